@@ -1,0 +1,1 @@
+"""handcal: calibrate an optical see-through headset with the wearer's bare hand."""

@@ -1,0 +1,1 @@
+"""Where frames come from: one interface for devices, recordings and the simulator."""

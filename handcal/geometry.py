@@ -1,0 +1,78 @@
+"""Rigid transforms and the pinhole: pure functions on arrays.
+
+Transforms are (4, 4) float64, ``T_dst_src``; points are rows of (N, 3) arrays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation, Slerp
+
+from handcal.types import Float64, Intrinsics
+
+
+def rigid(rotation: ArrayLike | None = None, translation_m: ArrayLike | None = None) -> Float64:
+    """Build a transform from a rotation, (3, 3) matrix or (3,) vector in rad, and a translation."""
+    T = np.eye(4)
+    if rotation is not None:
+        R = np.asarray(rotation, dtype=np.float64)
+        T[:3, :3] = Rotation.from_rotvec(R).as_matrix() if R.shape == (3,) else R
+    if translation_m is not None:
+        T[:3, 3] = translation_m
+    return T
+
+
+def invert(T_dst_src: Float64) -> Float64:
+    """Return ``T_src_dst`` of a rigid ``T_dst_src``."""
+    R = T_dst_src[:3, :3]
+    return rigid(R.T, -R.T @ T_dst_src[:3, 3])
+
+
+def transform(T_dst_src: Float64, points: ArrayLike) -> Float64:
+    """Map (N, 3) points by a (4, 4) affine transform."""
+    moved: Float64 = np.asarray(points, dtype=np.float64) @ T_dst_src[:3, :3].T + T_dst_src[:3, 3]
+    return moved
+
+
+def project(P: Float64, points: ArrayLike) -> Float64:
+    """Project (N, 3) points by a (3, 4) matrix to (N, 2) pixels.
+
+    Points on or behind the principal plane give NaN.
+    """
+    homogeneous = np.asarray(points, dtype=np.float64) @ P[:, :3].T + P[:, 3]
+    depth = homogeneous[:, 2:]
+    pixels: Float64 = homogeneous[:, :2] / np.where(depth > 0, depth, np.nan)
+    return pixels
+
+
+def camera_matrix(intrinsics: Intrinsics) -> Float64:
+    """Return the (3, 3) matrix K of a pinhole."""
+    return np.array(
+        [
+            [intrinsics.fx, 0.0, intrinsics.cx],
+            [0.0, intrinsics.fy, intrinsics.cy],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def interpolate_pose(T_0: Float64, T_1: Float64, fraction: float) -> Float64:
+    """Interpolate between two poses: the translation linearly, the rotation by slerp.
+
+    Parameters
+    ----------
+    T_0, T_1 : (4, 4) float64
+    fraction : float
+        0 gives `T_0`, 1 gives `T_1`.
+
+    Raises
+    ------
+    ValueError
+        If `fraction` lies outside 0..1: poses are never extrapolated.
+    """
+    if not 0.0 <= fraction <= 1.0:
+        raise ValueError(f"fraction {fraction} lies outside 0..1; poses are not extrapolated")
+    rotations = Rotation.from_matrix(np.stack([T_0[:3, :3], T_1[:3, :3]]))
+    R = Slerp([0.0, 1.0], rotations)(fraction).as_matrix()
+    return rigid(R, (1.0 - fraction) * T_0[:3, 3] + fraction * T_1[:3, 3])

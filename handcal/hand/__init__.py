@@ -1,0 +1,1 @@
+"""Find and segment the hand in a depth frame."""

@@ -1,0 +1,1 @@
+"""Datagrams between the PC and the headset."""

@@ -1,0 +1,1 @@
+"""Register the hand at alignment against the cursor, and solve the eye shift."""

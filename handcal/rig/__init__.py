@@ -1,0 +1,1 @@
+"""The offline calibration that everything starts from: the rig file."""

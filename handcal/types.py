@@ -1,0 +1,338 @@
+"""The values that travel through handcal: frozen, with read-only arrays, units and frames.
+
+Frames are named as in the paper (Hu, Rodriguez y Baena, Cutolo, ISMAR 2021): ``W`` world,
+``H`` headset camera rig, ``D`` depth camera, ``C0`` viewpoint of the offline calibration,
+``C1`` the wearer's eye, ``E`` ideal on-axis eye-display camera at C0, ``V`` the headset's
+rendering camera. ``T_dst_src`` maps column vectors from ``src`` to ``dst``. Axes are OpenCV's:
+x right, y down, z forward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+Float64: TypeAlias = NDArray[np.float64]
+Float32: TypeAlias = NDArray[np.float32]
+Bool: TypeAlias = NDArray[np.bool_]
+UInt8: TypeAlias = NDArray[np.uint8]
+UInt16: TypeAlias = NDArray[np.uint16]
+
+Eye: TypeAlias = Literal["left", "right"]
+EYES: tuple[Eye, Eye] = ("left", "right")
+Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]
+METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
+VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
+
+
+def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    """Return `values` as a read-only array of `dtype`, copying only if the dtype differs.
+
+    Parameters
+    ----------
+    values : array_like
+    dtype : dtype
+    shape : tuple of int or None
+        Required shape; None matches any length.
+
+    Raises
+    ------
+    ValueError
+        If the shape does not match.
+    """
+    array = np.asarray(values, dtype=dtype).view()
+    if len(array.shape) != len(shape) or any(
+        want is not None and got != want for got, want in zip(array.shape, shape, strict=True)
+    ):
+        wanted = "×".join("N" if want is None else str(want) for want in shape)
+        got = "×".join(map(str, array.shape)) or "scalar"
+        raise ValueError(f"expected an array of shape {wanted}, got {got}")
+    array.flags.writeable = False
+    return array
+
+
+def _freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) -> None:
+    value = getattr(instance, name)
+    if value is not None:
+        try:
+            object.__setattr__(instance, name, readonly(value, dtype, shape))
+        except ValueError as error:
+            raise ValueError(f"{type(instance).__name__}.{name}: {error}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A pinhole camera in pixels, with OpenCV's distortion coefficients (empty: none)."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One depth image with its colour image, as the camera delivers them.
+
+    Attributes
+    ----------
+    index : int
+        Running number given by the camera; a gap means dropped frames.
+    t_camera_ns, t_host_ns : int
+        The camera's own time, and the host's monotonic time of arrival.
+    depth : (H, W) uint16
+        0 where there is no measurement.
+    depth_scale_m : float
+        Metres per unit of `depth`.
+    depth_intrinsics : Intrinsics
+    color : (h, w, 3) uint8 or None
+        RGB.
+    color_intrinsics : Intrinsics or None
+    T_C_D : (4, 4) float64
+        From the depth camera to the colour camera; identity for depth aligned to colour.
+    """
+
+    index: int
+    t_camera_ns: int
+    t_host_ns: int
+    depth: UInt16
+    depth_scale_m: float
+    depth_intrinsics: Intrinsics
+    color: UInt8 | None = None
+    color_intrinsics: Intrinsics | None = None
+    T_C_D: Float64 = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        intrinsics = self.depth_intrinsics
+        _freeze(self, "depth", np.uint16, intrinsics.height, intrinsics.width)
+        _freeze(self, "T_C_D", np.float64, 4, 4)
+        if (self.color is None) != (self.color_intrinsics is None):
+            raise ValueError("Frame: color and color_intrinsics go together")
+        if self.color_intrinsics is not None:
+            size = self.color_intrinsics.height, self.color_intrinsics.width
+            _freeze(self, "color", np.uint8, *size, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandCloud:
+    """The segmented hand of one frame.
+
+    Attributes
+    ----------
+    t_camera_ns, t_host_ns : int
+        Times of the frame it came from.
+    points_m : (N, 3) float32
+        Visible surface, frame D.
+    is_cut : (N,) bool
+        True where the point lies beside a cut (forearm limit, ROI, image or depth-gate edge), so
+        that the hand goes on there; False elsewhere.
+    colors : (N, 3) uint8 or None
+        RGB of the points.
+    contour_m : (M, 3) float32
+        Outer contour in order around the hand, frame D.
+    contour_is_cut : (M,) bool
+        True on a cut edge, False on a silhouette.
+    mask : (H, W) uint8
+        255 on the hand, in the depth image.
+    box_px : (4,) int
+        x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive.
+    median_depth_m : float
+    """
+
+    t_camera_ns: int
+    t_host_ns: int
+    points_m: Float32
+    is_cut: Bool
+    colors: UInt8 | None
+    contour_m: Float32
+    contour_is_cut: Bool
+    mask: UInt8
+    box_px: tuple[int, int, int, int]
+    median_depth_m: float
+
+    def __post_init__(self) -> None:
+        _freeze(self, "points_m", np.float32, None, 3)
+        _freeze(self, "is_cut", np.bool_, len(self.points_m))
+        _freeze(self, "colors", np.uint8, len(self.points_m), 3)
+        _freeze(self, "contour_m", np.float32, None, 3)
+        _freeze(self, "contour_is_cut", np.bool_, len(self.contour_m))
+        _freeze(self, "mask", np.uint8, None, None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alignment:
+    """What one confirmed alignment gives the solver.
+
+    Attributes
+    ----------
+    cursor_m, hand_m : (N, 3), (M, 3) float64
+        The hand at t_a and at t_b, frame W.
+    cursor_is_cut, hand_is_cut : (N,), (M,) bool
+        Points beside a cut edge.
+    T_E_W : mapping of eye to (4, 4) float64
+        World to each eye's E at t_b.
+    eyes : tuple of eye
+        The eyes that the wearer aligned with: both, or one.
+    rotation_rad : (3,) float64
+        Rotation vector from the cursor to the hand seen by the guard at t_b, frame D.
+    t_a_ns, t_b_ns : int
+        Camera times of the two frames.
+    """
+
+    cursor_m: Float64
+    hand_m: Float64
+    cursor_is_cut: Bool
+    hand_is_cut: Bool
+    T_E_W: Mapping[Eye, Float64]
+    eyes: tuple[Eye, ...]
+    rotation_rad: Float64
+    t_a_ns: int
+    t_b_ns: int
+
+    def __post_init__(self) -> None:
+        _freeze(self, "cursor_m", np.float64, None, 3)
+        _freeze(self, "hand_m", np.float64, None, 3)
+        _freeze(self, "cursor_is_cut", np.bool_, len(self.cursor_m))
+        _freeze(self, "hand_is_cut", np.bool_, len(self.hand_m))
+        _freeze(self, "rotation_rad", np.float64, 3)
+        poses = {eye: readonly(T, np.float64, (4, 4)) for eye, T in self.T_E_W.items()}
+        object.__setattr__(self, "T_E_W", MappingProxyType(poses))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeShift:
+    """A solved eye shift φ from C0 to C1, in E's axes, and how far to trust it.
+
+    Attributes
+    ----------
+    shift_m : (3,) float64
+        φ1, φ2, φ3.
+    covariance_m2 : (3, 3) float64
+    rms_m : float
+        Root mean square distance of the inlier pairs after registration.
+    residuals_m : (M,) float64
+        Distance of each hand point to its partner after registration; NaN for an outlier.
+    inlier_ratio : float
+        Inlier pairs over hand points.
+    iterations : int
+    converged : bool
+    stop_reason : str
+    history_m2 : (iterations,) float64
+        Mean squared pair distance at each iteration.
+    method : str
+        One of `METHODS`, or ``"fused"``.
+    """
+
+    shift_m: Float64
+    covariance_m2: Float64
+    rms_m: float
+    residuals_m: Float64
+    inlier_ratio: float
+    iterations: int
+    converged: bool
+    stop_reason: str
+    history_m2: Float64
+    method: str
+
+    def __post_init__(self) -> None:
+        _freeze(self, "shift_m", np.float64, 3)
+        _freeze(self, "covariance_m2", np.float64, 3, 3)
+        _freeze(self, "residuals_m", np.float64, None)
+        _freeze(self, "history_m2", np.float64, None)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a solved eye shift may be used, and why."""
+
+    name: VerdictName
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Projection:
+    """What one eye of the headset renders with.
+
+    Attributes
+    ----------
+    eye : {"left", "right"}
+    P : (3, 4) float64
+        Pixels from points in V: ``ζ m = P [p_V; 1]``, OpenCV axes.
+    width_px, height_px : int
+        Size of the display.
+    """
+
+    eye: Eye
+    P: Float64
+    width_px: int
+    height_px: int
+
+    def __post_init__(self) -> None:
+        _freeze(self, "P", np.float64, 3, 4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeDisplay:
+    """One eye's offline calibration.
+
+    Attributes
+    ----------
+    K : (3, 3) float64
+        On-axis intrinsics of E, px.
+    H0 : (3, 3) float64
+        Homography correction of the viewpoint C0 (paper, eq. for H).
+    t_C0_V_m : (3,) float64
+        Position of V from C0 in E's axes, so that ``p_E = p_V + t_C0_V_m``.
+    z_C0_S_m : float
+        Distance from C0 to the display's focal plane S.
+    width_px, height_px : int
+    T_V_H : (4, 4) float64
+        From the headset rig to the rendering camera, as the headset reports it.
+    """
+
+    K: Float64
+    H0: Float64
+    t_C0_V_m: Float64
+    z_C0_S_m: float
+    width_px: int
+    height_px: int
+    T_V_H: Float64
+
+    def __post_init__(self) -> None:
+        _freeze(self, "K", np.float64, 3, 3)
+        _freeze(self, "H0", np.float64, 3, 3)
+        _freeze(self, "t_C0_V_m", np.float64, 3)
+        _freeze(self, "T_V_H", np.float64, 4, 4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """The offline calibration: both eye displays and where the depth camera sits.
+
+    Attributes
+    ----------
+    name : str
+    eyes : mapping of eye to EyeDisplay
+    T_H_D : (4, 4) float64
+        From the depth camera to the headset rig.
+    depth_intrinsics : Intrinsics
+    """
+
+    name: str
+    eyes: Mapping[Eye, EyeDisplay]
+    T_H_D: Float64
+    depth_intrinsics: Intrinsics
+
+    def __post_init__(self) -> None:
+        _freeze(self, "T_H_D", np.float64, 4, 4)
+        if set(self.eyes) != set(EYES):
+            raise ValueError("Rig.eyes: both left and right are needed")
+        object.__setattr__(self, "eyes", MappingProxyType(dict(self.eyes)))
