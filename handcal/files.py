@@ -1,0 +1,122 @@
+"""Reading files that may be hostile, and writing files that are never half there."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handcal.errors import FileError
+from handcal.types import UInt8
+
+MAX_JSON_BYTES = 16 * 2**20
+
+
+def write_atomic(path: Path, data: bytes) -> None:
+    """Write `data` so that `path` holds either its old content or all of the new.
+
+    Raises
+    ------
+    FileError
+        If the folder is missing, not writable or full.
+    """
+    try:
+        with tempfile.NamedTemporaryFile(
+            dir=path.parent, prefix=f".{path.name}.", delete=False
+        ) as file:
+            temporary = Path(file.name)
+            try:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+                temporary.replace(path)
+            except BaseException:
+                temporary.unlink(missing_ok=True)
+                raise
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def read_limited(path: Path, max_bytes: int) -> bytes:
+    """Return the content of `path`.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or holds more than `max_bytes`.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except OSError as error:
+        raise FileError(f"cannot read {path}: {error.strerror or error}") from error
+    if len(data) > max_bytes:
+        raise FileError(f"{path} is larger than the {max_bytes:,} bytes allowed for it")
+    return data
+
+
+def make_folder(path: Path) -> Path:
+    """Create `path` with its parents if needed and return it.
+
+    Raises
+    ------
+    FileError
+        If it cannot be created.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot create the folder {path}: {error.strerror or error}") from error
+    return path
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write `value` as indented JSON, atomically; NaN is refused with ValueError."""
+    write_atomic(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return the JSON object in `path`.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, is too large, or is not a JSON object.
+    """
+    data = read_limited(path, MAX_JSON_BYTES)
+    try:
+        value = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"{path} is not valid JSON: {error}") from error
+    if not isinstance(value, dict):
+        raise FileError(f"{path} must hold a JSON object")
+    return value
+
+
+def write_ply(path: Path, points_m: NDArray[np.floating], colors: UInt8 | None = None) -> None:
+    """Write (N, 3) points in metres, with (N, 3) RGB colours if given, as binary PLY."""
+    fields: list[tuple[str, str]] = [(axis, "<f4") for axis in "xyz"]
+    header = ["property float x", "property float y", "property float z"]
+    if colors is not None:
+        fields += [(channel, "u1") for channel in ("red", "green", "blue")]
+        header += ["property uchar red", "property uchar green", "property uchar blue"]
+    vertices = np.empty(len(points_m), dtype=fields)
+    for column, axis in enumerate("xyz"):
+        vertices[axis] = points_m[:, column]
+    if colors is not None:
+        for column, channel in enumerate(("red", "green", "blue")):
+            vertices[channel] = colors[:, column]
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment metres",
+        f"element vertex {len(vertices)}",
+        *header,
+        "end_header\n",
+    ]
+    write_atomic(path, "\n".join(lines).encode() + vertices.tobytes())
