@@ -1,0 +1,104 @@
+"""The eye-display model: how a moved eye changes what the headset must render.
+
+Pixel of world point v seen from the offline viewpoint C0: ``ζ m = K H0 E0 v``. Moving the eye by
+φ from C0 to C1, in E's axes, puts the update matrix UQ between H0 and E0 (paper, eq. for UQ).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handcal.geometry import project, rigid
+from handcal.types import EyeDisplay, Float64
+
+
+def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:
+    """Return UQ, the update of the offline model for an eye shift.
+
+    Parameters
+    ----------
+    shift_m : (3,) array_like
+        φ from C0 to C1 in E's axes.
+    display_distance_m : float
+        z(C0→S), from C0 to the display's focal plane.
+
+    Returns
+    -------
+    (4, 4) float64
+        ``UQ = [[1-φ3φ4, 0, φ1φ4, -φ1], [0, 1-φ3φ4, φ2φ4, -φ2], [0, 0, 1, -φ3], [0, 0, 0, 1]]``
+        with φ4 = 1/z(C0→S) (Hu et al. 2021, eq. for UQ).
+
+    Raises
+    ------
+    ValueError
+        If the shift is not three finite numbers, the distance is not positive, or the eye
+        would lie on or beyond the focal plane.
+    """
+    shift = np.asarray(shift_m, dtype=np.float64)
+    if shift.shape != (3,) or not np.isfinite(shift).all():
+        raise ValueError("shift_m must be three finite numbers in metres")
+    if not (np.isfinite(display_distance_m) and display_distance_m > 0):
+        raise ValueError(f"display_distance_m must be positive, got {display_distance_m}")
+    if shift[2] >= display_distance_m:
+        raise ValueError("the shifted eye would lie on or beyond the display's focal plane")
+    phi_1, phi_2, phi_3 = shift
+    phi_4 = 1.0 / display_distance_m
+    scale = 1.0 - phi_3 * phi_4
+    return np.array(
+        [
+            [scale, 0.0, phi_1 * phi_4, -phi_1],
+            [0.0, scale, phi_2 * phi_4, -phi_2],
+            [0.0, 0.0, 1.0, -phi_3],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def view_of_eye(display: EyeDisplay, T_W_H: Float64) -> Float64:
+    """Return ``T_E_W``, E0 at a moment, from the headset's pose: ``[I t(C0→V)] T_V_H T_H_W``."""
+    T_E_H = rigid(translation_m=display.t_C0_V_m) @ display.T_V_H
+    T_E_W: Float64 = T_E_H @ np.linalg.inv(T_W_H)
+    return T_E_W
+
+
+def eye_projection(display: EyeDisplay, shift_m: ArrayLike = (0.0, 0.0, 0.0)) -> Float64:
+    """Return ``K H0 UQ`` (3, 4): pixels on the display from points in E."""
+    UQ = update_matrix(shift_m, display.z_C0_S_m)
+    P: Float64 = display.K @ display.H0 @ UQ[:3]
+    return P
+
+
+def projection_matrix(display: EyeDisplay, shift_m: ArrayLike = (0.0, 0.0, 0.0)) -> Float64:
+    """Return P1 (3, 4), what the headset renders with: pixels from points in V.
+
+    ``P1 = K H0 UQ [I t(C0→V); 0 1]`` (Hu et al. 2021, eq. for P1). A zero shift gives the offline
+    calibration.
+    """
+    P: Float64 = eye_projection(display, shift_m) @ rigid(translation_m=display.t_C0_V_m)
+    return P
+
+
+def arcmin_from_px(display: EyeDisplay, error_px: ArrayLike) -> Float64:
+    """Convert distances on the display's centre from pixels to arcminutes."""
+    focal_px = (display.K @ display.H0)[0, 0]
+    arcmin: Float64 = 60.0 * np.degrees(np.arctan(np.asarray(error_px) / focal_px))
+    return arcmin
+
+
+def reprojection_error_px(
+    display: EyeDisplay, shift_m: ArrayLike, true_shift_m: ArrayLike, points_E_m: Float64
+) -> Float64:
+    """Return (N,) distances between where points are drawn and where the true eye needs them.
+
+    Parameters
+    ----------
+    display : EyeDisplay
+    shift_m, true_shift_m : (3,) array_like
+        The shift rendered with, and the eye's own.
+    points_E_m : (N, 3) float64
+        Points in E.
+    """
+    drawn = project(eye_projection(display, shift_m), points_E_m)
+    needed = project(eye_projection(display, true_shift_m), points_E_m)
+    return np.linalg.norm(drawn - needed, axis=1)
