@@ -1,0 +1,22 @@
+"""Where the files that ship with handcal lie, in a checkout and in an installed wheel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from handcal.errors import FileError
+
+
+def resource_path(name: str) -> Path:
+    """Return the path of the shipped file `name`.
+
+    Raises
+    ------
+    FileError
+        If it is missing: the installation is damaged.
+    """
+    package = Path(__file__).parent
+    for folder in (package / "_resources", package.parent / "resources"):
+        if (path := folder / name).exists():
+            return path
+    raise FileError(f"the shipped file {name} is missing; install handcal again")

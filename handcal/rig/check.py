@@ -1,0 +1,90 @@
+"""Whether a rig is plausible: every field checked, with what is wrong and what is expected."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from handcal.types import EYES, EyeDisplay, Float64, Intrinsics, Rig
+
+MAX_SIDE_PX = 16384
+ROTATION_TOLERANCE = 1e-5
+
+
+def check_rig(rig: Rig) -> None:
+    """Raise ValueError, naming the field and what is expected, if `rig` is implausible."""
+    require(
+        0 < len(rig.name) <= 200 and rig.name.isprintable(),
+        "name must be one line of 1 to 200 printable characters",
+    )
+    for eye in EYES:
+        _check_display(eye, rig.eyes[eye])
+    _check_rigid("T_H_D", rig.T_H_D)
+    _check_depth_camera(rig.depth_intrinsics)
+
+
+def require(condition: bool, problem: str) -> None:
+    """Raise ValueError with `problem` unless `condition` holds."""
+    if not condition:
+        raise ValueError(problem)
+
+
+def _check_display(eye: str, display: EyeDisplay) -> None:
+    K, H0 = display.K, display.H0
+    _check_camera(f"{eye}.K", K)
+    require(
+        bool((np.abs(H0) < 10).all()) and H0[2, 2] == 1 and np.linalg.det(H0) > 0,
+        f"{eye}.H0 must be a homography near the identity, with H0[2, 2] = 1",
+    )
+    require(
+        bool((np.abs(display.t_C0_V_m) < 0.1).all()),
+        f"{eye}.t_C0_V_m must be three numbers below 0.1 (metres)",
+    )
+    require(
+        0.1 <= display.z_C0_S_m <= 100,
+        f"{eye}.z_C0_S_m must lie between 0.1 and 100 (metres), got {display.z_C0_S_m}",
+    )
+    _check_size(eye, display.width_px, display.height_px)
+    _check_rigid(f"{eye}.T_V_H", display.T_V_H)
+
+
+def _check_depth_camera(intrinsics: Intrinsics) -> None:
+    _check_size("depth_camera", intrinsics.width, intrinsics.height)
+    fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy
+    _check_camera("depth_camera", np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
+    require(
+        len(intrinsics.distortion) in (0, 4, 5, 8, 12, 14)
+        and bool(np.isfinite(intrinsics.distortion).all()),
+        "depth_camera.distortion must hold 0, 4, 5, 8, 12 or 14 finite numbers (OpenCV's order)",
+    )
+
+
+def _check_camera(name: str, K: Float64) -> None:
+    require(
+        bool((np.abs(K) < 1e6).all())
+        and np.array_equal(np.tril(K, -1), np.zeros((3, 3)))
+        and K[0, 0] > 0
+        and K[1, 1] > 0
+        and K[2, 2] == 1,
+        f"{name} must be finite and upper triangular with positive focal lengths (pixels) and 1 "
+        "at the lower right",
+    )
+
+
+def _check_size(name: str, width: int, height: int) -> None:
+    require(
+        1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX,
+        f"{name}: width_px and height_px must lie between 1 and {MAX_SIDE_PX}, "
+        f"got {width} and {height}",
+    )
+
+
+def _check_rigid(name: str, T: Float64) -> None:
+    R = T[:3, :3]
+    require(
+        bool((np.abs(R) < 2).all())
+        and np.array_equal(T[3], [0, 0, 0, 1])
+        and np.allclose(R @ R.T, np.eye(3), rtol=0, atol=ROTATION_TOLERANCE)
+        and np.linalg.det(R) > 0,
+        f"{name} must be a rigid transform: an orthonormal, right-handed rotation over 0 0 0 1",
+    )
+    require(bool((np.abs(T[:3, 3]) < 1).all()), f"{name}: the translation must be below 1 (metres)")
