@@ -138,9 +138,9 @@ def openxr_view(projection: Projection) -> tuple[Pose, Fov]:
     """
     P = _metric(projection.P)
     K = P[:, :3]
-    if not np.allclose(K[[0, 1, 2, 2], [1, 0, 0, 1]] / [*np.diag(K)[:2], 1.0, 1.0], 0.0, atol=1e-9):
+    (fx, skew, cx), (v_from_x, fy, cy), (depth_from_x, depth_from_y, _) = K
+    if not np.allclose([skew / fx, v_from_x / fy, depth_from_x, depth_from_y], 0.0, atol=1e-9):
         raise ValueError("OpenXR cannot express this projection: it has skew or rotation")
-    (fx, _, cx), (_, fy, cy), _ = K
     eye_m = -np.linalg.solve(K, P[:, 3])
     fov = Fov(
         left_rad=float(np.arctan((-0.5 - cx) / fx)),

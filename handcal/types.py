@@ -31,7 +31,7 @@ VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
 
 
 def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """Return `values` as a read-only array of `dtype`, copying only if the dtype differs.
+    """Return `values` as a read-only array of `dtype` in C order, copying only if it is not.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...])
     ValueError
         If the shape does not match.
     """
-    array = np.asarray(values, dtype=dtype).view()
+    array = np.asarray(values, dtype=dtype, order="C").view()
     if len(array.shape) != len(shape) or any(
         want is not None and got != want for got, want in zip(array.shape, shape, strict=True)
     ):

@@ -1,0 +1,94 @@
+"""One alignment as the bytes of a plain, uncompressed .npz archive, bit for bit and back."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from handcal.types import EYES, Alignment
+
+_DTYPES = {
+    "cursor_m": "<f8",
+    "hand_m": "<f8",
+    "cursor_is_cut": "|b1",
+    "hand_is_cut": "|b1",
+    "rotation_rad": "<f8",
+    "t_ns": "<i8",
+    "eyes": "<U5",
+} | {f"T_E_W_{eye}": "<f8" for eye in EYES}
+
+
+def encode_alignment(alignment: Alignment) -> bytes:
+    """Return `alignment` as a .npz archive.
+
+    It holds `cursor_m`, `hand_m`, `cursor_is_cut`, `hand_is_cut` and `rotation_rad` as in
+    `Alignment`, `t_ns` (t_a, t_b), `eyes`, and `T_E_W_left` and `T_E_W_right` if known.
+    """
+    arrays: dict[str, Any] = {
+        "cursor_m": alignment.cursor_m,
+        "hand_m": alignment.hand_m,
+        "cursor_is_cut": alignment.cursor_is_cut,
+        "hand_is_cut": alignment.hand_is_cut,
+        "rotation_rad": alignment.rotation_rad,
+        "t_ns": [alignment.t_a_ns, alignment.t_b_ns],
+        "eyes": alignment.eyes,
+    } | {f"T_E_W_{eye}": T for eye, T in alignment.T_E_W.items()}
+    stream = io.BytesIO()
+    np.savez(
+        stream,
+        allow_pickle=False,
+        **{name: np.asarray(value, _DTYPES[name], order="C") for name, value in arrays.items()},
+    )
+    return stream.getvalue()
+
+
+def decode_alignment(data: bytes) -> Alignment:
+    """Return the alignment in a .npz archive, allocating no more than its own length.
+
+    Raises
+    ------
+    ValueError
+        If the archive is damaged or holds anything else.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            arrays = {
+                info.filename.removesuffix(".npy"): _decode_array(archive, info)
+                for info in archive.infolist()
+            }
+        t_a_ns, t_b_ns = map(int, arrays["t_ns"])
+        return Alignment(
+            cursor_m=arrays["cursor_m"],
+            hand_m=arrays["hand_m"],
+            cursor_is_cut=arrays["cursor_is_cut"],
+            hand_is_cut=arrays["hand_is_cut"],
+            T_E_W={eye: arrays[key] for eye in EYES if (key := f"T_E_W_{eye}") in arrays},
+            eyes=tuple(eye for name in arrays["eyes"] for eye in EYES if eye == name),
+            rotation_rad=arrays["rotation_rad"],
+            t_a_ns=t_a_ns,
+            t_b_ns=t_b_ns,
+        )
+    except KeyError as error:
+        raise ValueError(f"the alignment has no array {error}") from error
+    except (zipfile.BadZipFile, RuntimeError, EOFError, TypeError) as error:
+        raise ValueError(f"the alignment is damaged: {error}") from error
+
+
+def _decode_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
+    if info.compress_type != zipfile.ZIP_STORED:
+        raise ValueError(f"{info.filename} is compressed; alignments are stored plain")
+    data = archive.read(info)
+    stream = io.BytesIO(data)
+    if npy.read_magic(stream) != (1, 0):
+        raise ValueError(f"{info.filename} is not a version 1.0 array")
+    shape, fortran_order, dtype = npy.read_array_header_1_0(stream)
+    wanted = _DTYPES.get(info.filename.removesuffix(".npy"))
+    if dtype.str != wanted or fortran_order:
+        raise ValueError(f"{info.filename} holds {dtype.str}, not {wanted} in C order")
+    # A view of the bytes fails if the header promises more of them than there are.
+    return np.ndarray(shape, dtype, data, stream.tell()).copy()

@@ -1,0 +1,63 @@
+"""A lock on a file that one program at a time can hold.
+
+The system releases it when its holder ends, however it ends, so a lock cannot go stale; the
+process id in the file only tells a person who holds it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import BinaryIO
+
+from handcal.errors import FileError
+
+if sys.platform == "win32":
+    import msvcrt
+
+    # Windows locks bytes, and nobody else can read them: lock one far beyond the process id.
+    _LOCKED_BYTE = 2**30
+
+    def _try_lock(file: BinaryIO) -> None:
+        file.seek(_LOCKED_BYTE)
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        file.seek(0)
+else:
+    import fcntl
+
+    def _try_lock(file: BinaryIO) -> None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+class FileLock:
+    """Holds the lock at `path` from construction to `release`.
+
+    Raises
+    ------
+    FileError
+        If another program holds it, or the file cannot be opened.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            file = path.open("a+b")
+        except OSError as error:
+            raise FileError(f"cannot lock {path}: {error.strerror or error}") from error
+        try:
+            _try_lock(file)
+        except OSError as error:
+            file.seek(0)
+            holder = file.read(20).decode(errors="replace") or "unknown"
+            file.close()
+            raise FileError(
+                f"{path.parent} is in use by process {holder}; close it there first"
+            ) from error
+        file.truncate(0)
+        file.write(str(os.getpid()).encode())
+        file.flush()
+        self._file = file
+
+    def release(self) -> None:
+        """Give the lock back; safe to call twice."""
+        self._file.close()
