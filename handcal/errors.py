@@ -27,3 +27,11 @@ class LinkError(HandcalError):
 
 class FileError(HandcalError):
     """A file is missing, malformed, too large or of an unknown version."""
+
+
+class PoseError(HandcalError):
+    """The headset's pose at a time cannot be told; the text says why."""
+
+
+class PosePendingError(PoseError):
+    """The headset's pose at a time has not arrived yet; asking again soon may succeed."""

@@ -1,0 +1,210 @@
+"""The headset's end of the link."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from handcal.link import handcal_pb2 as pb
+from handcal.link import messages, wire
+from handcal.link.endpoint import Channel, Endpoint
+from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
+from handcal.link.reliable import Outgoing
+from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
+from handcal.link.transport import Address, UdpTransport, local_address, resolve
+from handcal.link.wire import Slot
+from handcal.types import EYES, Eye, Float64, Projection
+
+_POSES_PER_DATAGRAM = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadsetState:
+    """What the PC wants shown.
+
+    Attributes
+    ----------
+    cursor_W_m, live_W_m : (N, 3) float64 or None
+        The frozen and the live hand, frame W; None where there is none.
+    cursor_id : int
+    live_red : bool
+        Whether the live hand is drawn red, turned too far.
+    prompt : str
+    eyes : tuple of eye
+        The eyes to keep open.
+    projections : mapping of eye to Projection
+        What each eye renders with, where the PC has said so.
+    """
+
+    cursor_W_m: Float64 | None = None
+    cursor_id: int = 0
+    live_W_m: Float64 | None = None
+    live_red: bool = False
+    prompt: str = ""
+    eyes: tuple[Eye, ...] = EYES
+    projections: Mapping[Eye, Projection] = field(default_factory=dict)
+
+
+class HeadsetClient(Endpoint):
+    """Finds the PC, tells it poses and confirmations, and holds what it wants shown.
+
+    Parameters
+    ----------
+    server : (host, port)
+    pairing_key : bytes
+        Shared with the PC; at least 16 bytes.
+    clock_ns : callable
+        The headset's clock, ns.
+    settings : LinkSettings
+    impairment : Impairment
+        What happens to the datagrams of both directions.
+
+    Raises
+    ------
+    LinkError
+        If the server's name or network is unknown.
+    ValueError
+        If the key is too short.
+    """
+
+    def __init__(
+        self,
+        server: Address,
+        pairing_key: bytes,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+        settings: LinkSettings = DEFAULT_SETTINGS,
+        impairment: Impairment = UNIMPAIRED,
+    ) -> None:
+        keys = wire.derive_keys(pairing_key)
+        self._server = resolve(*server)
+        transport = UdpTransport(local_address(self._server), settings.receive_buffer_bytes)
+        super().__init__(
+            ImpairedTransport(transport, impairment), keys.to_pc, keys.to_headset, settings
+        )
+        self._clock_ns = clock_ns
+        self._recent_poses: deque[tuple[int, Float64]] = deque(maxlen=_POSES_PER_DATAGRAM)
+        self._state = HeadsetState()
+        self._live_frame = 0
+        self._live_chunks: dict[int, Float64] = {}
+        self._nonce = secrets.randbits(64)
+        self._joined_s = 0.0
+        self._next_hello_s = 0.0
+        self._start()
+
+    def send_pose(self, T_W_H: Float64, t_headset_ns: int) -> None:
+        """Send the headset's pose at a time of its own clock.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            self._require_running()
+            self._recent_poses.append((t_headset_ns, T_W_H))
+            self._send(messages.poses(self._recent_poses))
+
+    def confirm(self, T_E_W: Mapping[Eye, Float64], t_headset_ns: int, cursor_id: int) -> Outgoing:
+        """Tell reliably that the hand covers the cursor, with E0 of both eyes at that time.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.CONFIRM, messages.confirm(T_E_W, t_headset_ns, cursor_id))
+
+    def state(self) -> HeadsetState:
+        """Return what the PC wants shown now.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            self._require_running()
+            return self._state
+
+    def _greet(self, envelope: pb.Envelope, address: Address) -> None:
+        welcome = envelope.welcome
+        is_mine = welcome.nonce == self._nonce and address == self._server
+        if self._channel is None and is_mine:
+            self._channel = Channel(welcome.session, address)
+            self._nonce = secrets.randbits(64)  # used up, so that no old welcome is ever taken
+            self._dismissed = False
+            self._joined_s = time.monotonic()
+            self._next_hello_s = 0.0
+            self._live_frame = 0
+            self._state = HeadsetState(projections=self._state.projections)
+
+    def _handle(self, envelope: pb.Envelope) -> None:
+        match envelope.WhichOneof("body"):
+            case "ping":
+                self._answer(envelope.ping)
+            case "cursor":
+                cursor = envelope.cursor
+                points = messages.read_points(cursor.points)
+                self._state = replace(
+                    self._state,
+                    cursor_W_m=points if len(points) else None,
+                    cursor_id=cursor.cursor_id,
+                )
+            case "live_hand":
+                self._take_live_hand(envelope.live_hand)
+            case "prompt":
+                text, eyes = messages.read_prompt(envelope.prompt)
+                self._state = replace(self._state, prompt=text, eyes=eyes)
+            case "projection":
+                projection = messages.read_projection(envelope.projection)
+                projections = {**self._state.projections, projection.eye: projection}
+                self._state = replace(self._state, projections=projections)
+            case other:
+                raise messages.MalformedError(f"a PC sends no {other}")
+
+    def _take_live_hand(self, live: pb.LiveHand) -> None:
+        if live.frame < self._live_frame:
+            return
+        if live.frame > self._live_frame:
+            self._live_frame = live.frame
+            self._live_chunks.clear()
+        if live.chunk < messages.MAX_CHUNKS:
+            self._live_chunks[live.chunk] = messages.read_points(live.points)
+        points = np.concatenate(list(self._live_chunks.values()))
+        self._state = replace(
+            self._state, live_W_m=points if len(points) else None, live_red=live.red
+        )
+
+    def _answer(self, ping: pb.Ping) -> None:
+        received_ns = self._clock_ns()
+        if self._channel is None:
+            return
+        window = self._channel.window
+        pong = pb.Pong(
+            t_sent_host_ns=ping.t_sent_host_ns,
+            t_received_headset_ns=received_ns,
+            t_sent_headset_ns=self._clock_ns(),
+            highest_sequence=window.highest,
+            accepted=window.accepted,
+        )
+        self._send(pb.Envelope(pong=pong))
+
+    def _tick(self, now_s: float) -> None:
+        if now_s < self._next_hello_s:
+            return
+        self._next_hello_s = now_s + self._settings.hello_period_s
+        channel = self._channel
+        if channel is not None and now_s - max(channel.heard_s, self._joined_s) > (
+            self._settings.silence_s
+        ):
+            self._channel = channel = None
+        if channel is None:
+            self._send_greeting(pb.Envelope(hello=pb.Hello(nonce=self._nonce)), self._server)
+        else:
+            # The first one opens the session at the PC, the others keep it alive.
+            self._send(messages.ack())

@@ -1,0 +1,116 @@
+"""The headset's clock against the host's, from pings."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.errors import PosePendingError
+
+DRIFT_PRIOR = 50e-6
+"""Standard deviation of a crystal's drift before anything is measured, s/s."""
+
+MIN_SAMPLES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ClockFit:
+    """``t_headset - t_host = offset_ns + drift × (t_host - reference_host_ns)``.
+
+    Attributes
+    ----------
+    reference_host_ns : int
+    offset_ns, drift : float
+    round_trip_ns : float
+        Median over the pings kept.
+    uncertainty_ns : float
+        Half the shortest round trip, beyond which no asymmetry of the way can push the offset,
+        plus the standard error of the fit.
+    """
+
+    reference_host_ns: int
+    offset_ns: float
+    drift: float
+    round_trip_ns: float
+    uncertainty_ns: float
+
+
+class ClockEstimator:
+    """Estimates offset and drift from the four times of each ping, as NTP does (RFC 5905, 8).
+
+    A ping that waited somewhere tells little: one of round trip r bounds the offset to ±r/2, so
+    the line fit weighs each by its delay beyond the shortest.
+    """
+
+    def __init__(self, samples: int = 300) -> None:
+        self._samples: deque[tuple[int, int, int]] = deque(maxlen=samples)
+        self.fit: ClockFit | None = None
+
+    def add(
+        self,
+        sent_host_ns: int,
+        received_headset_ns: int,
+        sent_headset_ns: int,
+        received_host_ns: int,
+    ) -> None:
+        """Take the times of one ping; one whose round trip is negative is ignored."""
+        round_trip = (received_host_ns - sent_host_ns) - (sent_headset_ns - received_headset_ns)
+        if round_trip < 0:
+            return
+        offset = (received_headset_ns - sent_host_ns + sent_headset_ns - received_host_ns) // 2
+        self._samples.append(((sent_host_ns + received_host_ns) // 2, offset, round_trip))
+        if len(self._samples) >= MIN_SAMPLES:
+            self.fit = _fit(self._samples)
+
+    def to_headset_ns(self, host_ns: int) -> int:
+        """Convert a host time.
+
+        Raises
+        ------
+        PosePendingError
+            If too few pings have come back yet.
+        """
+        fit = self._ready()
+        elapsed = host_ns - fit.reference_host_ns
+        return host_ns + round(fit.offset_ns + fit.drift * elapsed)
+
+    def to_host_ns(self, headset_ns: int) -> int:
+        """Convert a headset time.
+
+        Raises
+        ------
+        PosePendingError
+            If too few pings have come back yet.
+        """
+        fit = self._ready()
+        elapsed = headset_ns - fit.reference_host_ns - round(fit.offset_ns)
+        return fit.reference_host_ns + elapsed - round(fit.drift / (1 + fit.drift) * elapsed)
+
+    def _ready(self) -> ClockFit:
+        if self.fit is None:
+            raise PosePendingError("the headset's clock is not known yet; wait for a few pings")
+        return self.fit
+
+
+def _fit(samples: deque[tuple[int, int, int]]) -> ClockFit:
+    reference_host, reference_offset, _ = samples[-1]
+    # Small differences of large integers first: a float64 holds only 53 bits.
+    elapsed, offset, round_trip = np.array(
+        [(t - reference_host, o - reference_offset, r) for t, o, r in samples], dtype=np.float64
+    ).T
+    shortest = round_trip.min()
+    # A microsecond for the clock's own grain, and half of what the ping lost on its way.
+    sigma = 1e3 + 0.5 * (round_trip - shortest)
+    A = np.column_stack([np.ones_like(elapsed), elapsed / 1e9]) / sigma[:, None]
+    prior = np.diag([0.0, 1 / (DRIFT_PRIOR * 1e9) ** 2])
+    covariance = np.linalg.inv(A.T @ A + prior)
+    offset_ns, drift_ns_per_s = covariance @ A.T @ (offset / sigma)
+    return ClockFit(
+        reference_host,
+        reference_offset + float(offset_ns),
+        float(drift_ns_per_s) / 1e9,
+        float(np.median(round_trip)),
+        float(0.5 * shortest + np.sqrt(covariance[0, 0])),
+    )

@@ -1,0 +1,278 @@
+"""What both ends of the link share: the thread, the session, reliable delivery and counters."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import Self
+
+from handcal.errors import LinkError
+from handcal.link import handcal_pb2 as pb
+from handcal.link import messages, wire
+from handcal.link.messages import MalformedError
+from handcal.link.reliable import Delivery, Inbox, Outbox, Outgoing
+from handcal.link.settings import LinkSettings
+from handcal.link.transport import Address, Transport
+from handcal.link.wire import Packet, Rejection, ReplayWindow, Slot
+
+_LOG = logging.getLogger(__name__)
+_HANDSHAKE_SESSION = 0
+_BYES = 3
+
+
+@dataclass(slots=True)
+class Channel:
+    """A session with one peer at one address."""
+
+    session: int
+    address: Address
+    heard_s: float = -math.inf
+    sequence: int = 0
+    window: ReplayWindow = field(default_factory=ReplayWindow)
+    inbox: Inbox = field(default_factory=Inbox)
+
+
+class Endpoint(ABC):
+    """One end of the link; its thread runs from `_start` to `close`.
+
+    Every method is safe to call from any thread. Names with an underscore are for the two
+    subclasses, which hold `_changed` where they touch what the thread touches.
+    """
+
+    def __init__(
+        self, transport: Transport, send_key: bytes, receive_key: bytes, settings: LinkSettings
+    ) -> None:
+        self._transport = transport
+        self._send_key = send_key
+        self._receive_key = receive_key
+        self._settings = settings
+        self._changed = threading.Condition(threading.RLock())
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
+        self._failure: Exception | None = None
+        self._channel: Channel | None = None
+        self._dismissed = False
+        self._outbox = Outbox(settings)
+        self._stream: deque[pb.Envelope] = deque()
+        self._next_burst_s = 0.0
+        self._sent = Counter[str]()
+        self._received = Counter[str]()
+        self._rejected = Counter[Rejection]()
+
+    @property
+    def address(self) -> Address:
+        """Where this end listens."""
+        return self._transport.address
+
+    @property
+    def connected(self) -> bool:
+        """Whether the other end was heard lately."""
+        with self._changed:
+            return self._channel is not None and not self._is_silent(self._channel)
+
+    @property
+    def dismissed(self) -> bool:
+        """Whether the other end has said good-bye and not come back."""
+        with self._changed:
+            return self._dismissed
+
+    def wait_connected(self, timeout_s: float) -> None:
+        """Wait for the other end.
+
+        Raises
+        ------
+        LinkError
+            If it has not come within `timeout_s`.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._failure or self.connected, timeout_s)
+            self._require_running()
+            if not self.connected:
+                raise LinkError(
+                    f"nobody with this pairing key answered within {timeout_s:g} s; "
+                    "check the address, the key and the firewall"
+                )
+
+    def wait_acked(self, message: Outgoing, timeout_s: float) -> None:
+        """Wait until the other end has acknowledged a message.
+
+        Raises
+        ------
+        LinkError
+            If it has not within `timeout_s`, was given up, or a newer message replaced it.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._failure or message.state is not Delivery.PENDING, timeout_s
+            )
+            self._require_running()
+            name = message.slot.name.lower().replace("_", " ")
+            if message.state is Delivery.SUPERSEDED:
+                raise LinkError(f"the {name} was replaced by a newer one before it arrived")
+            if message.state is not Delivery.ACKED:
+                raise LinkError(f"the {name} was not acknowledged; is the other end still there?")
+
+    def close(self) -> None:
+        """Say good-bye, stop the thread and release the socket; safe to call twice."""
+        if self._closing.is_set():
+            return
+        with self._changed:
+            self._closing.set()
+            for _ in range(_BYES):
+                self._send(pb.Envelope(bye=pb.Bye()))
+        self._thread.join()
+        self._transport.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @abstractmethod
+    def _greet(self, envelope: pb.Envelope, address: Address) -> None:
+        """Handle a message of the handshake."""
+
+    @abstractmethod
+    def _handle(self, envelope: pb.Envelope) -> None:
+        """Handle a message of the session."""
+
+    @abstractmethod
+    def _tick(self, now_s: float) -> None:
+        """Do what is due; called at least every `idle_wait_s`."""
+
+    def _start(self) -> None:
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            while not self._closing.is_set():
+                arrived = self._transport.receive(self._wait_s())
+                with self._changed:
+                    for datagram, address in arrived:
+                        self._take(datagram, address)
+                    self._work(time.monotonic())
+        except Exception as error:
+            _LOG.exception("the link stopped")
+            with self._changed:
+                self._failure = error
+                self._changed.notify_all()
+
+    def _require_running(self) -> None:
+        if self._failure is not None:
+            raise LinkError(f"the link has stopped: {self._failure}") from self._failure
+        if self._closing.is_set():
+            raise LinkError("the link is closed")
+
+    def _wait_s(self) -> float:
+        with self._changed:
+            is_busy = self._stream or self._outbox.has_queued
+        return self._settings.burst_pause_s if is_busy else self._settings.idle_wait_s
+
+    def _take(self, datagram: bytes, address: Address) -> None:
+        packet = wire.unseal(self._receive_key, datagram)
+        if isinstance(packet, Rejection):
+            self._rejected[packet] += 1
+            return
+        try:
+            if packet.session == _HANDSHAKE_SESSION:
+                self._greet(messages.parse(packet.payload), address)
+            elif (channel := self._find_channel(packet.session, address)) is None:
+                self._rejected[Rejection.WRONG_SESSION] += 1
+            elif not channel.window.accept(packet.sequence):
+                self._rejected[Rejection.REPLAYED] += 1
+            else:
+                self._accept(channel, packet)
+        except MalformedError:
+            self._rejected[Rejection.CORRUPT] += 1
+
+    def _find_channel(self, session: int, address: Address) -> Channel | None:
+        channel = self._channel
+        is_current = channel is not None and (channel.session, channel.address) == (
+            session,
+            address,
+        )
+        return channel if is_current else None
+
+    def _accept(self, channel: Channel, packet: Packet) -> None:
+        channel.heard_s = time.monotonic()
+        self._received["datagrams"] += 1
+        self._received["bytes"] += len(packet.payload)
+        is_reliable = packet.slot is not Slot.UNRELIABLE
+        payload = channel.inbox.receive(packet) if is_reliable else packet.payload
+        if payload is None:
+            return
+        envelope = messages.parse(payload)
+        match envelope.WhichOneof("body"):
+            case "ack":
+                for receipt in messages.read_ack(envelope.ack):
+                    self._outbox.acknowledge(receipt)
+            case "bye":
+                self._channel = None
+                self._dismissed = True
+            case _:
+                self._handle(envelope)
+
+    def _work(self, now_s: float) -> None:
+        for message in self._outbox.expire(now_s):
+            _LOG.warning("gave up sending the %s", message.slot.name.lower())
+        if self._channel is not None:
+            receipts = self._channel.inbox.take_receipts()
+            if receipts:
+                self._send(messages.ack(receipts))
+            if now_s >= self._next_burst_s:
+                self._send_burst(now_s)
+        self._tick(now_s)
+        self._changed.notify_all()
+
+    def _send_burst(self, now_s: float) -> None:
+        budget = self._settings.burst_datagrams
+        packets = self._outbox.due(now_s, budget)
+        for packet in packets:
+            self._send_packet(packet)
+        count = min(len(self._stream), budget - len(packets))
+        for _ in range(count):
+            self._send(self._stream.popleft())
+        if packets or count:
+            self._next_burst_s = now_s + self._settings.burst_pause_s
+
+    def _send_reliably(self, slot: Slot, envelope: pb.Envelope) -> Outgoing:
+        with self._changed:
+            self._require_running()
+            return self._outbox.send(slot, envelope.SerializeToString(), time.monotonic())
+
+    def _send(self, envelope: pb.Envelope) -> None:
+        """Send within the session, if there is one, without delivery guarantee."""
+        self._send_packet(Packet(envelope.SerializeToString()))
+
+    def _send_packet(self, packet: Packet) -> None:
+        channel = self._channel
+        if channel is None:
+            return
+        channel.sequence += 1
+        self._post(
+            replace(packet, session=channel.session, sequence=channel.sequence), channel.address
+        )
+
+    def _send_greeting(self, envelope: pb.Envelope, address: Address) -> None:
+        self._post(Packet(envelope.SerializeToString(), _HANDSHAKE_SESSION), address)
+
+    def _post(self, packet: Packet, address: Address) -> None:
+        datagram = wire.seal(self._send_key, packet)
+        self._sent["datagrams"] += 1
+        self._sent["bytes"] += len(datagram)
+        self._transport.send(datagram, address)
+
+    def _is_silent(self, channel: Channel) -> bool:
+        return time.monotonic() - channel.heard_s > self._settings.silence_s

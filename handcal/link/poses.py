@@ -1,0 +1,77 @@
+"""The headset's recent poses, and its pose at a time between them."""
+
+from __future__ import annotations
+
+import bisect
+
+from handcal.errors import PoseError, PosePendingError
+from handcal.geometry import interpolate_pose
+from handcal.types import Float64
+
+
+class PoseBuffer:
+    """Poses ``T_W_H`` by headset time, in order however they arrive.
+
+    Parameters
+    ----------
+    capacity : int
+        Poses kept.
+    max_gap_s : float
+        Poses farther apart are not interpolated between.
+    """
+
+    def __init__(self, capacity: int = 1000, max_gap_s: float = 0.05) -> None:
+        self._capacity = capacity
+        self._max_gap_ns = round(max_gap_s * 1e9)
+        self._times_ns: list[int] = []
+        self._poses: list[Float64] = []
+
+    def add(self, t_headset_ns: int, T_W_H: Float64) -> None:
+        """Take a pose; one already known is ignored."""
+        index = bisect.bisect_left(self._times_ns, t_headset_ns)
+        if index < len(self._times_ns) and self._times_ns[index] == t_headset_ns:
+            return
+        self._times_ns.insert(index, t_headset_ns)
+        self._poses.insert(index, T_W_H)
+        del self._times_ns[: -self._capacity], self._poses[: -self._capacity]
+
+    def at(self, t_headset_ns: int) -> Float64:
+        """Return the pose at a time: translation interpolated linearly, rotation by slerp.
+
+        Returns
+        -------
+        (4, 4) float64
+            ``T_W_H``.
+
+        Raises
+        ------
+        PosePendingError
+            If the time lies after the newest pose.
+        PoseError
+            If it lies before the oldest, or in too wide a gap.
+        """
+        times = self._times_ns
+        if not times or t_headset_ns > times[-1]:
+            raise PosePendingError("the headset's pose for this time has not arrived yet")
+        index = bisect.bisect_left(times, t_headset_ns)
+        if times[index] == t_headset_ns:
+            return self._poses[index]
+        if index == 0:
+            late_ms = (times[0] - t_headset_ns) / 1e6
+            raise PoseError(f"the time lies {late_ms:.0f} ms before the oldest pose kept")
+        gap_ns = times[index] - times[index - 1]
+        if gap_ns > self._max_gap_ns:
+            raise PoseError(
+                f"the headset's poses have a gap of {gap_ns / 1e6:.0f} ms at this time; "
+                f"at most {self._max_gap_ns / 1e6:.0f} ms can be interpolated"
+            )
+        fraction = (t_headset_ns - times[index - 1]) / gap_ns
+        return interpolate_pose(self._poses[index - 1], self._poses[index], fraction)
+
+    def rate_hz(self) -> float:
+        """Return the mean rate over the newest second of poses; 0 with fewer than two."""
+        first = (
+            bisect.bisect_left(self._times_ns, self._times_ns[-1] - 10**9) if self._times_ns else 0
+        )
+        recent = self._times_ns[first:]
+        return (len(recent) - 1) / (recent[-1] - recent[0]) * 1e9 if len(recent) > 1 else 0.0

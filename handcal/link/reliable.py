@@ -1,0 +1,208 @@
+"""Reliable delivery of the newest message of each slot. No sockets; time is an argument.
+
+The sender keeps one message per slot: a newer one replaces it, acknowledged or not. The receiver
+acknowledges fragments by bitmap, so only missing ones are sent again, and delivers each message
+once and never after a newer one of its slot. Holding one message per slot bounds the memory.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from enum import Enum, auto
+
+from handcal.link import wire
+from handcal.link.settings import LinkSettings
+from handcal.link.wire import Packet, Slot
+
+
+class Delivery(Enum):
+    """Where a reliable message stands."""
+
+    PENDING = auto()
+    ACKED = auto()
+    SUPERSEDED = auto()
+    FAILED = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """Fragments of a message that have arrived: bit i of `fragments` is fragment i."""
+
+    slot: int
+    message_id: int
+    fragments: int
+
+
+@dataclass(slots=True, eq=False)
+class Outgoing:
+    """A reliable message on its way, and the handle to wait for it with."""
+
+    slot: Slot
+    message_id: int
+    fragments: list[bytes]
+    deadline_s: float
+    backoff_s: float
+    resend_at_s: float
+    state: Delivery = Delivery.PENDING
+    is_resend: bool = False
+    queue: deque[int] = field(default_factory=deque)
+    missing: set[int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.missing = set(range(len(self.fragments)))
+
+
+class Outbox:
+    """The sender's half.
+
+    Attributes
+    ----------
+    resent : int
+        Fragments sent again.
+    acked, failed : int
+        Messages acknowledged, and given up.
+    """
+
+    def __init__(self, settings: LinkSettings) -> None:
+        self._settings = settings
+        self._newest: dict[Slot, Outgoing] = {}
+        self._next_id = 1
+        self.resent = 0
+        self.acked = 0
+        self.failed = 0
+
+    @property
+    def unacked(self) -> int:
+        """Messages still waiting for their acknowledgement."""
+        return len(self._pending())
+
+    @property
+    def has_queued(self) -> bool:
+        """Whether fragments wait for nothing but their turn."""
+        return any(message.queue for message in self._pending())
+
+    def send(self, slot: Slot, payload: bytes, now_s: float) -> Outgoing:
+        """Queue a message in place of the slot's older one."""
+        message = Outgoing(
+            slot,
+            self._next_id,
+            wire.split(payload),
+            deadline_s=now_s + self._settings.give_up_s,
+            backoff_s=self._settings.resend_s,
+            resend_at_s=now_s,
+        )
+        self._next_id += 1
+        older = self._newest.get(slot)
+        if older is not None and older.state is Delivery.PENDING:
+            older.state = Delivery.SUPERSEDED
+        self._newest[slot] = message
+        return message
+
+    def restart(self, now_s: float) -> None:
+        """Send the newest message of every slot to a receiver that knows none of them."""
+        for message in self._newest.values():
+            message.state = Delivery.PENDING
+            message.missing = set(range(len(message.fragments)))
+            message.queue.clear()
+            message.is_resend = False
+            message.deadline_s = now_s + self._settings.give_up_s
+            message.backoff_s = self._settings.resend_s
+            message.resend_at_s = now_s
+
+    def due(self, now_s: float, budget: int) -> list[Packet]:
+        """Return at most `budget` fragments to send now, session and sequence left open."""
+        packets: list[Packet] = []
+        for message in self._pending():
+            if not message.queue and now_s >= message.resend_at_s:
+                message.queue.extend(sorted(message.missing))
+            while message.queue and len(packets) < budget:
+                packets.append(self._take(message, now_s))
+        return packets
+
+    def _take(self, message: Outgoing, now_s: float) -> Packet:
+        index = message.queue.popleft()
+        self.resent += message.is_resend
+        if not message.queue:
+            message.is_resend = True
+            message.resend_at_s = now_s + message.backoff_s
+            message.backoff_s = min(2 * message.backoff_s, self._settings.resend_max_s)
+        return Packet(
+            message.fragments[index],
+            slot=message.slot,
+            message_id=message.message_id,
+            fragment=index,
+            fragment_count=len(message.fragments),
+        )
+
+    def acknowledge(self, receipt: Receipt) -> None:
+        """Take note of what the receiver has; a receipt of no pending message does nothing."""
+        for message in self._pending():
+            if (message.slot, message.message_id) != (receipt.slot, receipt.message_id):
+                continue
+            arrived = {index for index in message.missing if receipt.fragments >> index & 1}
+            if arrived:
+                message.missing -= arrived
+                message.backoff_s = self._settings.resend_s
+            if not message.missing:
+                message.state = Delivery.ACKED
+                self.acked += 1
+
+    def expire(self, now_s: float) -> list[Outgoing]:
+        """Give up the messages whose time is over and return them."""
+        expired = [message for message in self._pending() if now_s >= message.deadline_s]
+        for message in expired:
+            message.state = Delivery.FAILED
+        self.failed += len(expired)
+        return expired
+
+    def _pending(self) -> list[Outgoing]:
+        return [m for m in self._newest.values() if m.state is Delivery.PENDING]
+
+
+@dataclass(slots=True)
+class _Incoming:
+    message_id: int
+    fragment_count: int
+    fragments: dict[int, bytes] = field(default_factory=dict)
+    is_complete: bool = False
+
+    def receipt(self, slot: Slot) -> Receipt:
+        indices = range(self.fragment_count) if self.is_complete else self.fragments
+        return Receipt(slot, self.message_id, sum(1 << index for index in indices))
+
+
+class Inbox:
+    """The receiver's half."""
+
+    def __init__(self) -> None:
+        self._newest: dict[Slot, _Incoming] = {}
+        self._touched: set[Slot] = set()
+
+    def receive(self, packet: Packet) -> bytes | None:
+        """Take a fragment; return its message if that completes it."""
+        message = self._newest.get(packet.slot)
+        if message is None or packet.message_id > message.message_id:
+            message = _Incoming(packet.message_id, packet.fragment_count)
+            self._newest[packet.slot] = message
+        if (packet.message_id, packet.fragment_count) != (
+            message.message_id,
+            message.fragment_count,
+        ):
+            return None
+        self._touched.add(packet.slot)
+        if message.is_complete:
+            return None
+        message.fragments[packet.fragment] = packet.payload
+        if len(message.fragments) < message.fragment_count:
+            return None
+        complete = b"".join(message.fragments[index] for index in range(message.fragment_count))
+        message.is_complete = True
+        message.fragments.clear()
+        return complete
+
+    def take_receipts(self) -> list[Receipt]:
+        """Return what to acknowledge since the last call."""
+        receipts = [self._newest[slot].receipt(slot) for slot in sorted(self._touched)]
+        self._touched.clear()
+        return receipts
