@@ -97,11 +97,10 @@ def _box_px(
     vertices_m = transform(T_D_hand, hand.vertices_m)
     if vertices_m[:, 2].min() < _NEAR_M:
         return 0, 0, 0, 0
-    pixels = project(camera_matrix(intrinsics) @ rigid()[:3], vertices_m)
-    size = np.array([intrinsics.width, intrinsics.height])
-    x0, y0 = np.floor(pixels.min(0)).clip(0, size).astype(int).tolist()
-    x1, y1 = np.ceil(pixels.max(0) + 1).clip(0, size).astype(int).tolist()
-    return x0, y0, x1, y1
+    u, v = project(camera_matrix(intrinsics) @ rigid()[:3], vertices_m).T.copy()
+    x0, x1 = np.clip([np.floor(u.min()), np.ceil(u.max()) + 1], 0, intrinsics.width)
+    y0, y1 = np.clip([np.floor(v.min()), np.ceil(v.max()) + 1], 0, intrinsics.height)
+    return int(x0), int(y0), int(x1), int(y1)
 
 
 def visible_points(

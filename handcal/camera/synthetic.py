@@ -1,0 +1,154 @@
+"""A simulated depth camera: the embedded default, which needs no hardware."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from handcal.errors import CameraError, CameraTimeoutError
+from handcal.geometry import invert, rigid
+from handcal.sim.raster import D415
+from handcal.sim.render import World, render
+from handcal.sim.scene import SceneState
+from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.types import Frame, Intrinsics
+
+_POLL_S = 0.002
+# Colour of an Intel RealSense D415 at 1280x720: 69° across, 15 mm beside the depth (data sheet).
+_COLOR = Intrinsics(width=1280, height=720, fx=925.0, fy=925.0, cx=642.0, cy=362.0)
+_T_C_D = rigid([0.002, -0.003, 0.001], [0.015, 0.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True)
+class SyntheticSettings:
+    """The simulated camera.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Frames per second at most; fewer where rendering takes longer.
+    aligned : bool
+        Colour rendered in the depth camera's own image, as after the SDK's alignment; otherwise a
+        raw pair from two cameras.
+    clock_offset_s, clock_drift : float
+        The camera's clock is ``(1 + clock_drift) t + clock_offset_s`` of the host's t.
+    sensor : SensorSettings
+    """
+
+    rate_hz: float = 30.0
+    aligned: bool = True
+    clock_offset_s: float = 123.456
+    clock_drift: float = 20e-6
+    sensor: SensorSettings = field(default_factory=SensorSettings)
+
+
+class SyntheticCamera:
+    """Renders the world as a D415 would measure it; implements `Camera`.
+
+    Parameters
+    ----------
+    world : World
+    scene : callable
+        Returns the moving part of the world as it is now, or None while there is none.
+    depth_intrinsics : Intrinsics
+    seed : int
+        Of the sensor's noise.
+    settings : SyntheticSettings
+    """
+
+    name = "Simulated camera"
+
+    def __init__(
+        self,
+        world: World,
+        scene: Callable[[], SceneState | None],
+        *,
+        depth_intrinsics: Intrinsics = D415,
+        seed: int = 0,
+        settings: SyntheticSettings | None = None,
+    ) -> None:
+        self.depth_intrinsics = depth_intrinsics
+        self._world = world
+        self._scene = scene
+        self._settings = settings or SyntheticSettings()
+        self._rng = np.random.default_rng(seed)
+        self._index = 0
+        self._next_s = time.monotonic()
+        self._is_open = True
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        """Render the next frame, at the camera's rate.
+
+        Its host time is that of its arrival, after exposure and rendering, as with a real camera.
+
+        Raises
+        ------
+        CameraTimeoutError
+            If there is nothing to see within `timeout_s`.
+        CameraError
+            If the camera was closed.
+        """
+        if not self._is_open:
+            raise CameraError("the simulated camera is closed; open it again")
+        deadline_s = time.monotonic() + timeout_s
+        state = None
+        while state is None:
+            now_s = time.monotonic()
+            if now_s >= self._next_s:
+                state = self._scene()
+            if state is None and now_s >= deadline_s:
+                raise CameraTimeoutError(
+                    f"the simulated camera saw nothing within {timeout_s:g} s: "
+                    "start the virtual headset, which brings the wearer"
+                )
+            if state is None:
+                time.sleep(np.clip(self._next_s - now_s, _POLL_S, deadline_s - now_s + _POLL_S))
+        self._next_s = max(self._next_s + 1.0 / self._settings.rate_hz, time.monotonic())
+        return self._expose(state)
+
+    def _expose(self, state: SceneState) -> Frame:
+        settings = self._settings
+        depth_m, color = render(self._world, state.T_W_D, state.T_W_hand, self.depth_intrinsics)
+        depth = sense_depth(depth_m, self.depth_intrinsics.fx, self._rng, settings.sensor)
+        camera_s_per_s = 1.0 + settings.clock_drift
+        frame = Frame(
+            index=self._index,
+            t_camera_ns=round(state.t_ns * camera_s_per_s + 1e9 * settings.clock_offset_s),
+            t_host_ns=time.monotonic_ns(),
+            depth=depth,
+            depth_scale_m=settings.sensor.depth_scale_m,
+            depth_intrinsics=self.depth_intrinsics,
+            color=color,
+            color_intrinsics=self.depth_intrinsics,
+        )
+        self._index += 1
+        if settings.aligned:
+            return frame
+        _, color = render(self._world, state.T_W_D @ invert(_T_C_D), state.T_W_hand, _COLOR)
+        return replace(
+            frame,
+            color=color,
+            color_intrinsics=_COLOR,
+            T_C_D=_T_C_D,
+            t_host_ns=time.monotonic_ns(),
+        )
+
+    def close(self) -> None:
+        """Stop; safe to call twice."""
+        self._is_open = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

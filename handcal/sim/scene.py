@@ -1,0 +1,155 @@
+"""Light: how the simulated world reaches the simulated camera in another process.
+
+The virtual headset hosts the wearer, whose head and hand the camera has to see. Their true poses
+travel as datagrams over loopback; only the synthetic camera reads them, to render frames, and
+nothing else of the engine may.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from handcal.types import Float64, _freeze
+
+_MAGIC = b"hcS1"
+# Magic, host time in ns, whether there is a hand, and the upper 3x4 of both poses by rows.
+_DATAGRAM = struct.Struct("<4sq?12d12d")
+_STALE_NS = 1_000_000_000
+_RIGID_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneState:
+    """The moving part of the world at one instant.
+
+    Attributes
+    ----------
+    t_ns : int
+        Host's monotonic time.
+    T_W_D : (4, 4) float64
+        True pose of the depth camera.
+    T_W_hand : (4, 4) float64 or None
+        True pose of the hand; None while it is out of sight.
+    """
+
+    t_ns: int
+    T_W_D: Float64
+    T_W_hand: Float64 | None
+
+    def __post_init__(self) -> None:
+        _freeze(self, "T_W_D", np.float64, 4, 4)
+        _freeze(self, "T_W_hand", np.float64, 4, 4)
+
+
+def pack(state: SceneState) -> bytes:
+    """Return the state as a datagram."""
+    T_W_hand = np.eye(4) if state.T_W_hand is None else state.T_W_hand
+    poses = np.concatenate([state.T_W_D[:3].ravel(), T_W_hand[:3].ravel()])
+    return _DATAGRAM.pack(_MAGIC, state.t_ns, state.T_W_hand is not None, *poses)
+
+
+def unpack(datagram: bytes) -> SceneState | None:
+    """Return the state in a datagram, or None if it is not one with rigid poses."""
+    if len(datagram) != _DATAGRAM.size:
+        return None
+    magic, t_ns, has_hand, *numbers = _DATAGRAM.unpack(datagram)
+    poses = np.tile(np.eye(4), (2, 1, 1))
+    poses[:, :3] = np.reshape(numbers, (2, 3, 4))
+    if magic != _MAGIC or not all(map(_is_rigid, poses)):
+        return None
+    return SceneState(t_ns, poses[0], poses[1] if has_hand else None)
+
+
+def _is_rigid(T: Float64) -> bool:
+    R = T[:3, :3]
+    if not (np.isfinite(T).all() and np.abs(T).max() < 1e3):
+        return False
+    return bool(np.allclose(R @ R.T, np.eye(3), atol=_RIGID_TOLERANCE) and np.linalg.det(R) > 0)
+
+
+class ScenePublisher:
+    """Sends states to a receiver on this machine."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.connect(("127.0.0.1", port))
+
+    def publish(self, state: SceneState) -> None:
+        """Send a state; nobody listening is no error, as with light."""
+        with suppress(ConnectionRefusedError):
+            self._socket.send(pack(state))
+
+    def close(self) -> None:
+        """Close the socket; safe to call twice."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class SceneReceiver:
+    """Keeps the newest state that a publisher sent.
+
+    Parameters
+    ----------
+    port : int
+        0 takes a free one.
+
+    Attributes
+    ----------
+    port : int
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", port))
+        self._socket.setblocking(False)
+        self.port: int = self._socket.getsockname()[1]
+        self._newest: SceneState | None = None
+
+    def latest(self) -> SceneState | None:
+        """Return the newest state, or None if none came within the last second."""
+        now_ns = time.monotonic_ns()
+        while True:
+            try:
+                state = unpack(self._socket.recv(_DATAGRAM.size + 1))
+            except BlockingIOError:
+                break
+            if state is None or not now_ns - _STALE_NS < state.t_ns <= time.monotonic_ns():
+                continue
+            if self._newest is None or state.t_ns > self._newest.t_ns:
+                self._newest = state
+        if self._newest is not None and self._newest.t_ns < now_ns - _STALE_NS:
+            self._newest = None
+        return self._newest
+
+    def close(self) -> None:
+        """Close the socket; safe to call twice."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

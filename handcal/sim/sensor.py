@@ -1,0 +1,121 @@
+"""What a stereo depth camera makes of an ideal depth image.
+
+Modelled on the Intel RealSense D415: the depth image is that of the left imager, and depth comes
+from the disparity d = f B / z to the right imager, so that σz = z² σd / (f B).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from handcal.types import Bool, Float32, UInt16
+
+
+@dataclass(frozen=True, slots=True)
+class SensorSettings:
+    """The depth sensor.
+
+    Attributes
+    ----------
+    baseline_m : float
+        Between the imagers; D415: 55 mm (data sheet).
+    disparity_sigma_px : float
+        Subpixel error of the matching.
+    correlation_px : float
+        Neighbours share matching windows and so errors: standard deviation of the Gaussian that
+        correlates them.
+    disparity_step_px : float
+        The matcher's resolution; D4xx: 1/32 px.
+    edge_px : int
+        Width of the band along a depth edge where the matching window sees both sides.
+    edge_hole_ratio, edge_flying_ratio : float
+        Of the pixels in that band, those without a depth, and those with a depth in between.
+    depth_scale_m : float
+        Metres per unit.
+    """
+
+    baseline_m: float = 0.055
+    disparity_sigma_px: float = 0.08
+    correlation_px: float = 2.0
+    disparity_step_px: float = 1.0 / 32.0
+    edge_px: int = 3
+    edge_hole_ratio: float = 0.35
+    edge_flying_ratio: float = 0.15
+    depth_scale_m: float = 0.0001
+
+
+# Disparity that differs by more than this within the band is an edge, not a slope.
+_EDGE_STEP_PX = 4.0
+
+
+def sense_depth(
+    depth_m: Float32, focal_px: float, rng: np.random.Generator, settings: SensorSettings
+) -> UInt16:
+    """Turn an ideal depth image into a measured one.
+
+    Parameters
+    ----------
+    depth_m : (H, W) float32
+        Positive everywhere.
+    focal_px : float
+        Horizontal focal length.
+    rng : numpy.random.Generator
+    settings : SensorSettings
+
+    Returns
+    -------
+    (H, W) uint16
+        In units of `settings.depth_scale_m`; 0 where there is no measurement.
+    """
+    fB = focal_px * settings.baseline_m
+    disparity = np.float32(fB) / depth_m
+    hidden = _hidden_from_the_right(disparity)
+    hidden |= _blur_edges(disparity, rng, settings)
+    disparity += settings.disparity_sigma_px * _correlated_noise(
+        disparity.shape, settings.correlation_px, rng
+    )
+    np.rint(disparity / settings.disparity_step_px, out=disparity)
+    units = fB / settings.disparity_step_px / settings.depth_scale_m
+    # OpenCV rounds, saturates, and gives 0 for a disparity of 0.
+    measured = np.asarray(cv2.divide(units, disparity, dtype=cv2.CV_16U), dtype=np.uint16)
+    measured[hidden] = 0
+    return measured
+
+
+def _hidden_from_the_right(disparity: Float32) -> Bool:
+    """Return where a nearer surface hides the point from the right imager.
+
+    Pixel u appears at u − d there; whatever lies to its right in the left image and yet lands at
+    or left of it passes in front of it.
+    """
+    right_px = np.arange(disparity.shape[1], dtype=np.float32) - disparity
+    leftmost = np.minimum.accumulate(right_px[:, ::-1], axis=1)[:, ::-1]
+    return right_px > leftmost
+
+
+def _blur_edges(disparity: Float32, rng: np.random.Generator, settings: SensorSettings) -> Bool:
+    """Spread flying pixels along depth edges, in place, and return where the edges are holes."""
+    window = np.ones((settings.edge_px, settings.edge_px), dtype=np.uint8)
+    far, near = cv2.erode(disparity, window), cv2.dilate(disparity, window)
+    edge = np.flatnonzero(near - far > _EDGE_STEP_PX)
+    fate = rng.random(len(edge))
+    holes = np.zeros(disparity.shape, dtype=np.bool_)
+    holes.flat[edge[fate < settings.edge_hole_ratio]] = True
+    flying = edge[fate > 1.0 - settings.edge_flying_ratio]
+    share = rng.random(len(flying), dtype=np.float32)
+    disparity.flat[flying] = far.flat[flying] + share * (near.flat[flying] - far.flat[flying])
+    return holes
+
+
+def _correlated_noise(
+    shape: tuple[int, ...], correlation_px: float, rng: np.random.Generator
+) -> Float32:
+    """Return Gaussian noise of unit variance that neighbours share; drawn at half resolution."""
+    half = rng.standard_normal((shape[0] // 2 + 1, shape[1] // 2 + 1), dtype=np.float32)
+    smooth = cv2.GaussianBlur(half, (0, 0), correlation_px / 2.0)
+    noise = np.asarray(cv2.resize(smooth, (shape[1], shape[0])), dtype=np.float32)
+    noise /= noise.std()
+    return noise
