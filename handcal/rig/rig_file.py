@@ -1,7 +1,7 @@
 """The rig file: the offline calibration in OpenCV's FileStorage YAML.
 
 Anything that reads FileStorage reads it. Per eye: K, H0, t_C0_V_m, z_C0_S_m, the display's size
-and T_V_H; for the depth camera: T_H_D and its intrinsics. Numbers survive the file bit for bit.
+and T_V_H; for the depth camera: T_H_D and its intrinsics. Numbers survive exactly.
 """
 
 from __future__ import annotations

@@ -1,0 +1,24 @@
+import numpy as np
+import pytest
+
+from handcal.geometry import rigid
+from handcal.types import Alignment
+
+
+@pytest.fixture(scope="session")
+def alignment() -> Alignment:
+    rng = np.random.default_rng(1)
+    return Alignment(
+        cursor_m=rng.normal(size=(40, 3)),
+        hand_m=rng.normal(size=(50, 3)),
+        cursor_is_cut=rng.random(40) < 0.1,
+        hand_is_cut=rng.random(50) < 0.1,
+        T_E_W={
+            "left": rigid(rng.normal(size=3), rng.normal(size=3)),
+            "right": rigid(rng.normal(size=3), rng.normal(size=3)),
+        },
+        eyes=("right",),
+        rotation_rad=rng.normal(size=3),
+        t_a_ns=1_700_000_000_123_456_789,
+        t_b_ns=1_700_000_003_123_456_789,
+    )

@@ -1,0 +1,68 @@
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from handcal.geometry import rigid
+from handcal.rig.check import check_rig
+from handcal.rig.example import example_rig
+from handcal.types import Float64, Rig
+
+
+def with_display(**changes: object) -> Rig:
+    rig = example_rig()
+    left = dataclasses.replace(rig.eyes["left"], **changes)  # type: ignore[arg-type]
+    return dataclasses.replace(rig, eyes={"left": left, "right": rig.eyes["right"]})
+
+
+def with_depth_camera(**changes: object) -> Rig:
+    rig = example_rig()
+    return dataclasses.replace(
+        rig,
+        depth_intrinsics=dataclasses.replace(rig.depth_intrinsics, **changes),  # type: ignore[arg-type]
+    )
+
+
+def edited(A: Float64, row: int, column: int, value: float) -> Float64:
+    A = A.copy()
+    A[row, column] = value
+    return A
+
+
+LEFT = example_rig().eyes["left"]
+LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: dataclasses.replace(example_rig(), name="two\nlines"), "name must be one line"),
+        (lambda: dataclasses.replace(example_rig(), name=""), "name must be one line"),
+        (lambda: with_display(K=edited(LEFT.K, 0, 0, -2456.0)), r"left\.K .* positive focal"),
+        (lambda: with_display(K=edited(LEFT.K, 1, 1, np.nan)), r"left\.K .* finite"),
+        (lambda: with_display(K=edited(LEFT.K, 2, 0, 0.1)), r"left\.K .* upper triangular"),
+        (lambda: with_display(H0=np.zeros((3, 3))), r"left\.H0 .* homography"),
+        (lambda: with_display(H0=edited(LEFT.H0, 0, 2, np.inf)), r"left\.H0"),
+        (lambda: with_display(t_C0_V_m=[1.0, -2.0, 3.0]), r"left\.t_C0_V_m .* \(metres\)"),
+        (lambda: with_display(t_C0_V_m=[np.nan, 0.0, 0.0]), r"left\.t_C0_V_m"),
+        (lambda: with_display(z_C0_S_m=2000.0), r"left\.z_C0_S_m .* got 2000"),
+        (lambda: with_display(z_C0_S_m=-2.0), r"left\.z_C0_S_m .* got -2"),
+        (lambda: with_display(width_px=0), "left: width_px .* got 0 and 720"),
+        (lambda: with_display(height_px=10**6), "left: width_px .* got 1268 and 1000000"),
+        (lambda: with_display(T_V_H=LEFT_HANDED), r"left\.T_V_H .* right-handed"),
+        (lambda: with_display(T_V_H=1.001 * LEFT.T_V_H), r"left\.T_V_H .* rigid"),
+        (lambda: with_display(T_V_H=rigid(None, [30.0, 0, 0])), r"left\.T_V_H: the translation"),
+        (
+            lambda: dataclasses.replace(example_rig(), T_H_D=np.full((4, 4), 1e300)),
+            "T_H_D .* rigid",
+        ),
+        (lambda: with_depth_camera(fx=np.nan), "depth_camera must be finite"),
+        (lambda: with_depth_camera(width=0), "depth_camera: width_px"),
+        (lambda: with_depth_camera(distortion=(0.1,)), r"depth_camera\.distortion must hold"),
+        (lambda: with_depth_camera(distortion=(np.inf,) * 5), r"depth_camera\.distortion"),
+    ],
+)
+def test_an_implausible_field_is_named(make: Callable[[], Rig], problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        check_rig(make())

@@ -1,0 +1,60 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.display import projection_matrix
+from handcal.geometry import camera_matrix, invert, project, transform
+from handcal.resources import resource_path
+from handcal.rig.check import check_rig
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import write_rig
+from handcal.types import EYES, EyeDisplay, Float64
+
+
+def viewpoint_in_H_m(display: EyeDisplay) -> Float64:
+    """C0 lies at -t_C0_V in V."""
+    point: Float64 = transform(invert(display.T_V_H), -display.t_C0_V_m[None])[0]
+    return point
+
+
+def test_the_shipped_file_is_the_example(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    write_rig(path, example_rig())
+    assert path.read_text() == resource_path("example_rig.yaml").read_text()
+
+
+def test_it_is_plausible() -> None:
+    check_rig(example_rig())
+
+
+def test_the_viewpoints_are_an_eye_distance_apart() -> None:
+    left, right = (viewpoint_in_H_m(example_rig().eyes[eye]) for eye in EYES)
+    np.testing.assert_allclose(right - left, [0.063, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("distance_m", [0.4, 0.5, 0.6])
+@pytest.mark.parametrize("eye", EYES)
+def test_the_depth_camera_sees_everything_that_is_displayed(eye: str, distance_m: float) -> None:
+    rig = example_rig()
+    display = rig.eyes["left" if eye == "left" else "right"]
+    width, height = display.width_px, display.height_px
+    corners_px = np.array([[0, 0], [width, 0], [width, height], [0, height]]) - 0.5
+    P = projection_matrix(display)
+    # A point at the distance z from the viewpoint: p_V with ζ = z, from its pixel.
+    rays = np.column_stack([corners_px, np.ones(4)]) * distance_m
+    points_V_m = np.linalg.solve(P[:, :3], rays.T - P[:, 3:]).T
+    np.testing.assert_allclose(project(P, points_V_m), corners_px, atol=1e-9)
+    points_D_m = transform(invert(rig.T_H_D) @ invert(display.T_V_H), points_V_m)
+    pixels = project(camera_matrix(rig.depth_intrinsics) @ np.eye(3, 4), points_D_m)
+    size = rig.depth_intrinsics.width, rig.depth_intrinsics.height
+    assert (pixels > 0).all()
+    assert (pixels < size).all()
+
+
+def test_a_hand_before_the_eyes_lies_within_the_depth_gate() -> None:
+    rig = example_rig()
+    middle_m = np.mean([viewpoint_in_H_m(rig.eyes[eye]) for eye in EYES], axis=0)
+    hand_H_m = middle_m + np.array([0.0, 0.03, 0.5])
+    depth_m = transform(invert(rig.T_H_D), hand_H_m[None])[0, 2]
+    assert 0.35 < depth_m < 0.7

@@ -1,0 +1,108 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.errors import FileError
+from handcal.files import (
+    make_folder,
+    read_json,
+    read_limited,
+    write_atomic,
+    write_json,
+    write_ply,
+)
+
+
+def test_write_replaces_the_whole_content_and_leaves_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    write_atomic(path, b"a long first content")
+    write_atomic(path, b"short")
+    assert path.read_bytes() == b"short"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_failed_write_keeps_the_old_content(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.bin"
+    write_atomic(path, b"old")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(FileError, match="No space left on device"):
+        write_atomic(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"cannot write .*: No such file"):
+        write_atomic(tmp_path / "gone" / "a.bin", b"")
+
+
+def test_reading_is_limited(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"12345")
+    assert read_limited(path, 5) == b"12345"
+    with pytest.raises(FileError, match="larger than the 4 bytes"):
+        read_limited(path, 4)
+    with pytest.raises(FileError, match="cannot read"):
+        read_limited(tmp_path / "missing", 4)
+    with pytest.raises(FileError, match="cannot read"):
+        read_limited(tmp_path, 4)
+
+
+def test_make_folder_makes_parents_and_takes_an_existing_one(tmp_path: Path) -> None:
+    path = tmp_path / "a" / "b"
+    assert make_folder(path) == make_folder(path) == path
+    assert path.is_dir()
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match="cannot create the folder"):
+        make_folder(tmp_path / "file" / "c")
+
+
+def test_json_keeps_every_bit_of_a_number(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    value = {"x": 0.1 + 0.2, "tiny": 5e-324, "text": "φ", "list": [1, None, True]}
+    write_json(path, value)
+    assert read_json(path) == value
+
+
+def test_json_refuses_nan(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="JSON compliant"):
+        write_json(tmp_path / "a.json", {"x": float("nan")})
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"{", "not valid JSON"),
+        (b"", "not valid JSON"),
+        (b"\xff", "not valid JSON"),
+        (b"[" * 100_000, "not valid JSON"),
+        (json.dumps([1]).encode(), "must hold a JSON object"),
+    ],
+)
+def test_bad_json_is_a_file_error(tmp_path: Path, content: bytes, problem: str) -> None:
+    path = tmp_path / "a.json"
+    path.write_bytes(content)
+    with pytest.raises(FileError, match=problem):
+        read_json(path)
+
+
+@pytest.mark.parametrize("colored", [False, True])
+def test_opencv_reads_our_ply(tmp_path: Path, colored: bool) -> None:
+    rng = np.random.default_rng(0)
+    points_m = rng.normal(size=(9, 3)).astype(np.float32)
+    colors = rng.integers(0, 256, (9, 3), dtype=np.uint8) if colored else None
+    path = tmp_path / "a.ply"
+    write_ply(path, points_m, colors)
+    read_points, _, read_colors = cv2.loadPointCloud(str(path))
+    assert np.array_equal(read_points.reshape(-1, 3), points_m)
+    if colors is not None:
+        assert np.array_equal(np.rint(read_colors.reshape(-1, 3) * 255), colors)

@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from handcal.geometry import (
+    camera_matrix,
+    interpolate_pose,
+    invert,
+    project,
+    rigid,
+    transform,
+)
+from handcal.types import Float64, Intrinsics
+
+COORDINATE = st.floats(-3, 3, allow_subnormal=False)
+VECTORS = st.tuples(COORDINATE, COORDINATE, COORDINATE)
+TRANSFORMS = st.builds(rigid, VECTORS, VECTORS)
+POINTS = np.random.default_rng(0).normal(size=(7, 3))
+
+
+def close(A: Float64, B: Float64) -> bool:
+    return np.allclose(A, B, rtol=0, atol=1e-12)
+
+
+@given(TRANSFORMS)
+def test_inverse_undoes_and_is_an_involution(T: Float64) -> None:
+    assert close(invert(T) @ T, np.eye(4))
+    assert close(T @ invert(T), np.eye(4))
+    assert close(invert(invert(T)), T)
+
+
+@given(TRANSFORMS, TRANSFORMS)
+def test_a_product_applies_one_transform_after_the_other(T_c_b: Float64, T_b_a: Float64) -> None:
+    assert close(transform(T_c_b @ T_b_a, POINTS), transform(T_c_b, transform(T_b_a, POINTS)))
+    assert close(invert(T_c_b @ T_b_a), invert(T_b_a) @ invert(T_c_b))
+
+
+@given(TRANSFORMS)
+def test_rigid_transforms_keep_distances_and_handedness(T: Float64) -> None:
+    moved = transform(T, POINTS)
+    before = np.linalg.norm(POINTS[1:] - POINTS[:-1], axis=1)
+    assert close(np.linalg.norm(moved[1:] - moved[:-1], axis=1), before)
+    assert np.isclose(np.linalg.det(T), 1.0)
+
+
+def test_rigid_takes_a_vector_or_a_matrix() -> None:
+    # A quarter turn about z takes x to y.
+    T = rigid([0.0, 0.0, np.pi / 2], [1.0, 2.0, 3.0])
+    assert close(transform(T, [[1.0, 0.0, 0.0]]), np.array([[1.0, 3.0, 3.0]]))
+    assert close(rigid(T[:3, :3], T[:3, 3]), T)
+    assert close(rigid(), np.eye(4))
+
+
+def test_project_by_hand() -> None:
+    # u = 100 · 0.2/0.5 + 50 = 90, v = 200 · (-0.1)/0.5 + 60 = 20
+    K = camera_matrix(Intrinsics(100, 120, 100.0, 200.0, 50.0, 60.0))
+    P = K @ np.eye(3, 4)
+    assert close(project(P, [[0.2, -0.1, 0.5]]), np.array([[90.0, 20.0]]))
+
+
+def test_project_gives_nan_on_and_behind_the_principal_plane() -> None:
+    pixels = project(np.eye(3, 4), [[0.1, 0.1, 0.0], [0.1, 0.1, -1.0], [0.1, 0.1, 1.0]])
+    assert np.isnan(pixels).all(axis=1).tolist() == [True, True, False]
+
+
+@given(TRANSFORMS, TRANSFORMS, st.floats(0, 1))
+def test_interpolation_runs_evenly_from_one_pose_to_the_other(
+    T_0: Float64, T_1: Float64, fraction: float
+) -> None:
+    T = interpolate_pose(T_0, T_1, fraction)
+    assert close(interpolate_pose(T_0, T_1, 0.0), T_0)
+    assert close(interpolate_pose(T_0, T_1, 1.0), T_1)
+    assert close(T[:3, 3], (1 - fraction) * T_0[:3, 3] + fraction * T_1[:3, 3])
+    whole = Rotation.from_matrix(T_1[:3, :3] @ T_0[:3, :3].T).magnitude()
+    part = Rotation.from_matrix(T[:3, :3] @ T_0[:3, :3].T).magnitude()
+    assert np.isclose(part, fraction * whole, atol=1e-7)
+
+
+@pytest.mark.parametrize("fraction", [-0.001, 1.001, np.nan])
+def test_poses_are_not_extrapolated(fraction: float) -> None:
+    with pytest.raises(ValueError, match="not extrapolated"):
+        interpolate_pose(np.eye(4), np.eye(4), fraction)

@@ -1,0 +1,48 @@
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from handcal.errors import FileError
+from handcal.lock import FileLock
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from handcal.lock import FileLock
+lock = FileLock(Path(sys.argv[1]))
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+def test_only_one_can_hold_it_and_the_holder_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    lock = FileLock(path)
+    with pytest.raises(FileError, match=f"in use by process {os.getpid()};"):
+        FileLock(path)
+    lock.release()
+    lock.release()
+    FileLock(path).release()
+
+
+def test_a_killed_holder_leaves_it_free(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE
+    ) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"held\n"
+        with pytest.raises(FileError, match=f"in use by process {holder.pid};"):
+            FileLock(path)
+        holder.send_signal(signal.SIGKILL)
+        holder.wait()
+        FileLock(path).release()
+
+
+def test_a_missing_folder_says_so(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"cannot lock .*: No such file"):
+        FileLock(tmp_path / "gone" / "lock")

@@ -1,0 +1,75 @@
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from handcal.geometry import rigid
+from handcal.rig.example import example_rig
+from handcal.types import Alignment, Frame, Intrinsics, Projection, Rig, readonly
+
+INTRINSICS = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
+
+
+def frame(**changes: object) -> Frame:
+    fields: dict[str, object] = {
+        "index": 0,
+        "t_camera_ns": 1,
+        "t_host_ns": 2,
+        "depth": np.zeros((3, 4), np.uint16),
+        "depth_scale_m": 0.001,
+        "depth_intrinsics": INTRINSICS,
+    }
+    return Frame(**(fields | changes))  # type: ignore[arg-type]
+
+
+def test_readonly_keeps_the_memory_of_a_fitting_array_and_leaves_the_original_writable() -> None:
+    original = np.zeros((2, 3))
+    frozen = readonly(original, np.float64, (None, 3))
+    assert np.shares_memory(original, frozen)
+    assert original.flags.writeable
+    with pytest.raises(ValueError, match="read-only"):
+        frozen[0, 0] = 1.0
+
+
+def test_readonly_puts_arrays_in_c_order() -> None:
+    assert readonly(np.zeros((3, 2)).T, np.float64, (2, 3)).flags.c_contiguous
+
+
+@pytest.mark.parametrize("shape", [(3,), (2, 2), (1, 2, 3)])
+def test_readonly_refuses_a_wrong_shape(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="expected an array of shape N×3, got"):
+        readonly(np.zeros(shape), np.float64, (None, 3))
+
+
+def test_values_are_frozen_and_their_arrays_read_only(alignment: Alignment) -> None:
+    with pytest.raises(FrozenInstanceError):
+        alignment.t_a_ns = 0  # type: ignore[misc]
+    for array in (alignment.cursor_m, alignment.T_E_W["left"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 1.0
+    with pytest.raises(TypeError):
+        alignment.T_E_W["left"] = np.eye(4)  # type: ignore[index]
+
+
+def test_a_wrong_shape_names_the_field() -> None:
+    with pytest.raises(ValueError, match=r"Projection\.P: expected an array of shape 3×4"):
+        Projection("left", np.eye(4), 10, 10)
+
+
+def test_a_frame_must_fit_its_intrinsics() -> None:
+    assert frame().depth.shape == (3, 4)
+    with pytest.raises(ValueError, match=r"Frame\.depth: expected an array of shape 3×4, got 4×3"):
+        frame(depth=np.zeros((4, 3), np.uint16))
+
+
+def test_a_frame_needs_colour_and_its_intrinsics_together() -> None:
+    color = np.zeros((3, 4, 3), np.uint8)
+    assert frame(color=color, color_intrinsics=INTRINSICS).color is not None
+    with pytest.raises(ValueError, match="go together"):
+        frame(color=color)
+
+
+def test_a_rig_needs_both_eyes() -> None:
+    rig = example_rig()
+    with pytest.raises(ValueError, match="both left and right"):
+        Rig("one eye", {"left": rig.eyes["left"]}, rigid(), rig.depth_intrinsics)
