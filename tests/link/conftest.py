@@ -1,0 +1,119 @@
+"""A hand-made headset and PC: what an attacker, or a broken peer, could send."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from handcal.link import handcal_pb2 as pb
+from handcal.link import wire
+from handcal.link.server import HeadsetServer
+from handcal.link.transport import Address
+from handcal.link.wire import Packet
+
+KEY = b"a pairing key of the tests"
+
+
+@pytest.fixture
+def pairing_key() -> bytes:
+    return KEY
+
+
+@pytest.fixture
+def eventually() -> Callable[..., None]:
+    return _eventually
+
+
+def _eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
+    """Wait until a condition holds; fail if it does not in time."""
+    end_s = time.monotonic() + timeout_s
+    while not is_true():
+        assert time.monotonic() < end_s, "the condition never held"
+        time.sleep(0.002)
+
+
+class RawPeer:
+    """A socket that seals and opens datagrams itself."""
+
+    def __init__(self, send_key: bytes, receive_key: bytes) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(3.0)
+        self.address: Address = self.socket.getsockname()
+        self._send_key = send_key
+        self._receive_key = receive_key
+
+    def seal(self, envelope: pb.Envelope, session: int = 0, sequence: int = 0) -> bytes:
+        packet = Packet(envelope.SerializeToString(), session, sequence)
+        return wire.seal(self._send_key, packet)
+
+    def receive(self) -> tuple[pb.Envelope, Packet, Address]:
+        datagram, address = self.socket.recvfrom(2048)
+        packet = wire.unseal(self._receive_key, datagram)
+        assert isinstance(packet, Packet)
+        return pb.Envelope.FromString(packet.payload), packet, address
+
+
+class RawHeadset(RawPeer):
+    """A headset by hand."""
+
+    def __init__(self, server: Address, key: bytes = KEY) -> None:
+        keys = wire.derive_keys(key)
+        super().__init__(keys.to_pc, keys.to_headset)
+        self.server = server
+
+    def send(self, datagram: bytes) -> None:
+        self.socket.sendto(datagram, self.server)
+
+    def join(self, nonce: int = 1) -> int:
+        """Return the session offered."""
+        self.send(self.seal(pb.Envelope(hello=pb.Hello(nonce=nonce))))
+        while True:
+            envelope, _, _ = self.receive()
+            if envelope.WhichOneof("body") == "welcome":
+                assert envelope.welcome.nonce == nonce
+                return envelope.welcome.session
+
+
+class RawServer(RawPeer):
+    """A PC by hand."""
+
+    def __init__(self) -> None:
+        keys = wire.derive_keys(KEY)
+        super().__init__(keys.to_headset, keys.to_pc)
+
+    def wait_for(self, body: str) -> tuple[pb.Envelope, Address]:
+        while True:
+            envelope, _, address = self.receive()
+            if envelope.WhichOneof("body") == body:
+                return envelope, address
+
+
+@pytest.fixture
+def server() -> Iterator[HeadsetServer]:
+    with HeadsetServer(KEY) as server:
+        yield server
+
+
+@pytest.fixture
+def new_headset(server: HeadsetServer) -> Iterator[Callable[..., RawHeadset]]:
+    """Make hand-made headsets at the server."""
+    made: list[RawHeadset] = []
+
+    def make(key: bytes = KEY) -> RawHeadset:
+        made.append(RawHeadset(server.address, key))
+        return made[-1]
+
+    yield make
+    for headset in made:
+        headset.socket.close()
+
+
+@pytest.fixture
+def raw_server() -> Iterator[RawServer]:
+    server = RawServer()
+    yield server
+    server.socket.close()

@@ -1,0 +1,72 @@
+import random
+
+import pytest
+
+from handcal.errors import PosePendingError
+from handcal.link.clock import MIN_SAMPLES, ClockEstimator
+
+MS = 1_000_000
+START_NS = 5_000_000_000_000
+
+
+class Headset:
+    """A clock with a known offset and drift, behind a network with known delays."""
+
+    def __init__(self, offset_ns: int, drift: float) -> None:
+        self.offset_ns = offset_ns
+        self.drift = drift
+
+    def at(self, host_ns: int) -> int:
+        return host_ns + self.offset_ns + round(self.drift * (host_ns - START_NS))
+
+    def ping(self, clock: ClockEstimator, host_ns: int, out_ns: int, back_ns: int) -> None:
+        received = host_ns + out_ns
+        answered = received + 50_000
+        clock.add(host_ns, self.at(received), self.at(answered), answered + back_ns)
+
+
+def test_equal_ways_give_the_exact_clock() -> None:
+    headset, clock = Headset(-3_000 * MS, 0.0), ClockEstimator()
+    for i in range(50):
+        headset.ping(clock, START_NS + 100 * MS * i, MS, MS)
+    now = START_NS + 5_000 * MS
+    assert abs(clock.to_headset_ns(now) - headset.at(now)) < 10
+    assert abs(clock.to_host_ns(headset.at(now)) - now) < 10
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_offset_and_drift_through_asymmetric_jitter(seed: int) -> None:
+    chance, headset, clock = random.Random(seed), Headset(20 * MS, 80e-6), ClockEstimator()
+    for i in range(300):
+        out = MS + round(chance.expovariate(1 / (4 * MS)))
+        back = MS + round(chance.expovariate(1 / (0.5 * MS)))
+        headset.ping(clock, START_NS + 100 * MS * i, out, back)
+    now = START_NS + 30_000 * MS
+    assert clock.fit is not None
+    error_ns = abs(clock.to_headset_ns(now) - headset.at(now))
+    assert error_ns < 0.5 * MS
+    assert error_ns < clock.fit.uncertainty_ns
+    assert abs(clock.fit.drift - 80e-6) < 25e-6
+
+
+def test_conversions_are_inverse() -> None:
+    headset, clock = Headset(20 * MS, 80e-6), ClockEstimator()
+    for i in range(100):
+        headset.ping(clock, START_NS + 100 * MS * i, MS, 2 * MS)
+    for host_ns in (START_NS - 10_000 * MS, START_NS, START_NS + 60_000 * MS):
+        assert abs(clock.to_host_ns(clock.to_headset_ns(host_ns)) - host_ns) <= 2
+
+
+def test_an_unknown_clock_says_so() -> None:
+    headset, clock = Headset(0, 0.0), ClockEstimator()
+    for i in range(MIN_SAMPLES - 1):
+        headset.ping(clock, START_NS + i, MS, MS)
+    with pytest.raises(PosePendingError, match="clock"):
+        clock.to_headset_ns(START_NS)
+
+
+def test_an_impossible_round_trip_is_ignored() -> None:
+    clock = ClockEstimator()
+    for _ in range(2 * MIN_SAMPLES):
+        clock.add(START_NS, START_NS, START_NS + 10 * MS, START_NS + MS)
+    assert clock.fit is None

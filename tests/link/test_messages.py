@@ -1,0 +1,125 @@
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from handcal.geometry import rigid
+from handcal.link import handcal_pb2 as pb
+from handcal.link import messages
+from handcal.link.messages import MalformedError
+from handcal.link.reliable import Receipt
+from handcal.link.wire import MAX_PAYLOAD_BYTES
+from handcal.types import EYES, Float64, Projection
+
+CLOUDS = arrays(np.float64, st.tuples(st.integers(0, 700), st.just(3)), elements=st.floats(-3, 3))
+
+
+def sent(envelope: pb.Envelope) -> pb.Envelope:
+    return messages.parse(envelope.SerializeToString())
+
+
+@given(CLOUDS)
+def test_a_cursor_is_true_to_half_a_quantum(points: Float64) -> None:
+    cursor = sent(messages.cursor(points, 7)).cursor
+    assert cursor.cursor_id == 7
+    np.testing.assert_allclose(
+        messages.read_points(cursor.points), points, atol=messages.QUANTUM_M / 2 + 1e-12
+    )
+
+
+@given(CLOUDS)
+def test_live_chunks_hold_every_point_once_and_fit_a_datagram(points: Float64) -> None:
+    envelopes = messages.live_hand(points, red=True, frame=3)
+    assert all(envelope.ByteSize() <= MAX_PAYLOAD_BYTES for envelope in envelopes)
+    chunks = [sent(envelope).live_hand for envelope in envelopes]
+    assert {(c.frame, c.chunk_count, c.red) for c in chunks} == {(3, len(chunks), True)}
+    read = np.full(points.shape, np.nan)
+    for chunk in chunks:
+        read[chunk.chunk :: chunk.chunk_count] = messages.read_points(chunk.points)
+    np.testing.assert_allclose(read, points, atol=messages.QUANTUM_M / 2 + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.zeros((5, 2)), "finite metres"),
+        (np.array([[0.0, 0.0, np.nan]]), "finite metres"),
+        (np.zeros((messages.MAX_POINTS + 1, 3)), "exceed"),
+        (np.array([[0.0, 0.0, 0.0], [7.0, 0.0, 0.0]]), "spread"),
+    ],
+)
+def test_clouds_that_do_not_fit_are_refused(points: Float64, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        messages.cursor(points, 1)
+
+
+def test_projection_prompt_poses_and_confirmation_survive_exactly() -> None:
+    P = np.random.default_rng(0).normal(size=(3, 4))
+    projection = messages.read_projection(
+        sent(messages.projection(Projection("right", P, 1268, 720))).projection
+    )
+    assert (projection.eye, projection.width_px, projection.height_px) == ("right", 1268, 720)
+    np.testing.assert_array_equal(projection.P, P)
+
+    prompt = sent(messages.prompt("Close the right eye", ["left"])).prompt
+    assert messages.read_prompt(prompt) == ("Close the right eye", ("left",))
+
+    T = {eye: rigid([0.1, -0.2, 0.3], [x, 0.0, 1.0]) for eye, x in zip(EYES, (-1, 1), strict=True)}
+    ((t_ns, T_W_H),) = messages.read_poses(sent(messages.poses([(-5, T["left"])])).poses)
+    assert t_ns == -5
+    np.testing.assert_array_equal(T_W_H, T["left"])
+    confirm = sent(messages.confirm(T, 9, 4)).confirm
+    assert (confirm.t_headset_ns, confirm.cursor_id) == (9, 4)
+    for eye, T_E_W in messages.read_confirm(confirm).items():
+        np.testing.assert_array_equal(T_E_W, T[eye])
+
+
+@given(
+    st.lists(st.builds(Receipt, st.integers(1, 5), st.integers(0, 99), st.integers(0, 2**256 - 1)))
+)
+def test_receipts_survive(receipts: list[Receipt]) -> None:
+    assert list(messages.read_ack(sent(messages.ack(receipts)).ack)) == receipts
+
+
+def test_what_cannot_be_sent_is_refused() -> None:
+    with pytest.raises(ValueError, match="500 characters"):
+        messages.prompt("x" * 501, EYES)
+    with pytest.raises(ValueError, match="finite"):
+        messages.projection(Projection("left", np.full((3, 4), np.inf), 1268, 720))
+
+
+def rotated(scale: float) -> list[float]:
+    numbers: list[float] = (scale * rigid([0.1, 0.2, 0.3]))[:3].ravel().tolist()
+    return numbers
+
+
+@pytest.mark.parametrize(
+    ("read", "message"),
+    [
+        (messages.read_points, pb.Points(origin_m=[0, 0], offsets=bytes(6))),
+        (messages.read_points, pb.Points(origin_m=[0, 0, 0], offsets=bytes(7))),
+        (messages.read_points, pb.Points(origin_m=[0, 0, np.nan], offsets=bytes(6))),
+        (messages.read_projection, pb.Projection(eye=pb.EYE_UNSPECIFIED, P=[0.0] * 12)),
+        (messages.read_projection, pb.Projection(eye=pb.EYE_LEFT, P=[0.0] * 11)),
+        (messages.read_prompt, pb.Prompt(text="x" * 501)),
+        (messages.read_prompt, pb.Prompt(eyes=[pb.EYE_LEFT] * 3)),
+        (lambda m: list(messages.read_poses(m)), pb.Poses(poses=[pb.Pose(T_W_H=rotated(1.01))])),
+        (lambda m: list(messages.read_poses(m)), pb.Poses(poses=[pb.Pose(T_W_H=rotated(-1.0))])),
+        (messages.read_confirm, pb.Confirm(T_E_W_left=rotated(1.0))),
+    ],
+)
+def test_nonsense_is_malformed(read: Callable[[Any], object], message: object) -> None:
+    with pytest.raises(MalformedError):
+        read(message)
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_are_an_envelope_or_malformed(data: bytes) -> None:
+    try:
+        assert isinstance(messages.parse(data), pb.Envelope)
+    except MalformedError:
+        return

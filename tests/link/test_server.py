@@ -1,0 +1,225 @@
+"""The PC's end against hand-made headsets, honest and hostile."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.errors import LinkError, PosePendingError
+from handcal.geometry import rigid
+from handcal.link import handcal_pb2 as pb
+from handcal.link import messages
+from handcal.link.server import HeadsetServer
+from handcal.link.settings import LinkSettings
+from handcal.types import Projection
+
+NewHeadset = Callable[..., Any]
+Eventually = Callable[..., None]
+KEEP_ALIVE = messages.ack()
+
+
+def pose(t_ns: int) -> pb.Envelope:
+    return messages.poses([(t_ns, rigid(translation_m=[t_ns / 1e9, 0.0, 0.0]))])
+
+
+def test_it_listens_on_loopback_unless_told_otherwise(server: HeadsetServer) -> None:
+    assert server.address[0] == "127.0.0.1"
+    assert server.address[1] > 0
+
+
+def test_a_hello_alone_connects_nobody(server: HeadsetServer, new_headset: NewHeadset) -> None:
+    new_headset().join()
+    time.sleep(0.05)
+    assert not server.connected
+
+
+def test_a_signed_datagram_of_the_offered_session_connects(
+    server: HeadsetServer, new_headset: NewHeadset
+) -> None:
+    headset = new_headset()
+    headset.send(headset.seal(KEEP_ALIVE, headset.join(), 1))
+    server.wait_connected(3.0)
+    envelope, packet, _ = headset.receive()
+    assert envelope.WhichOneof("body") == "ping"
+    assert packet.sequence == 1
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda d: d[:-1] + bytes([d[-1] ^ 1]), "unpaired"),
+        (lambda d: b"xx" + d[2:], "corrupt"),
+        (lambda d: d[:2] + b"\x09" + d[3:], "wrong_version"),
+        (lambda d: d + bytes(1400), "oversized"),
+        (lambda d: d[:20], "corrupt"),
+    ],
+)
+def test_spoilt_datagrams_are_counted_and_dropped(
+    server: HeadsetServer,
+    new_headset: NewHeadset,
+    eventually: Eventually,
+    spoil: Callable[[bytes], bytes],
+    reason: str,
+) -> None:
+    headset = new_headset()
+    headset.send(spoil(headset.seal(pb.Envelope(hello=pb.Hello(nonce=1)))))
+    eventually(lambda: server.statistics().rejected[reason] == 1)
+    assert headset.join() != 0
+
+
+def test_a_wrong_key_is_counted_and_never_answered(
+    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+) -> None:
+    stranger = new_headset(b"another pairing key")
+    stranger.send(stranger.seal(pb.Envelope(hello=pb.Hello(nonce=1))))
+    eventually(lambda: server.statistics().rejected["unpaired"] == 1)
+    assert server.statistics().sent == 0
+
+
+def test_a_replayed_capture_does_nothing(
+    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+) -> None:
+    headset, thief = new_headset(), new_headset()
+    hello = headset.seal(pb.Envelope(hello=pb.Hello(nonce=1)))
+    session = headset.join()
+    capture = [hello, *(headset.seal(pose(i), session, i) for i in range(1, 9))]
+    for datagram in capture:
+        headset.send(datagram)
+    eventually(lambda: server.statistics().received == 8)
+
+    for datagram in capture[1:]:
+        headset.send(datagram)
+    eventually(lambda: server.statistics().rejected["replayed"] == 8)
+    for datagram in capture:
+        thief.send(datagram)
+    eventually(lambda: server.statistics().rejected["wrong_session"] == 8)
+
+    stranger_session = thief.receive()[0].welcome.session
+    assert stranger_session != session
+    headset.send(headset.seal(pose(9), session, 9))
+    eventually(lambda: server.statistics().received == 9)
+    thief.socket.settimeout(0.3)
+    with pytest.raises(TimeoutError):
+        thief.receive()
+
+
+def test_an_older_session_stays_closed(
+    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+) -> None:
+    first, second = new_headset(), new_headset()
+    old = first.join()
+    first.send(first.seal(KEEP_ALIVE, old, 1))
+    eventually(lambda: server.statistics().received == 1)
+    second.send(second.seal(KEEP_ALIVE, second.join(), 1))
+    eventually(lambda: server.statistics().received == 2)
+    first.send(first.seal(KEEP_ALIVE, old, 2))
+    eventually(lambda: server.statistics().rejected["wrong_session"] == 1)
+
+
+def test_nonsense_from_a_paired_headset_is_corrupt(
+    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+) -> None:
+    headset = new_headset()
+    session = headset.join()
+    skewed = pb.Envelope(poses=pb.Poses(poses=[pb.Pose(t_headset_ns=1, T_W_H=[0.0] * 12)]))
+    for sequence, envelope in enumerate((skewed, pb.Envelope(), pb.Envelope(ping=pb.Ping())), 1):
+        headset.send(headset.seal(envelope, session, sequence))
+    headset.send(headset.seal(KEEP_ALIVE))  # outside any session
+    eventually(lambda: server.statistics().rejected["corrupt"] == 4)
+    assert server.statistics().pose_rate_hz == 0.0
+
+
+def test_poses_are_told_at_the_hosts_time(
+    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+) -> None:
+    headset = new_headset()
+    session = headset.join()
+    offset_ns = 7_000_000_000
+    headset.send(headset.seal(KEEP_ALIVE, session, 1))
+    with pytest.raises(PosePendingError, match="clock"):
+        server.pose_at_host_ns(time.monotonic_ns())
+    for sequence in range(2, 9):
+        t_ns = headset.receive()[0].ping.t_sent_host_ns + offset_ns
+        pong = pb.Pong(
+            t_sent_host_ns=t_ns - offset_ns,
+            t_received_headset_ns=time.monotonic_ns() + offset_ns,
+            t_sent_headset_ns=time.monotonic_ns() + offset_ns,
+            highest_sequence=10,
+            accepted=7,
+        )
+        headset.send(headset.seal(pb.Envelope(pong=pong), session, sequence))
+    eventually(lambda: server.statistics().clock_offset_ms is not None)
+    statistics = server.statistics()
+    assert statistics.clock_offset_ms == pytest.approx(7000.0, abs=2.0)
+    assert statistics.lost == 3
+
+    now_ns = time.monotonic_ns()
+    for i in range(3):
+        t_ns = now_ns + offset_ns + 10_000_000 * i
+        T = rigid(translation_m=[0.1 * i, 0.0, 0.0])
+        headset.send(headset.seal(messages.poses([(t_ns, T)]), session, 20 + i))
+    eventually(lambda: server.statistics().pose_rate_hz == pytest.approx(100.0))
+    assert server.pose_at_host_ns(now_ns + 10_000_000)[0, 3] == pytest.approx(0.1, abs=0.02)
+    assert server.statistics().lost_inbound == 11
+
+
+def test_giving_up_is_loud(pairing_key: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    with HeadsetServer(pairing_key, settings=LinkSettings(give_up_s=0.1)) as server:
+        message = server.send_prompt("Raise your hand")
+        assert server.statistics().unacked == 1
+        with pytest.raises(LinkError, match="prompt was not acknowledged"):
+            server.wait_acked(message, 3.0)
+        assert server.statistics().failed == 1
+    assert "gave up sending the prompt" in caplog.text
+
+
+def test_a_replaced_message_says_so(server: HeadsetServer) -> None:
+    P = np.eye(3, 4)
+    older = server.send_projection(Projection("left", P, 1268, 720))
+    server.send_projection(Projection("left", P, 1268, 720))
+    with pytest.raises(LinkError, match="projection left was replaced"):
+        server.wait_acked(older, 1.0)
+
+
+def test_nobody_answering_says_what_to_do(server: HeadsetServer) -> None:
+    with pytest.raises(LinkError, match="check the address, the key and the firewall"):
+        server.wait_connected(0.05)
+
+
+def test_a_closed_link_refuses_and_leaves_no_thread(pairing_key: bytes) -> None:
+    before = threading.active_count()
+    server = HeadsetServer(pairing_key)
+    assert threading.active_count() == before + 1
+    server.close()
+    server.close()
+    assert threading.active_count() == before
+    for use in (
+        lambda: server.send_cursor(np.zeros((1, 3)), 1),
+        lambda: server.send_live_hand(np.zeros((1, 3)), red=False),
+        server.confirmations,
+        lambda: server.pose_at_host_ns(0),
+    ):
+        with pytest.raises(LinkError, match="closed"):
+            use()
+
+
+def test_an_error_in_the_thread_reaches_the_caller(
+    pairing_key: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("boom")
+
+    monkeypatch.setattr(HeadsetServer, "_tick", fail)
+    with (
+        HeadsetServer(pairing_key) as server,
+        pytest.raises(LinkError, match="stopped: boom"),
+    ):
+        server.wait_connected(3.0)
+
+
+def test_a_taken_port_is_a_clear_error(server: HeadsetServer, pairing_key: bytes) -> None:
+    with pytest.raises(LinkError, match="cannot listen on"):
+        HeadsetServer(pairing_key, bind=server.address)
