@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tokenize
 import zipfile
 from typing import Any
 
@@ -21,6 +22,16 @@ _DTYPES = {
     "t_ns": "<i8",
     "eyes": "<U5",
 } | {f"T_E_W_{eye}": "<f8" for eye in EYES}
+
+# What zipfile, numpy's header parser and ndarray raise on damaged archives, besides ValueError.
+_DAMAGE = (
+    zipfile.BadZipFile,
+    RuntimeError,
+    EOFError,
+    TypeError,
+    SyntaxError,
+    tokenize.TokenError,
+)
 
 
 def encode_alignment(alignment: Alignment) -> bytes:
@@ -75,7 +86,7 @@ def decode_alignment(data: bytes) -> Alignment:
         )
     except KeyError as error:
         raise ValueError(f"the alignment has no array {error}") from error
-    except (zipfile.BadZipFile, RuntimeError, EOFError, TypeError) as error:
+    except _DAMAGE as error:
         raise ValueError(f"the alignment is damaged: {error}") from error
 
 
