@@ -1,0 +1,30 @@
+from pathlib import Path
+
+import pytest
+
+from handcal.errors import FileError, LinkError
+from handcal.link.pairing import KEY_VARIABLE, new_pairing_key, read_pairing_key
+from handcal.link.wire import derive_keys
+
+
+def test_the_key_comes_from_the_environment_or_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    key, other = new_pairing_key(), new_pairing_key()
+    assert key != other
+    monkeypatch.setenv(KEY_VARIABLE, key)
+    (tmp_path / "key").write_text(other + "\n")
+    assert read_pairing_key() == key.encode()
+    assert read_pairing_key(tmp_path / "key") == other.encode()
+    assert derive_keys(read_pairing_key()) != derive_keys(other.encode())
+
+
+def test_no_key_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    with pytest.raises(LinkError, match=KEY_VARIABLE):
+        read_pairing_key()
+    (tmp_path / "key").write_text("\n")
+    with pytest.raises(LinkError, match="no pairing key"):
+        read_pairing_key(tmp_path / "key")
+    with pytest.raises(FileError):
+        read_pairing_key(tmp_path / "absent")

@@ -1,0 +1,131 @@
+"""The virtual headset over real datagrams: in a process of its own, and its endings."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.display import view_of_eye
+from handcal.errors import LinkError
+from handcal.geometry import transform
+from handcal.link.pairing import KEY_VARIABLE
+from handcal.link.server import Confirmation, HeadsetServer
+from handcal.resources import resource_path
+from handcal.rig.rig_file import read_rig
+from handcal.sim.hand import make_hand
+from handcal.sim.headset import HeadsetSettings, run_headset
+from handcal.sim.scene import SceneReceiver, SceneState
+from handcal.types import EYES
+
+KEY = "a pairing key of the tests"
+RIG_PATH = resource_path("example_rig.yaml")
+PROGRAM = """
+import sys
+from handcal.link.impair import Impairment
+from handcal.link.pairing import read_pairing_key
+from handcal.sim.headset import HeadsetSettings, run_headset, until_terminated
+rig, port, scene_port = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+bad = Impairment(loss=0.3, reorder=0.1, duplicate=0.1)
+run_headset(
+    HeadsetSettings(rig, port, scene_port, seed=1, impairment=bad),
+    read_pairing_key(),
+    until_terminated(),
+)
+"""
+
+
+def wait_for(ask: Callable[[], Any], timeout_s: float = 10.0) -> Any:
+    """Ask until the answer is not None."""
+    end_s = time.monotonic() + timeout_s
+    while (answer := ask()) is None:
+        assert time.monotonic() < end_s, "no answer in time"
+        time.sleep(0.005)
+    return answer
+
+
+@pytest.fixture
+def server() -> Iterator[HeadsetServer]:
+    with HeadsetServer(KEY.encode()) as server:
+        yield server
+
+
+@pytest.fixture
+def light() -> Iterator[SceneReceiver]:
+    with SceneReceiver() as light:
+        yield light
+
+
+@pytest.fixture
+def process(server: HeadsetServer, light: SceneReceiver) -> Iterator[subprocess.Popen[bytes]]:
+    arguments = [str(RIG_PATH), str(server.address[1]), str(light.port)]
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *arguments], env={**os.environ, KEY_VARIABLE: KEY}
+    ) as process:
+        yield process
+        process.kill()
+
+
+def test_a_wearer_in_another_process_aligns_and_confirms(
+    server: HeadsetServer, light: SceneReceiver, process: subprocess.Popen[bytes]
+) -> None:
+    server.wait_connected(20.0)
+    time.sleep(1.5)
+    state: SceneState = wait_for(light.latest)
+    assert state.T_W_hand is not None
+    hand_W_m = transform(state.T_W_hand, make_hand(1).vertices_m)
+    server.wait_acked(server.send_cursor(hand_W_m[::10], cursor_id=1), 5.0)
+    confirmation: Confirmation = wait_for(lambda: next(iter(server.confirmations()), None))
+    assert confirmation.cursor_id == 1
+    assert abs(time.monotonic_ns() - confirmation.t_host_ns) < 1e9
+
+    rig = read_rig(RIG_PATH)
+    time.sleep(0.05)
+    T_W_H = server.pose_at_host_ns(confirmation.t_host_ns)
+    for eye in EYES:
+        np.testing.assert_allclose(
+            confirmation.T_E_W[eye], view_of_eye(rig.eyes[eye], T_W_H), atol=2e-3
+        )
+    statistics = server.statistics()
+    assert statistics.pose_rate_hz > 60.0
+    assert statistics.clock_offset_ms == pytest.approx(12345.0, abs=2.0)
+    assert statistics.lost_inbound > 0
+
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(5.0) == 0
+    wait_for(lambda: not server.connected or None)
+
+
+@pytest.fixture
+def settings(server: HeadsetServer, light: SceneReceiver) -> HeadsetSettings:
+    return HeadsetSettings(str(RIG_PATH), server.address[1], light.port, patience_s=0.3)
+
+
+def test_it_ends_when_the_time_is_over(settings: HeadsetSettings) -> None:
+    start_s = time.monotonic()
+    run_headset(replace(settings, duration_s=0.2), KEY.encode(), lambda: False)
+    assert time.monotonic() - start_s > 0.2
+
+
+def test_it_ends_when_the_pc_says_good_bye(
+    settings: HeadsetSettings, server: HeadsetServer
+) -> None:
+    def is_stopped() -> bool:
+        if server.connected:
+            server.close()
+        return False
+
+    run_headset(settings, KEY.encode(), is_stopped)
+    assert server.statistics().received > 0
+
+
+def test_nobody_answering_is_one_clear_line(settings: HeadsetSettings) -> None:
+    with pytest.raises(LinkError, match="no PC answered") as error:
+        run_headset(settings, b"a pairing key of somebody else", lambda: False)
+    assert "\n" not in str(error.value)
