@@ -1,0 +1,209 @@
+"""Find the hand in a coarse depth image: which surface it is, its palm, and where the arm begins.
+
+The palm is the largest inscribed circle near the end of a limb. A ball about its centre, which
+depends neither on the limb's direction nor on how much forearm is visible, separates the hand
+from the arm, so that two frames of one hand are cut at the same place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from handcal.errors import HandError
+from handcal.hand.surface import NEIGHBOURS, components, goes_on, on_border, solid_surface
+from handcal.hand.view import DepthView, deproject
+from handcal.types import Bool, Float32, Float64
+
+# Sizes of adult hands, with room to spare (Gordon et al., 2012 Anthropometric Survey of U.S. Army
+# Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed
+# circle of a palm is about 20 mm in radius.
+_PALM_RADIUS_M = (0.018, 0.065)
+_TIP_M = 0.05
+_TIP_TO_PALM_M = 0.15
+_PALM_TO_ARM_M = 0.03
+_PALM_TO_WRIST_MAX_M = 0.11
+_HAND_REACH_M = 0.20
+_AREA_MIN_M2 = 0.004
+# The wrist is where the inscribed radius first comes this close to its minimum, in shells of this
+# thickness about the palm, in this cone about the arm.
+_WRIST_NARROW = 1.1
+_SHELL_M = 0.0025
+_ARMWARD_COS = 0.6
+_WRIST_BEYOND_M = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocatedHand:
+    """Where the hand is.
+
+    Attributes
+    ----------
+    hand, arm : (h, w) bool
+        The hand, and the arm that goes on from it.
+    palm_m : (3,) float64
+        Centre of the visible palm or back of the hand, camera frame.
+    palm_radius_m : float
+    limit_m : float
+        Distance from `palm_m` at which the arm begins.
+    """
+
+    hand: Bool
+    arm: Bool
+    palm_m: Float64
+    palm_radius_m: float
+    limit_m: float
+
+
+def locate_hand(
+    view: DepthView, *, gate_m: tuple[float, float], jump_m: float, forearm_m: float
+) -> LocatedHand:
+    """Find the nearest hand-sized end of a surface.
+
+    Parameters
+    ----------
+    view : DepthView
+        About 2 mm between the pixels of a hand.
+    gate_m : (float, float)
+        Nearest and farthest depth of a hand.
+    jump_m : float
+        Neighbouring pixels this far apart in depth belong to different surfaces.
+    forearm_m : float
+        How much of the arm beyond the wrist counts as hand.
+
+    Raises
+    ------
+    HandError
+        If there is none.
+    """
+    jump = round(jump_m / view.scale_m)
+    solid = solid_surface(view.depth, jump)
+    points_m = deproject(view, *np.indices(view.depth.shape))
+    z_m = points_m[2]
+    gated = solid & (z_m >= gate_m[0]) & (z_m <= gate_m[1])
+    ends = on_border(gated) | goes_on(gated, solid & ~gated, view.depth, jump)
+    pitch = view.step_px / view.camera.fx
+    radius_m = _inscribed_radius_px(view.depth > 0, solid) * z_m * np.float32(pitch)
+
+    found = None
+    for surface in components(gated, _AREA_MIN_M2 / (pitch * gate_m[1]) ** 2):
+        located = _locate_on(surface, ends, points_m, radius_m, forearm_m)
+        area_m2 = np.square(z_m[located.hand]).sum() * pitch**2
+        plausible = (
+            _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
+            and area_m2 >= _AREA_MIN_M2
+        )
+        if plausible and (found is None or located.palm_m[2] < found.palm_m[2]):
+            found = located
+    if found is None:
+        raise HandError(
+            f"no hand-sized thing between {gate_m[0]:.2f} and {gate_m[1]:.2f} m; "
+            "raise the bare hand in front of the camera"
+        )
+    return found
+
+
+def _locate_on(
+    surface: Bool, ends: Bool, points_m: Float32, radius_m: Float32, forearm_m: float
+) -> LocatedHand:
+    """Find palm and wrist on one surface, which runs on out of sight where `ends` is set."""
+    arm_end = _arm_end(surface, ends, points_m, radius_m)
+    tip_m = _farthest(surface, points_m, points_m[:, arm_end].mean(axis=1))
+    near_tip = surface & (_distance(points_m, tip_m) < _TIP_TO_PALM_M)
+    palm_m, palm_radius_m = _palm(near_tip, points_m, radius_m)
+
+    from_palm_m = _distance(points_m, palm_m)
+    arm = _arm(surface & (from_palm_m > palm_radius_m + _PALM_TO_ARM_M), arm_end)
+    wrist_m = _palm_to_wrist(surface, arm, palm_m, points_m, from_palm_m, radius_m)
+    limit_m = wrist_m + forearm_m
+    arm = _arm(surface & (from_palm_m > limit_m), arm_end)
+    hand = surface & ~arm & (from_palm_m < _HAND_REACH_M)
+    return LocatedHand(hand, arm, palm_m.astype(np.float64), palm_radius_m, limit_m)
+
+
+def _arm_end(surface: Bool, ends: Bool, points_m: Float32, radius_m: Float32) -> Bool:
+    """Return where the arm leaves: the widest place that runs on out of sight.
+
+    Where none does, it is the thicker of the two tips of the surface: fingers are thin.
+    """
+    places = components(surface & ends)
+    if places:
+        return places[0]
+    tip_m = points_m[:, surface].mean(axis=1)
+    tips = []
+    for _ in range(2):
+        tip_m = _farthest(surface, points_m, tip_m)
+        tips.append(surface & (_distance(points_m, tip_m) < _TIP_M))
+    return max(tips, key=lambda tip: float(radius_m[tip].mean()))
+
+
+def _farthest(surface: Bool, points_m: Float32, from_m: Float32) -> Float32:
+    distance_m = np.where(surface, _distance(points_m, from_m), 0)
+    farthest: Float32 = points_m.reshape(3, -1)[:, np.argmax(distance_m)]
+    return farthest
+
+
+def _palm(near_tip: Bool, points_m: Float32, radius_m: Float32) -> tuple[Float32, float]:
+    """Return centre and radius of the largest inscribed circle."""
+    inscribed_m = np.where(near_tip, radius_m, 0)
+    best = np.unravel_index(np.argmax(inscribed_m), inscribed_m.shape)
+    palm_radius_m = float(inscribed_m[best])
+    # Averaged over the top of the distance map: one pixel of it is too coarse to cut by.
+    top = (inscribed_m > 0.95 * palm_radius_m) & (
+        _distance(points_m, points_m[:, best[0], best[1]]) < palm_radius_m
+    )
+    return points_m[:, top].mean(axis=1), palm_radius_m
+
+
+def _arm(beyond_palm: Bool, arm_end: Bool) -> Bool:
+    """Return the part that leads to the arm's end: not the fingers."""
+    for part in components(beyond_palm):
+        if (part & arm_end).any():
+            return part
+    return np.zeros_like(beyond_palm)
+
+
+def _palm_to_wrist(
+    surface: Bool,
+    arm: Bool,
+    palm_m: Float32,
+    points_m: Float32,
+    from_palm_m: Float32,
+    radius_m: Float32,
+) -> float:
+    """Return the distance from the palm's centre to the wrist.
+
+    Toward the arm the inscribed radius falls to that of the wrist, then grows along the forearm.
+    The wrist is placed where the fall ends: the minimum itself is too flat to be found twice.
+    """
+    near_arm = arm & (from_palm_m < _PALM_TO_WRIST_MAX_M)
+    if not near_arm.any():
+        return _PALM_TO_WRIST_MAX_M
+    weight = radius_m[near_arm] ** 2  # a thumb that leaves with the arm is thin
+    axis = (points_m[:, near_arm] - palm_m[:, None]) @ weight
+    axis /= np.linalg.norm(axis)
+    along_axis_m = np.tensordot(axis, points_m, 1) - axis @ palm_m
+    armward = surface & (along_axis_m > _ARMWARD_COS * from_palm_m)
+    shell = (from_palm_m[armward] / _SHELL_M).astype(int)
+    profile_m = np.zeros(round(_PALM_TO_WRIST_MAX_M / _SHELL_M) + 1)
+    np.maximum.at(profile_m, np.minimum(shell, len(profile_m) - 1), radius_m[armward])
+    profile_m = profile_m[:-1]
+    profile_m[profile_m == 0] = np.inf
+    narrowest = int(np.argmin(profile_m))
+    wide = np.flatnonzero(profile_m[:narrowest] > _WRIST_NARROW * profile_m[narrowest])
+    falls_to = wide[-1] + 1 if len(wide) else narrowest
+    return float(falls_to * _SHELL_M) + _WRIST_BEYOND_M
+
+
+def _inscribed_radius_px(measured: Bool, solid: Bool) -> Float32:
+    """Return each pixel's distance in pixels to the surface's edge, pinholes closed."""
+    closed = cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS)
+    closed[measured & ~solid] = 0
+    return cv2.distanceTransform(closed, cv2.DIST_L2, 5)
+
+
+def _distance(points_m: Float32, from_m: Float32) -> Float32:
+    distance_m: Float32 = np.sqrt(sum(np.square(points_m[i] - from_m[i]) for i in range(3)))
+    return distance_m

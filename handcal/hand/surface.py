@@ -1,0 +1,83 @@
+"""Depth images as surfaces that end where the depth jumps."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from handcal.types import Bool, UInt16
+
+NEIGHBOURS = np.ones((3, 3), np.uint8)
+_UNMEASURED = np.uint16(65535)
+
+
+def solid_surface(depth: UInt16, jump: int) -> Bool:
+    """Mark the measured pixels that are not on the far side of a depth jump.
+
+    Of two neighbouring pixels of the surface neither is more than `jump` behind the other, so
+    surfaces at different depths never touch. Flying pixels, which hang between a silhouette and
+    what is behind it, are on its far side.
+
+    Parameters
+    ----------
+    depth : (h, w) uint16
+        0 where there is no measurement.
+    jump : int
+        In the units of `depth`.
+
+    Returns
+    -------
+    (h, w) bool
+    """
+    measured = depth > 0
+    return measured & (behind_nearest(depth, measured) <= jump)
+
+
+def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
+    """Return how far each pixel of `surface` is behind the nearest one around it; 0 beside it.
+
+    Parameters
+    ----------
+    depth : (h, w) uint16
+    surface : (h, w) bool
+    size_px : int
+        Side of the square looked at around a pixel, odd.
+    """
+    on_surface = np.where(surface, depth, _UNMEASURED)
+    around = np.ones((size_px, size_px), np.uint8)
+    return np.where(surface, on_surface - cv2.erode(on_surface, around), np.uint16(0))
+
+
+def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
+    """Mark the pixels of `surface` beside which `other` goes on: touches it, or hides it.
+
+    Parameters
+    ----------
+    surface, other : (h, w) bool
+        Disjoint parts of a solid surface.
+    depth : (h, w) uint16
+    jump : int
+        In the units of `depth`.
+
+    Returns
+    -------
+    (h, w) bool
+    """
+    nearest_other = cv2.erode(np.where(other, depth, _UNMEASURED), NEIGHBOURS)
+    touches: Bool = nearest_other <= depth + np.uint32(jump)
+    return surface & touches & (nearest_other != _UNMEASURED)
+
+
+def on_border(mask: Bool) -> Bool:
+    """Mark the pixels of `mask` that lie on the border of the image."""
+    inner = np.zeros_like(mask)
+    inner[1:-1, 1:-1] = True
+    return mask & ~inner
+
+
+def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
+    """Return the 8-connected parts of `mask` of at least that area, the largest first."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    largest_first = np.argsort(-areas, kind="stable")
+    return [labels == 1 + i for i in largest_first if areas[i] >= area_min_px]
