@@ -1,0 +1,363 @@
+"""The simulated person who wears the headset.
+
+Knows what a person knows: what the displays show, and the own hand as seen from the own eyes.
+The engine learns nothing from here but what the hand does before the camera, and the button.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from handcal.display import view_of_eye
+from handcal.geometry import interpolate_pose, invert, rigid, transform
+from handcal.sim.hand import HandModel
+from handcal.sim.placement import (
+    CursorMatch,
+    match_cursor,
+    misplace,
+    overlay_hand,
+    view_through,
+)
+from handcal.types import EYES, Eye, Float64, Rig
+
+_Phase: TypeAlias = Literal["raised", "reaching", "awaiting"]
+
+_CURSOR_POINTS = 150
+_LOWERED_M = 0.35
+_ARCMIN = np.radians(1.0 / 60.0)
+
+
+@dataclass(frozen=True, slots=True)
+class WearerSettings:
+    """How the wearer is built and behaves.
+
+    Attributes
+    ----------
+    headset_sigma_m : tuple of 3 float
+        How the headset sits, common to both eyes, E axes: lateral, vertical, eye relief.
+    eye_distance_sigma_m : float
+        Deviation of the eye distance from the rig's.
+    eye_sigma_m : float
+        Each eye's own deviation along each axis.
+    largest_shift_m : float
+        The eye box: longer shifts are shortened to it.
+    raise_m, raise_spread_m : tuple of 3 float
+        Where the palm is raised, from the middle of the viewpoints C0 in the head's axes, and how
+        far it may differ each time.
+    raise_turn_rad : float
+        How far the raised palm turns from facing the eyes, standard deviation about each axis.
+    reaction_s, movement_s, dwell_s, patience_s : float
+        From a new cursor to the start of the movement; the movement; holding still before
+        confirming; waiting for an answer before confirming again.
+    lateral_sigma_arcmin : float
+        Error of the overlay about each of two axes.
+    depth_sigma : float
+        Error of the overlay's size, relative.
+    rotation_sigma_rad : float
+        Rotation of the hand against the cursor, about a random axis.
+    novice : bool or None
+        A novice overlays a rotated hand first and confirms it; None lets the seed choose.
+    novice_rotation_rad : float
+        By how much.
+    head_sway_m, head_sway_rad, hand_sway_m, hand_sway_rad : float
+        Amplitudes of slow sway.
+    tremor_m : float
+        Amplitude of the hand's tremor, 8 to 12 Hz.
+    """
+
+    headset_sigma_m: tuple[float, float, float] = (0.002, 0.0015, 0.003)
+    eye_distance_sigma_m: float = 0.002
+    eye_sigma_m: float = 0.0005
+    largest_shift_m: float = 0.010
+    raise_m: tuple[float, float, float] = (0.0, 0.048, 0.56)
+    raise_spread_m: tuple[float, float, float] = (0.015, 0.006, 0.025)
+    raise_turn_rad: float = 0.1
+    reaction_s: float = 0.4
+    movement_s: float = 0.8
+    dwell_s: float = 0.6
+    patience_s: float = 6.0
+    lateral_sigma_arcmin: float = 3.0
+    depth_sigma: float = 0.003
+    rotation_sigma_rad: float = 0.035
+    novice: bool | None = None
+    novice_rotation_rad: float = 0.23
+    head_sway_m: float = 0.003
+    head_sway_rad: float = 0.005
+    hand_sway_m: float = 0.0005
+    hand_sway_rad: float = 0.003
+    tremor_m: float = 0.0001
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplayView:
+    """What the headset shows at one instant.
+
+    Attributes
+    ----------
+    t_s : float
+    cursor_W_m : (N, 3) float64 or None
+        The points drawn as cursor, W.
+    cursor_id : int
+    P : mapping of eye to (3, 4) float64
+        Pixels from points in V, as rendered now.
+    T_V_H : mapping of eye to (4, 4) float64
+    eyes : tuple of eye
+        The eyes that shall be open.
+    guard_red : bool
+        Whether the live hand is drawn red.
+    prompt : str
+    """
+
+    t_s: float
+    cursor_W_m: Float64 | None
+    cursor_id: int
+    P: Mapping[Eye, Float64]
+    T_V_H: Mapping[Eye, Float64]
+    eyes: tuple[Eye, ...]
+    guard_red: bool
+    prompt: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WearerAction:
+    """What the wearer does at one instant.
+
+    Attributes
+    ----------
+    T_W_H, T_W_hand : (4, 4) float64
+        Poses of the headset and of the hand.
+    confirm : bool
+        True at the instants when the button is pressed.
+    """
+
+    T_W_H: Float64
+    T_W_hand: Float64
+    confirm: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Slip:
+    """How one placement misses: turned hand, angles across the line of sight, apparent size."""
+
+    rotation_rad: Float64
+    lateral_rad: Float64
+    depth_ratio: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Move:
+    """A movement of the hand toward a goal, by minimum jerk (Flash & Hogan 1985).
+
+    It may dip on its way, as a relaxing arm does.
+    """
+
+    T_from: Float64
+    start_s: float
+    duration_s: float
+    dip_m: float = 0.0
+
+    def pose(self, t_s: float, T_goal: Float64) -> Float64:
+        tau = float(np.clip((t_s - self.start_s) / self.duration_s, 0.0, 1.0))
+        done = min(tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 1.0)
+        T = interpolate_pose(self.T_from, T_goal, done)
+        T[1, 3] += self.dip_m * np.sin(np.pi * tau) ** 2
+        return T
+
+    @property
+    def end_s(self) -> float:
+        return self.start_s + self.duration_s
+
+
+class _Sway:
+    """Smooth, aimless motion: two sines about and along each axis."""
+
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        size_m: float,
+        size_rad: float,
+        band_hz: tuple[float, float],
+    ) -> None:
+        self._sizes = np.repeat([size_rad, size_m], 3)[:, None] * rng.uniform(0.3, 0.7, (6, 2))
+        self._rate_rad_s = 2.0 * np.pi * rng.uniform(*band_hz, (6, 2))
+        self._phase_rad = rng.uniform(0.0, 2.0 * np.pi, (6, 2))
+
+    def pose(self, t_s: float) -> Float64:
+        sway = (self._sizes * np.sin(self._rate_rad_s * t_s + self._phase_rad)).sum(1)
+        return rigid(sway[:3], sway[3:])
+
+
+def draw_eyes(rng: np.random.Generator, settings: WearerSettings) -> dict[Eye, Float64]:
+    """Draw both eyes' true shifts φ from C0, E axes, in metres."""
+    common_m = rng.normal(0.0, settings.headset_sigma_m)
+    apart_m = rng.normal(0.0, settings.eye_distance_sigma_m)
+    shifts: dict[Eye, Float64] = {}
+    for eye, side in zip(EYES, (-0.5, 0.5), strict=True):
+        own_m = rng.normal(0.0, settings.eye_sigma_m, 3)
+        shift_m = common_m + own_m + [side * apart_m, 0.0, 0.0]
+        shorten = settings.largest_shift_m / max(
+            settings.largest_shift_m, float(np.linalg.norm(shift_m))
+        )
+        shifts[eye] = shorten * shift_m
+    return shifts
+
+
+class Wearer:
+    """A person who follows the procedure, step by step in time.
+
+    Parameters
+    ----------
+    seed : int
+    rig : Rig
+        The headset that is worn.
+    hand : HandModel
+        The own hand.
+    settings : WearerSettings, optional
+
+    Attributes
+    ----------
+    true_shift_m : mapping of eye to (3,) float64
+        φ of the true eyes from C0, E axes. For judging results only; the engine never learns it.
+    """
+
+    def __init__(
+        self, seed: int, rig: Rig, hand: HandModel, settings: WearerSettings | None = None
+    ) -> None:
+        self._settings = settings = settings or WearerSettings()
+        self._rng = rng = np.random.default_rng(seed)
+        self._rig = rig
+        self._hand = hand
+        self.true_shift_m: Mapping[Eye, Float64] = draw_eyes(rng, settings)
+        self._is_naive = rng.random() < 0.5 if settings.novice is None else settings.novice
+        self._head_sway = _Sway(rng, settings.head_sway_m, settings.head_sway_rad, (0.05, 0.25))
+        self._hand_sway = _Sway(rng, settings.hand_sway_m, settings.hand_sway_rad, (0.2, 0.5))
+        self._tremor = _Sway(rng, settings.tremor_m, 0.0, (8.0, 12.0))
+        self._T_W_H0 = rigid(rng.normal(0.0, 0.05, 3), rng.normal(0.0, 0.05, 3))
+        self._phase: _Phase = "raised"
+        self._T_W_raised = self._choose_place()
+        self._T_W_hand = rigid(translation_m=[0.0, _LOWERED_M, 0.0]) @ self._T_W_raised
+        self._move: _Move | None = None
+        self._task: tuple[int, tuple[Eye, ...]] | None = None
+        self._match: CursorMatch | None = None
+        self._slip = self._draw_slip(0.0)
+        self._confirmed_s = 0.0
+        self._P_confirmed: Mapping[Eye, Float64] = {}
+
+    def step(self, view: DisplayView) -> WearerAction:
+        """Live on until `view.t_s`, looking at what the headset shows.
+
+        Parameters
+        ----------
+        view : DisplayView
+            Its times must not run backward from step to step.
+        """
+        t_s = view.t_s
+        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s)
+        if self._move is None:
+            self._move = _Move(self._T_W_hand, t_s, 2.0 * self._settings.movement_s)
+        self._notice(view, self._move)
+        overlay = None if self._phase == "raised" else self._overlay(view, T_W_H)
+        confirm = overlay is not None and self._decide(view, self._move)
+        goal = self._T_W_raised if overlay is None else overlay
+        self._T_W_hand = self._move.pose(t_s, goal)
+        T_W_hand = self._T_W_hand @ self._hand_sway.pose(t_s) @ self._tremor.pose(t_s)
+        return WearerAction(T_W_H, T_W_hand, confirm)
+
+    def _notice(self, view: DisplayView, move: _Move) -> None:
+        """Take up a cursor that appears, and relax when it has served."""
+        task = None if view.cursor_W_m is None else (view.cursor_id, view.eyes)
+        if self._phase == "raised":
+            wait_s = self._settings.patience_s if task == self._task else 0.0
+            if task is not None and view.t_s >= move.end_s + wait_s:
+                self._take_up(view, task)
+        elif task is None or (self._phase == "awaiting" and self._was_answered(view)):
+            self._relax(view.t_s)
+        elif task != self._task:
+            self._take_up(view, task)
+
+    def _take_up(self, view: DisplayView, task: tuple[int, tuple[Eye, ...]]) -> None:
+        assert view.cursor_W_m is not None
+        if self._match is None or self._task is None or self._task[0] != task[0]:
+            every = -(-len(view.cursor_W_m) // _CURSOR_POINTS)
+            cursor_m = np.asarray(view.cursor_W_m[::every], dtype=np.float64)
+            self._match = match_cursor(self._hand, cursor_m, self._T_W_hand)
+        self._task = task
+        turned_rad = self._settings.novice_rotation_rad if self._is_naive else 0.0
+        self._reach(view.t_s, self._draw_slip(turned_rad))
+
+    def _reach(self, t_s: float, slip: _Slip) -> None:
+        self._phase = "reaching"
+        self._slip = slip
+        start_s = t_s + self._settings.reaction_s
+        self._move = _Move(self._T_W_hand, start_s, self._settings.movement_s)
+
+    def _relax(self, t_s: float) -> None:
+        """Lower the hand and raise it again at another place."""
+        self._phase = "raised"
+        self._T_W_raised = self._choose_place()
+        duration_s = 2.0 * self._settings.movement_s
+        self._move = _Move(self._T_W_hand, t_s, duration_s, dip_m=_LOWERED_M)
+
+    def _was_answered(self, view: DisplayView) -> bool:
+        return any(not np.array_equal(P, view.P[eye]) for eye, P in self._P_confirmed.items())
+
+    def _decide(self, view: DisplayView, move: _Move) -> bool:
+        """Return whether to press the button now; correct the hand instead if it is red."""
+        settings, t_s = self._settings, view.t_s
+        if self._phase == "reaching":
+            if t_s < move.end_s + settings.dwell_s:
+                return False
+            if view.guard_red and not self._is_naive:
+                self._reach(t_s, self._draw_slip(0.0))
+                return False
+            return self._press(view)
+        if view.guard_red and t_s > self._confirmed_s + settings.reaction_s:
+            self._is_naive = False
+            self._reach(t_s, self._draw_slip(0.0))
+            return False
+        return t_s > self._confirmed_s + settings.patience_s and self._press(view)
+
+    def _press(self, view: DisplayView) -> bool:
+        self._phase = "awaiting"
+        self._confirmed_s = view.t_s
+        self._P_confirmed = dict(view.P)
+        return True
+
+    def _overlay(self, view: DisplayView, T_W_H: Float64) -> Float64 | None:
+        """Return where the hand seems to overlap the cursor, or None if too little is drawn."""
+        assert self._match is not None
+        views, eyes_m = [], []
+        for eye in view.eyes:
+            display, shift_m = self._rig.eyes[eye], self.true_shift_m[eye]
+            drawn = view.P[eye] @ view.T_V_H[eye]
+            views.append(view_through(display, shift_m, T_W_H, drawn, self._match.cursor_m))
+            eyes_m.append(transform(invert(view_of_eye(display, T_W_H)), shift_m[None])[0])
+        turned = self._match.T_W_hand @ rigid(self._slip.rotation_rad)
+        placed = overlay_hand(self._match.surface_m, turned, views)
+        if placed is None:
+            return None
+        eye_m = np.mean(eyes_m, axis=0)
+        return misplace(placed[0], eye_m, self._slip.lateral_rad, self._slip.depth_ratio)
+
+    def _draw_slip(self, turned_rad: float) -> _Slip:
+        """Draw the errors of one placement, with a hand turned by about `turned_rad`."""
+        settings, rng = self._settings, self._rng
+        axis = rng.normal(size=3)
+        angle_rad = turned_rad + settings.rotation_sigma_rad * rng.normal()
+        return _Slip(
+            angle_rad * axis / np.linalg.norm(axis),
+            settings.lateral_sigma_arcmin * _ARCMIN * rng.normal(size=2),
+            settings.depth_sigma * rng.normal(),
+        )
+
+    def _choose_place(self) -> Float64:
+        """Return a pose for the raised hand, upright, the palm facing the eyes."""
+        settings, rng = self._settings, self._rng
+        viewpoints_m = [invert(view_of_eye(d, np.eye(4)))[:3, 3] for d in self._rig.eyes.values()]
+        palm_m = np.mean(viewpoints_m, axis=0) + settings.raise_m
+        palm_m += rng.uniform(-1.0, 1.0, 3) * settings.raise_spread_m
+        return self._T_W_H0 @ rigid(rng.normal(0.0, settings.raise_turn_rad, 3), palm_m)

@@ -1,0 +1,117 @@
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handcal.display import projection_matrix, view_of_eye
+from handcal.geometry import invert, rigid, transform
+from handcal.rig.example import example_rig
+from handcal.sim.hand import HandModel, make_hand
+from handcal.sim.placement import (
+    EyeView,
+    match_cursor,
+    misplace,
+    overlay_hand,
+    view_through,
+)
+from handcal.sim.raster import visible_points
+from handcal.types import EYES, Eye, Float64
+
+RIG = example_rig()
+T_W_H = rigid([0.02, 0.01, 0.03], [0.1, 0.05, -0.1])
+T_W_HAND = T_W_H @ rigid([0.05, -0.1, 0.02], [0.0, 0.08, 0.45])
+
+
+@pytest.fixture(scope="module")
+def hand() -> HandModel:
+    return make_hand(1)
+
+
+@pytest.fixture(scope="module")
+def surface_m(hand: HandModel) -> Float64:
+    T_W_D = T_W_H @ RIG.T_H_D
+    points_m, _ = visible_points(
+        hand, invert(T_W_D) @ T_W_HAND, 400, np.random.default_rng(0), forearm_m=0.02
+    )
+    return transform(invert(T_W_HAND) @ T_W_D, points_m)
+
+
+def _views(surface_m: Float64, shift_m: Sequence[float], eyes: tuple[Eye, ...]) -> list[EyeView]:
+    return [
+        view_through(
+            RIG.eyes[eye],
+            np.array(shift_m),
+            T_W_H,
+            projection_matrix(RIG.eyes[eye]) @ RIG.eyes[eye].T_V_H,
+            transform(T_W_HAND, surface_m),
+        )
+        for eye in eyes
+    ]
+
+
+def test_eyes_at_the_viewpoints_see_the_cursor_where_the_hand_was(surface_m: Float64) -> None:
+    start = rigid(translation_m=[0.01, -0.02, 0.03]) @ T_W_HAND
+    placed = overlay_hand(surface_m, start, _views(surface_m, (0, 0, 0), EYES))
+    assert placed is not None
+    np.testing.assert_allclose(placed[0], T_W_HAND, atol=1e-8)
+    assert placed[1] < 1e-4
+
+
+@pytest.mark.parametrize("phi_3_m", [-0.01, 0.01])
+def test_one_eye_moved_forward_moves_the_hand_by_the_exact_factor(
+    surface_m: Float64, phi_3_m: float
+) -> None:
+    placed = overlay_hand(surface_m, T_W_HAND, _views(surface_m, (0, 0, phi_3_m), ("left",)))
+    assert placed is not None
+    T_E_W = view_of_eye(RIG.eyes["left"], T_W_H)
+    depth_m = transform(T_E_W, T_W_HAND[None, :3, 3])[0, 2]
+    moved_m = (T_E_W[:3, :3] @ (placed[0] - T_W_HAND)[:3, 3])[2]
+    assert moved_m == pytest.approx(phi_3_m * (1 - depth_m / 2.0), rel=0.05)
+
+
+def test_both_eyes_shifted_alike_agree_on_the_hand(surface_m: Float64) -> None:
+    views = _views(surface_m, (0.003, -0.002, 0.005), EYES)
+    placed = overlay_hand(surface_m, T_W_HAND, views)
+    assert placed is not None
+    offsets_px = np.concatenate(
+        [_seen_px(view, transform(placed[0], surface_m)) - view.drawn_px for view in views]
+    )
+    np.testing.assert_allclose(np.nanmean(offsets_px, axis=0), 0.0, atol=0.05)
+    assert placed[1] == pytest.approx(np.sqrt(np.nanmean((offsets_px**2).sum(1))), rel=1e-6)
+    assert placed[1] < 2.0  # a translated hand is not quite what a shifted eye sees
+
+
+def _seen_px(view: EyeView, points_m: Float64) -> Float64:
+    homogeneous = np.column_stack([points_m, np.ones(len(points_m))]) @ view.seen.T
+    return homogeneous[:, :2] / homogeneous[:, 2:]
+
+
+def test_points_beside_the_display_are_not_seen(surface_m: Float64) -> None:
+    far_aside_m = surface_m + np.array([0.5, 0.0, 0.0])
+    assert overlay_hand(surface_m, T_W_HAND, _views(far_aside_m, (0, 0, 0), EYES)) is None
+
+
+def test_noisy_cursor_with_flying_pixels_finds_the_hand(
+    hand: HandModel, surface_m: Float64
+) -> None:
+    rng = np.random.default_rng(1)
+    cursor_m = transform(T_W_HAND, surface_m) + rng.normal(0.0, 0.0005, surface_m.shape)
+    cursor_m[::25, 2] += 0.05
+    guess = T_W_HAND @ rigid([0.01, 0.01, -0.01], [0.002, 0.001, -0.002])
+    match = match_cursor(hand, cursor_m, guess)
+    error = invert(T_W_HAND) @ match.T_W_hand
+    assert np.linalg.norm(error[:3, 3]) < 0.0004
+    assert Rotation.from_matrix(error[:3, :3]).magnitude() < 0.006
+    regular = np.arange(len(surface_m)) % 25 != 0
+    assert np.median(np.linalg.norm(match.surface_m - surface_m, axis=1)[regular]) < 0.001
+
+
+def test_misplace_turns_the_line_of_sight_and_scales_it() -> None:
+    eye_m = np.array([0.1, -0.2, 0.0])
+    line_m = T_W_HAND[:3, 3] - eye_m
+    aside = misplace(T_W_HAND, eye_m, np.array([0.003, 0.004]), 0.0)[:3, 3] - eye_m
+    cosine = aside @ line_m / np.linalg.norm(aside) / np.linalg.norm(line_m)
+    assert np.arccos(cosine) == pytest.approx(0.005, rel=1e-3)
+    longer = misplace(T_W_HAND, eye_m, np.zeros(2), 0.01)[:3, 3] - eye_m
+    np.testing.assert_allclose(longer, 1.01 * line_m)

@@ -1,0 +1,74 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.types import Float32
+
+FOCAL_PX = 1005.0
+SETTINGS = SensorSettings()
+SHAPE = 300, 600
+
+
+def _wall(depth_m: float) -> Float32:
+    return np.full(SHAPE, depth_m, dtype=np.float32)
+
+
+def _post() -> Float32:
+    """A post 100 px wide at 0.5 m before a wall at 1.5 m."""
+    depth_m = _wall(1.5)
+    depth_m[:, 300:400] = 0.5
+    return depth_m
+
+
+def _sense_m(depth_m: Float32, settings: SensorSettings = SETTINGS, seed: int = 0) -> Float32:
+    measured = sense_depth(depth_m, FOCAL_PX, np.random.default_rng(seed), settings)
+    return np.asarray(measured * settings.depth_scale_m, dtype=np.float32)
+
+
+@pytest.mark.parametrize("depth_m", [0.4, 0.5, 0.7, 1.5])
+def test_noise_grows_with_the_square_of_depth(depth_m: float) -> None:
+    measured_m = _sense_m(_wall(depth_m))
+    sigma_m = depth_m**2 * SETTINGS.disparity_sigma_px / (FOCAL_PX * SETTINGS.baseline_m)
+    assert measured_m.std() == pytest.approx(sigma_m, rel=0.1)
+    assert measured_m.mean() == pytest.approx(depth_m, abs=0.1 * sigma_m)
+
+
+def test_noise_is_shared_by_neighbours_only() -> None:
+    error_m = _sense_m(_wall(0.5)) - 0.5
+    near = np.corrcoef(error_m[:, :-1].ravel(), error_m[:, 1:].ravel())[0, 1]
+    far = np.corrcoef(error_m[:, :-20].ravel(), error_m[:, 20:].ravel())[0, 1]
+    assert near > 0.7
+    assert abs(far) < 0.05
+
+
+def test_depth_comes_in_steps_of_disparity() -> None:
+    measured_m = _sense_m(_wall(1.5), replace(SETTINGS, depth_scale_m=0.0001))
+    steps = FOCAL_PX * SETTINGS.baseline_m / measured_m / SETTINGS.disparity_step_px
+    # The unit of 0.1 mm is about 0.08 of a step here.
+    np.testing.assert_allclose(steps, np.rint(steps), atol=0.05)
+
+
+def test_shadow_left_of_a_near_thing_has_the_width_of_the_disparity_jump() -> None:
+    settings = replace(SETTINGS, edge_hole_ratio=0.0, edge_flying_ratio=0.0)
+    holes = (_sense_m(_post(), settings) == 0).mean(axis=0)
+    jump_px = FOCAL_PX * SETTINGS.baseline_m * (1 / 0.5 - 1 / 1.5)
+    shadow = np.flatnonzero(holes)
+    assert shadow.max() == 299
+    assert len(shadow) == pytest.approx(jump_px, abs=1.5)
+    np.testing.assert_array_equal(holes[shadow], 1.0)
+
+
+def test_edges_have_holes_and_flying_pixels() -> None:
+    measured_m = _sense_m(_post())
+    band = measured_m[:, 399:401]  # right edge: no shadow
+    flying = (band > 0.52) & (band < 1.4)
+    assert (band == 0).mean() == pytest.approx(SETTINGS.edge_hole_ratio, abs=0.07)
+    assert 0.5 * SETTINGS.edge_flying_ratio < flying.mean() <= SETTINGS.edge_flying_ratio + 0.03
+    assert (measured_m[:, 310:390] > 0).all()
+
+
+def test_seed_decides_and_repeats() -> None:
+    np.testing.assert_array_equal(_sense_m(_post(), seed=1), _sense_m(_post(), seed=1))
+    assert (_sense_m(_post(), seed=1) != _sense_m(_post(), seed=2)).any()
