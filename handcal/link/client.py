@@ -129,7 +129,8 @@ class HeadsetClient(Endpoint):
         """
         with self._changed:
             self._require_running()
-            return self._state
+            points = np.concatenate([np.empty((0, 3)), *self._live_chunks.values()])
+            return replace(self._state, live_W_m=points if len(points) else None)
 
     def _greet(self, envelope: pb.Envelope, address: Address) -> None:
         welcome = envelope.welcome
@@ -141,6 +142,7 @@ class HeadsetClient(Endpoint):
             self._joined_s = time.monotonic()
             self._next_hello_s = 0.0
             self._live_frame = 0
+            self._live_chunks.clear()
             self._state = HeadsetState(projections=self._state.projections)
 
     def _handle(self, envelope: pb.Envelope) -> None:
@@ -175,10 +177,7 @@ class HeadsetClient(Endpoint):
             self._live_chunks.clear()
         if live.chunk < messages.MAX_CHUNKS:
             self._live_chunks[live.chunk] = messages.read_points(live.points)
-        points = np.concatenate(list(self._live_chunks.values()))
-        self._state = replace(
-            self._state, live_W_m=points if len(points) else None, live_red=live.red
-        )
+            self._state = replace(self._state, live_red=live.red)
 
     def _answer(self, ping: pb.Ping) -> None:
         received_ns = self._clock_ns()

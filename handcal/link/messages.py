@@ -6,11 +6,12 @@ What comes in is bounded by the datagrams, but may still be nonsense: every read
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from google.protobuf.message import DecodeError
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from handcal.link import handcal_pb2 as pb
 from handcal.link.reliable import Receipt
@@ -52,8 +53,9 @@ def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
     ValueError
         If the points are not finite, too many, or spread over more than 6.5 m.
     """
-    points, origin = _checked_cloud(points_W_m)
-    return pb.Envelope(cursor=pb.Cursor(cursor_id=cursor_id, points=_quantise(points, origin)))
+    origin_m, offsets = _quantise(points_W_m)
+    points = pb.Points(origin_m=origin_m, offsets=offsets.tobytes())
+    return pb.Envelope(cursor=pb.Cursor(cursor_id=cursor_id, points=points))
 
 
 def live_hand(points_W_m: ArrayLike, red: bool, frame: int) -> list[pb.Envelope]:
@@ -64,8 +66,8 @@ def live_hand(points_W_m: ArrayLike, red: bool, frame: int) -> list[pb.Envelope]
     ValueError
         As `cursor`.
     """
-    points, origin = _checked_cloud(points_W_m)
-    count = max(1, -(-len(points) // CHUNK_POINTS))
+    origin_m, offsets = _quantise(points_W_m)
+    count = max(1, math.ceil(len(offsets) / CHUNK_POINTS))
     return [
         pb.Envelope(
             live_hand=pb.LiveHand(
@@ -73,7 +75,7 @@ def live_hand(points_W_m: ArrayLike, red: bool, frame: int) -> list[pb.Envelope]
                 chunk=chunk,
                 chunk_count=count,
                 red=red,
-                points=_quantise(points[chunk::count], origin),
+                points=pb.Points(origin_m=origin_m, offsets=offsets[chunk::count].tobytes()),
             )
         )
         for chunk in range(count)
@@ -89,24 +91,20 @@ def read_points(message: pb.Points) -> Float64:
     return points
 
 
-def _checked_cloud(points_m: ArrayLike) -> tuple[Float64, Float64]:
-    """Return the points, and the middle of their box."""
+def _quantise(points_m: ArrayLike) -> tuple[list[float], NDArray[np.int16]]:
+    """Return the middle of the points' box, and each point's offset from it in quanta."""
     points = np.asarray(points_m, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise ValueError("points must be an (N, 3) array of finite metres")
     if len(points) > MAX_POINTS:
         raise ValueError(f"{len(points):,} points exceed the {MAX_POINTS:,} that the link carries")
     if not len(points):
-        return points, np.zeros(3)
+        return [0.0, 0.0, 0.0], np.empty((0, 3), "<i2")
     low, high = points.min(axis=0), points.max(axis=0)
     if (high - low).max() > 2 * np.iinfo(np.int16).max * QUANTUM_M:
         raise ValueError("the points spread over more than the 6.5 m that the link carries")
-    return points, (low + high) / 2
-
-
-def _quantise(points: Float64, origin: Float64) -> pb.Points:
-    offsets = np.rint((points - origin) / QUANTUM_M).astype("<i2")
-    return pb.Points(origin_m=origin.tolist(), offsets=offsets.tobytes())
+    origin = (low + high) / 2
+    return origin.tolist(), np.rint((points - origin) / QUANTUM_M).astype("<i2")
 
 
 def prompt(text: str, eyes: Sequence[Eye]) -> pb.Envelope:

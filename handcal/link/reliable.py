@@ -15,6 +15,8 @@ from handcal.link import wire
 from handcal.link.settings import LinkSettings
 from handcal.link.wire import Packet, Slot
 
+RECEIPT_COPIES = 3
+
 
 class Delivery(Enum):
     """Where a reliable message stands."""
@@ -177,7 +179,7 @@ class Inbox:
 
     def __init__(self) -> None:
         self._newest: dict[Slot, _Incoming] = {}
-        self._touched: set[Slot] = set()
+        self._owed: dict[Slot, int] = {}
 
     def receive(self, packet: Packet) -> bytes | None:
         """Take a fragment; return its message if that completes it."""
@@ -190,7 +192,7 @@ class Inbox:
             message.fragment_count,
         ):
             return None
-        self._touched.add(packet.slot)
+        self._owed[packet.slot] = RECEIPT_COPIES
         if message.is_complete:
             return None
         message.fragments[packet.fragment] = packet.payload
@@ -202,7 +204,7 @@ class Inbox:
         return complete
 
     def take_receipts(self) -> list[Receipt]:
-        """Return what to acknowledge since the last call."""
-        receipts = [self._newest[slot].receipt(slot) for slot in sorted(self._touched)]
-        self._touched.clear()
+        """Return what to acknowledge now; each receipt comes up a few times, lest it be lost."""
+        receipts = [self._newest[slot].receipt(slot) for slot in self._owed]
+        self._owed = {slot: copies - 1 for slot, copies in self._owed.items() if copies > 1}
         return receipts
