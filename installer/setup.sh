@@ -1,0 +1,68 @@
+# Brings .venv up to date with installer/requirements.lock; sourced by run.sh and test.sh.
+# shellcheck shell=bash
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+root=$PWD
+
+fail() {
+    echo "handcal: $*" >&2
+    exit 1
+}
+
+# What the wheels load from the system: librealsense needs libusb and udev, Open3D needs OpenGL.
+apt_packages=(python3 python3-venv libusb-1.0-0 libudev1 libgl1 libegl1 libgomp1)
+
+install_system_packages() {
+    command -v dpkg-query >/dev/null || {
+        echo "handcal: not a Debian system; these must be there: ${apt_packages[*]}" >&2
+        return
+    }
+    local missing=() package
+    for package in "${apt_packages[@]}"; do
+        dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
+            missing+=("$package")
+    done
+    [[ ${#missing[@]} -eq 0 ]] && return
+    local as_root=()
+    if [[ $EUID -ne 0 ]]; then
+        command -v sudo >/dev/null || fail "as root, run: apt-get install ${missing[*]}"
+        as_root=(sudo)
+    fi
+    echo "Installing system packages: ${missing[*]}"
+    "${as_root[@]}" apt-get update -qq &&
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+            apt-get install -y -qq --no-install-recommends "${missing[@]}" ||
+        fail "apt-get failed; is this computer online? Needed: ${missing[*]}"
+}
+
+find_python() {
+    local python
+    for python in python3 python3.13 python3.12 python3.11; do
+        if "$python" -c 'import sys, venv, ensurepip
+sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; then
+            command -v "$python"
+            return
+        fi
+    done
+    fail "Python 3.11, 3.12 or 3.13 is needed; found $(python3 --version 2>&1 || true)"
+}
+
+install_python_packages() {
+    local stamp=.venv/handcal.stamp wanted python
+    # The folder belongs to the stamp because a virtual environment does not survive a move.
+    wanted=$(echo "$root" | cat - installer/requirements.lock pyproject.toml | sha256sum)
+    if [[ -x .venv/bin/python && -f $stamp && $(<"$stamp") == "$wanted" ]]; then
+        return
+    fi
+    python=$(find_python)
+    echo "Installing Python packages into .venv (about 400 MB the first time)"
+    "$python" -m venv --clear .venv
+    local pip=(.venv/bin/python -m pip --disable-pip-version-check --quiet)
+    "${pip[@]}" install --require-hashes -r installer/requirements.lock ||
+        fail "the packages could not be installed; is this computer online?"
+    "${pip[@]}" install --no-deps -e . || fail "handcal itself could not be installed"
+    echo "$wanted" >"$stamp"
+}
+
+install_system_packages
+install_python_packages

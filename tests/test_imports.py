@@ -1,0 +1,17 @@
+import subprocess
+import sys
+
+IMPORT_EVERYTHING = """
+import importlib, pkgutil, sys, handcal
+for module in pkgutil.walk_packages(handcal.__path__, "handcal."):
+    importlib.import_module(module.name)
+print(len(sys.modules), *{"PySide6", "pyqtgraph", "open3d", "pyrealsense2"} & sys.modules.keys())
+"""
+
+
+def test_the_whole_engine_imports_without_its_heavy_and_optional_parts() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", IMPORT_EVERYTHING], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split()[1:] == []
