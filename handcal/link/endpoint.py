@@ -193,22 +193,20 @@ class Endpoint(ABC):
             elif not channel.window.accept(packet.sequence):
                 self._rejected[Rejection.REPLAYED] += 1
             else:
+                self._received["datagrams"] += 1
+                self._received["bytes"] += len(datagram)
                 self._accept(channel, packet)
         except MalformedError:
             self._rejected[Rejection.CORRUPT] += 1
 
     def _find_channel(self, session: int, address: Address) -> Channel | None:
         channel = self._channel
-        is_current = channel is not None and (channel.session, channel.address) == (
-            session,
-            address,
-        )
-        return channel if is_current else None
+        if channel is None or (channel.session, channel.address) != (session, address):
+            return None
+        return channel
 
     def _accept(self, channel: Channel, packet: Packet) -> None:
         channel.heard_s = time.monotonic()
-        self._received["datagrams"] += 1
-        self._received["bytes"] += len(packet.payload)
         is_reliable = packet.slot is not Slot.UNRELIABLE
         payload = channel.inbox.receive(packet) if is_reliable else packet.payload
         if payload is None:

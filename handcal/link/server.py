@@ -70,7 +70,6 @@ class LinkStatistics:
     clock_offset_ms, clock_drift_ppm, clock_uncertainty_ms : float or None
         Headset's clock less the host's; None before it is known.
     bytes_sent, bytes_received : int
-        Whole datagrams sent, payloads received.
     """
 
     connected: bool
@@ -292,12 +291,12 @@ class HeadsetServer(Endpoint):
                 raise messages.MalformedError(f"a headset sends no {other}")
 
     def _take_pong(self, pong: pb.Pong) -> None:
+        now_ns = time.monotonic_ns()
+        if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * self._settings.silence_s:
+            return  # of no ping sent lately
         self._lost = max(0, pong.highest_sequence - pong.accepted)
         self._clock.add(
-            pong.t_sent_host_ns,
-            pong.t_received_headset_ns,
-            pong.t_sent_headset_ns,
-            time.monotonic_ns(),
+            pong.t_sent_host_ns, pong.t_received_headset_ns, pong.t_sent_headset_ns, now_ns
         )
 
     def _tick(self, now_s: float) -> None:

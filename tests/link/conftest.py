@@ -47,8 +47,10 @@ class RawPeer:
         self._receive_key = receive_key
 
     def seal(self, envelope: pb.Envelope, session: int = 0, sequence: int = 0) -> bytes:
-        packet = Packet(envelope.SerializeToString(), session, sequence)
-        return wire.seal(self._send_key, packet)
+        return self.seal_payload(envelope.SerializeToString(), session, sequence)
+
+    def seal_payload(self, payload: bytes, session: int, sequence: int) -> bytes:
+        return wire.seal(self._send_key, Packet(payload, session, sequence))
 
     def receive(self) -> tuple[pb.Envelope, Packet, Address]:
         datagram, address = self.socket.recvfrom(2048)

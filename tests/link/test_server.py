@@ -1,5 +1,6 @@
 """The PC's end against hand-made headsets, honest and hostile."""
 
+import random
 import threading
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from handcal.errors import LinkError, PosePendingError
 from handcal.geometry import rigid
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages
+from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.types import Projection
@@ -130,6 +132,33 @@ def test_nonsense_from_a_paired_headset_is_corrupt(
     headset.send(headset.seal(KEEP_ALIVE))  # outside any session
     eventually(lambda: server.statistics().rejected["corrupt"] == 4)
     assert server.statistics().pose_rate_hz == 0.0
+
+
+def test_a_paired_headset_gone_mad_stops_nothing(
+    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+) -> None:
+    headset, chance = new_headset(), random.Random(0)
+    session = headset.join()
+    extremes = (-(2**63), -1, 0, 1, 2**63 - 1)
+    for sequence in range(1, 400):
+        now_ns, a, b = time.monotonic_ns(), chance.choice(extremes), chance.choice(extremes)
+        envelope = chance.choice(
+            [
+                pb.Envelope(pong=pb.Pong(t_sent_host_ns=a, t_received_headset_ns=b)),
+                pb.Envelope(pong=pb.Pong(t_sent_host_ns=now_ns, t_received_headset_ns=b)),
+                pose(a),
+                messages.ack([Receipt(1, 1, 2**200)]),
+                messages.confirm({"left": np.eye(4), "right": np.eye(4)}, a, 1),
+            ]
+        )
+        payload = bytearray(envelope.SerializeToString())
+        if chance.random() < 0.5:
+            payload[chance.randrange(len(payload))] ^= 1 << chance.randrange(8)
+        headset.send(headset.seal_payload(bytes(payload), session, sequence))
+    eventually(lambda: server.statistics().received == 399)
+    server.confirmations()
+    assert server.statistics().rejected["corrupt"] > 0
+    assert headset.join() != 0
 
 
 def test_poses_are_told_at_the_hosts_time(
