@@ -21,8 +21,8 @@ from handcal.types import EyeDisplay, Float64
 _MATCH_ITERATIONS = 30
 _OVERLAY_ITERATIONS = 8
 _CONVERGED_M = 1e-6
-# Cursor points farther than this from the hand's surface hardly count: flying pixels.
-_OUTLIER_M = 0.003
+# Cursor points farther than this from the hand's surface hardly count, at first and at last.
+_START_M, _OUTLIER_M = 0.03, 0.003
 _FEWEST_POINTS = 20
 
 
@@ -70,20 +70,18 @@ def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> Curso
     cursor_m : (N, 3) float64
         W.
     T_W_hand : (4, 4) float64
-        About where the hand was, within some millimetres.
+        About where the hand was, within some centimetres.
     """
     tree = KDTree(hand.vertices_m)
     T_hand_W = invert(T_W_hand)
-    for _ in range(_MATCH_ITERATIONS):
+    for outlier_m in np.geomspace(_START_M, _OUTLIER_M, _MATCH_ITERATIONS):
         points = transform(T_hand_W, cursor_m)
         distance_m, normals = _to_surface(hand, tree, points)
-        weights = 1.0 / (1.0 + (distance_m / _OUTLIER_M) ** 2) ** 2
+        weights = 1.0 / (1.0 + (distance_m / outlier_m) ** 2) ** 2
         J = np.hstack([np.cross(points, normals), normals])
         JW = J.T * weights
         step = -np.linalg.solve(JW @ J + 1e-9 * np.eye(6), JW @ distance_m)
         T_hand_W = rigid(step[:3], step[3:]) @ T_hand_W
-        if np.abs(step).max() < _CONVERGED_M:
-            break
     points = transform(T_hand_W, cursor_m)
     distance_m, normals = _to_surface(hand, tree, points)
     return CursorMatch(cursor_m, points - distance_m[:, None] * normals, invert(T_hand_W))

@@ -72,7 +72,7 @@ def make_room(seed: int, settings: RoomSettings | None = None) -> Room:
 
 def _wallpaper(rng: np.random.Generator, width: int, height: int) -> UInt8:
     """Grain of several sizes, so that stereo finds texture everywhere, and some pictures on it."""
-    paint = rng.uniform(90.0, 200.0, 3)
+    paint = rng.uniform(90.0, 190.0) + rng.normal(0.0, 15.0, 3)
     grain = np.zeros((height, width), dtype=np.float32)
     for cell, strength in ((64, 14.0), (12, 8.0), (2, 8.0)):
         coarse = rng.normal(0.0, strength, (height // cell + 2, width // cell + 2))
