@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 
 from handcal.errors import HandError
+from handcal.hand.settings import SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, components, goes_on, on_border, solid_surface
-from handcal.hand.view import DepthView, deproject
+from handcal.hand.view import DepthView, between, crop_view, deproject
 from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with room to spare (Gordon et al., 2012 Anthropometric Survey of U.S. Army
@@ -41,8 +42,10 @@ class LocatedHand:
 
     Attributes
     ----------
+    view : DepthView
+        The part of the image with the surface that the hand is on.
     hand, arm : (h, w) bool
-        The hand, and the arm that goes on from it.
+        The hand, and the arm that goes on from it, in `view`.
     palm_m : (3,) float64
         Centre of the visible palm or back of the hand, camera frame.
     palm_radius_m : float
@@ -50,6 +53,7 @@ class LocatedHand:
         Distance from `palm_m` at which the arm begins.
     """
 
+    view: DepthView
     hand: Bool
     arm: Bool
     palm_m: Float64
@@ -57,58 +61,50 @@ class LocatedHand:
     limit_m: float
 
 
-def locate_hand(
-    view: DepthView, *, gate_m: tuple[float, float], jump_m: float, forearm_m: float
-) -> LocatedHand:
+def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
     """Find the nearest hand-sized end of a surface.
 
     Parameters
     ----------
     view : DepthView
         About 2 mm between the pixels of a hand.
-    gate_m : (float, float)
-        Nearest and farthest depth of a hand.
-    jump_m : float
-        Neighbouring pixels this far apart in depth belong to different surfaces.
-    forearm_m : float
-        How much of the arm beyond the wrist counts as hand.
+    settings : SegmentSettings
 
     Raises
     ------
     HandError
         If there is none.
     """
-    jump = round(jump_m / view.scale_m)
+    jump = round(settings.edge_jump_m / view.scale_m)
     solid = solid_surface(view.depth, jump)
-    points_m = deproject(view, *np.indices(view.depth.shape))
-    z_m = points_m[2]
-    gated = solid & (z_m >= gate_m[0]) & (z_m <= gate_m[1])
+    gated = solid & between(view, settings.depth_min_m, settings.depth_max_m)
     ends = on_border(gated) | goes_on(gated, solid & ~gated, view.depth, jump)
+    radius_px = _inscribed_radius_px(view.depth > 0, solid)
     pitch = view.step_px / view.camera.fx
-    radius_m = _inscribed_radius_px(view.depth > 0, solid) * z_m * np.float32(pitch)
 
     found = None
-    for surface in components(gated, _AREA_MIN_M2 / (pitch * gate_m[1]) ** 2):
-        located = _locate_on(surface, ends, points_m, radius_m, forearm_m)
-        area_m2 = np.square(z_m[located.hand]).sum() * pitch**2
-        plausible = (
-            _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
-            and area_m2 >= _AREA_MIN_M2
-        )
+    for surface in components(gated, _AREA_MIN_M2 / (pitch * settings.depth_max_m) ** 2):
+        part, place = crop_view(view, surface, margin=2)
+        radius_m = radius_px[place] * part.depth * np.float32(pitch * view.scale_m)
+        located = _locate_on(part, surface[place], ends[place], radius_m, settings.forearm_m)
+        plausible = _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
         if plausible and (found is None or located.palm_m[2] < found.palm_m[2]):
             found = located
     if found is None:
         raise HandError(
-            f"no hand-sized thing between {gate_m[0]:.2f} and {gate_m[1]:.2f} m; "
+            f"no hand-sized thing between {settings.depth_min_m:.2f} and "
+            f"{settings.depth_max_m:.2f} m; "
             "raise the bare hand in front of the camera"
         )
     return found
 
 
 def _locate_on(
-    surface: Bool, ends: Bool, points_m: Float32, radius_m: Float32, forearm_m: float
+    view: DepthView, surface: Bool, ends: Bool, radius_m: Float32, forearm_m: float
 ) -> LocatedHand:
     """Find palm and wrist on one surface, which runs on out of sight where `ends` is set."""
+    rows, columns = np.ogrid[: surface.shape[0], : surface.shape[1]]
+    points_m = deproject(view, rows, columns)
     arm_end = _arm_end(surface, ends, points_m, radius_m)
     tip_m = _farthest(surface, points_m, points_m[:, arm_end].mean(axis=1))
     near_tip = surface & (_distance(points_m, tip_m) < _TIP_TO_PALM_M)
@@ -120,7 +116,7 @@ def _locate_on(
     limit_m = wrist_m + forearm_m
     arm = _arm(surface & (from_palm_m > limit_m), arm_end)
     hand = surface & ~arm & (from_palm_m < _HAND_REACH_M)
-    return LocatedHand(hand, arm, palm_m.astype(np.float64), palm_radius_m, limit_m)
+    return LocatedHand(view, hand, arm, palm_m.astype(np.float64), palm_radius_m, limit_m)
 
 
 def _arm_end(surface: Bool, ends: Bool, points_m: Float32, radius_m: Float32) -> Bool:
@@ -201,9 +197,10 @@ def _inscribed_radius_px(measured: Bool, solid: Bool) -> Float32:
     """Return each pixel's distance in pixels to the surface's edge, pinholes closed."""
     closed = cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS)
     closed[measured & ~solid] = 0
-    return cv2.distanceTransform(closed, cv2.DIST_L2, 5)
+    return cv2.distanceTransform(closed, cv2.DIST_L2, 5).astype(np.float32, copy=False)
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:
-    distance_m: Float32 = np.sqrt(sum(np.square(points_m[i] - from_m[i]) for i in range(3)))
+    x_m, y_m, z_m = (axis_m - from_axis for axis_m, from_axis in zip(points_m, from_m, strict=True))
+    distance_m: Float32 = np.sqrt(x_m * x_m + y_m * y_m + z_m * z_m)
     return distance_m

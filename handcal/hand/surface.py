@@ -34,7 +34,9 @@ def solid_surface(depth: UInt16, jump: int) -> Bool:
 
 
 def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
-    """Return how far each pixel of `surface` is behind the nearest one around it; 0 beside it.
+    """Return how far each pixel of `surface` is behind the nearest one around it.
+
+    Beside the surface the result means nothing.
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
     """
     on_surface = np.where(surface, depth, _UNMEASURED)
     around = np.ones((size_px, size_px), np.uint8)
-    return np.where(surface, on_surface - cv2.erode(on_surface, around), np.uint16(0))
+    return on_surface - cv2.erode(on_surface, around)
 
 
 def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
@@ -64,8 +66,8 @@ def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
     (h, w) bool
     """
     nearest_other = cv2.erode(np.where(other, depth, _UNMEASURED), NEIGHBOURS)
-    touches: Bool = nearest_other <= depth + np.uint32(jump)
-    return surface & touches & (nearest_other != _UNMEASURED)
+    beside: Bool = (nearest_other != _UNMEASURED) & (nearest_other <= depth + np.uint32(jump))
+    return surface & beside
 
 
 def on_border(mask: Bool) -> Bool:

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.geometry import camera_matrix
-from handcal.types import Float32, Frame, Intrinsics, UInt16
+from handcal.types import Bool, Float32, Frame, Intrinsics, UInt16
 
 Box: TypeAlias = tuple[int, int, int, int]
 """x0, y0, x1, y1 in pixels, x1 and y1 exclusive."""
+Pixels: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""Rows and columns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,28 +48,57 @@ def view_depth(frame: Frame, box: Box, step_px: int = 1) -> DepthView:
     return DepthView(depth, frame.depth_scale_m, frame.depth_intrinsics, box, step_px)
 
 
+def crop_view(view: DepthView, mask: Bool, margin: int) -> tuple[DepthView, tuple[slice, slice]]:
+    """Return the part of a view around a mask in it, and where in the view that part is."""
+    x, y, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    left, top = max(0, x - margin), max(0, y - margin)
+    part = np.s_[top : y + height + margin, left : x + width + margin]
+    depth = np.ascontiguousarray(view.depth[part])
+    x0, y0 = view.box[0] + left * view.step_px, view.box[1] + top * view.step_px
+    box = (
+        x0,
+        y0,
+        min(view.box[2], x0 + depth.shape[1] * view.step_px),
+        min(view.box[3], y0 + depth.shape[0] * view.step_px),
+    )
+    return DepthView(depth, view.scale_m, view.camera, box, view.step_px), part
+
+
+def pixels_of(mask: Bool) -> Pixels:
+    """Return rows and columns of a mask's pixels; np.nonzero takes several times as long."""
+    rows, columns = np.divmod(np.flatnonzero(mask), mask.shape[1])
+    return rows, columns
+
+
+def between(view: DepthView, depth_min_m: float, depth_max_m: float) -> Bool:
+    """Mark the pixels of a view within a range of depths."""
+    nearest = np.uint16(np.ceil(depth_min_m / view.scale_m))
+    farthest = np.uint16(depth_max_m / view.scale_m)
+    return (view.depth >= nearest) & (view.depth <= farthest)
+
+
 def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Float32:
     """Return the points that pixels of a view show, lens distortion undone.
 
     Parameters
     ----------
     view : DepthView
-    rows, columns : (N,) int
-        Pixels of the view.
+    rows, columns : (...) int
+        Pixels of the view, broadcast against each other.
 
     Returns
     -------
-    (3, N) float32
+    (3, ...) float32
         Depth camera's frame.
     """
     camera = view.camera
     u = (view.box[0] + columns * view.step_px).astype(np.float32)
     v = (view.box[1] + rows * view.step_px).astype(np.float32)
+    z_m = view.depth[rows, columns] * np.float32(view.scale_m)
     if any(camera.distortion):
-        pixels = np.stack([u, v], axis=-1).reshape(-1, 1, 2)
+        pixels = np.stack(np.broadcast_arrays(u, v), axis=-1).reshape(-1, 1, 2)
         rays = cv2.undistortPoints(pixels, camera_matrix(camera), np.array(camera.distortion))
-        x, y = rays.reshape(-1, 2).T
+        x, y = np.moveaxis(rays.reshape(*z_m.shape, 2), -1, 0)
     else:
         x, y = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
-    z_m = view.depth[rows, columns] * np.float32(view.scale_m)
-    return np.stack([x * z_m, y * z_m, z_m]).astype(np.float32)
+    return np.stack([x * z_m, y * z_m, z_m]).astype(np.float32, copy=False)

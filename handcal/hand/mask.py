@@ -1,0 +1,125 @@
+"""The located hand at full resolution: which pixels it covers, its outline, and where it is cut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from handcal.errors import HandError
+from handcal.hand.locate import LocatedHand
+from handcal.hand.settings import SegmentSettings
+from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
+from handcal.hand.view import (
+    DepthView,
+    Pixels,
+    between,
+    crop_view,
+    deproject,
+    pixels_of,
+    view_depth,
+)
+from handcal.types import Bool, Frame, UInt8
+
+# The hand's outline may touch the image border this much.
+_BORDER_CONTACT_M = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandMask:
+    """The hand in the depth image.
+
+    Attributes
+    ----------
+    view : DepthView
+        The part of the image around the hand, at full resolution.
+    surface : (h, w) bool
+        Measured pixels of the hand.
+    filled : (h, w) uint8
+        255 on the hand, small holes closed.
+    outline : Pixels
+        The outer contour, in order.
+    cut : (h, w) bool
+        Where the hand ends but the arm, the region of interest or the gate's surface goes on.
+    pitch_m : float
+        About the distance between neighbouring pixels on the hand.
+    """
+
+    view: DepthView
+    surface: Bool
+    filled: UInt8
+    outline: Pixels
+    cut: Bool
+    pitch_m: float
+
+
+def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> HandMask:
+    """Mask a located hand at full resolution.
+
+    Raises
+    ------
+    HandError
+        If the image does not show all of it.
+    """
+    view, may_be_hand, may_be_arm = _full_resolution(located, frame)
+    jump = round(settings.edge_jump_m / view.scale_m)
+    pitch_m = float(located.palm_m[2]) / view.camera.fx
+    solid = solid_surface(view.depth, jump)
+    within = solid & may_be_hand & between(view, settings.depth_min_m, settings.depth_max_m)
+    near_wrist = pixels_of(within & may_be_arm)
+    from_palm_m = np.linalg.norm(deproject(view, *near_wrist).T - located.palm_m, axis=1)
+    within[near_wrist] = from_palm_m <= located.limit_m
+    if not within.any():
+        raise HandError("the depth image is too sparse where the hand is; check the camera")
+    outline, filled = _outline(within, settings.hole_area_m2 / pitch_m**2)
+    surface = within & (filled > 0)
+    if _border_contact_px(surface, view) * pitch_m > _BORDER_CONTACT_M:
+        raise HandError("hand cut by the image border; move it toward the middle")
+    cut = on_border(surface) | goes_on(surface, solid & ~surface, view.depth, jump)
+    return HandMask(view, surface, filled, outline, cut, pitch_m)
+
+
+def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool]:
+    """Return the image around the hand, and where in it the hand and the arm may be."""
+    coarse, place = crop_view(located.view, located.hand, margin=2)
+    view = view_depth(frame, coarse.box)
+    height, width = view.depth.shape
+    hand, arm = (
+        cv2.dilate(part[place].astype(np.uint8), NEIGHBOURS)
+        .astype(bool)
+        .repeat(coarse.step_px, axis=0)
+        .repeat(coarse.step_px, axis=1)[:height, :width]
+        for part in (located.hand, located.arm)
+    )
+    return view, hand, arm
+
+
+def _outline(within: Bool, hole_area_px: float) -> tuple[Pixels, UInt8]:
+    """Return the outer contour of the largest part, and that part with small holes closed.
+
+    Borders are followed as in Suzuki & Abe, "Topological structural analysis of digitized binary
+    images by border following", 1985.
+    """
+    mask = np.where(within, np.uint8(255), np.uint8(0))
+    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    is_hole = hierarchy.reshape(-1, 4)[:, 3] >= 0
+    areas = np.array([cv2.contourArea(contour) for contour in contours])
+    outer = contours[int(np.argmax(np.where(is_hole, -1.0, areas)))]
+    small_holes = [contours[int(i)] for i in np.flatnonzero(is_hole & (areas <= hole_area_px))]
+    cv2.drawContours(mask, small_holes, -1, 255, cv2.FILLED)
+    inside = cv2.drawContours(np.zeros_like(mask), [outer], 0, 255, cv2.FILLED)
+    columns, rows = outer.reshape(-1, 2).astype(np.intp).T
+    return (rows, columns), mask & inside
+
+
+def _border_contact_px(surface: Bool, view: DepthView) -> int:
+    """Count the pixels of the hand on the border of the whole image."""
+    x0, y0, x1, y1 = view.box
+    sides = (
+        (y0 == 0, surface[0]),
+        (y1 == view.camera.height, surface[-1]),
+        (x0 == 0, surface[:, 0]),
+        (x1 == view.camera.width, surface[:, -1]),
+    )
+    return sum(int(np.count_nonzero(side)) for at_border, side in sides if at_border)

@@ -1,0 +1,55 @@
+"""Settings of the segmentation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentSettings:
+    """How a hand is segmented.
+
+    Attributes
+    ----------
+    depth_min_m, depth_max_m : float
+        Depth gate: within arm's reach and the camera's range (paper, section on segmentation).
+    edge_jump_m : float
+        Neighbouring pixels this far apart in depth belong to different surfaces.
+    flying_m : float
+        A point this far behind another two pixels away is taken for a flying pixel.
+    forearm_m : float
+        How much of the forearm beyond the wrist counts as hand.
+    cut_band_m : float
+        Points this close to a cut edge are marked as cut.
+    hole_area_m2 : float
+        Holes in the hand up to this size are closed in the mask.
+    roi_margin : float
+        By how much a given region of interest is widened on each side, as a share of its size: a
+        detector's box ends at the wrist, but the way the arm leaves tells where the hand ends.
+    points : int
+        About how many points of the surface are kept.
+
+    Raises
+    ------
+    ValueError
+        If the gate is empty or `points` is not positive.
+    """
+
+    depth_min_m: float = 0.35
+    depth_max_m: float = 0.70
+    edge_jump_m: float = 0.02
+    flying_m: float = 0.01
+    forearm_m: float = 0.02
+    cut_band_m: float = 0.004
+    hole_area_m2: float = 1e-4
+    roi_margin: float = 0.25
+    points: int = 5000
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.depth_min_m < self.depth_max_m:
+            raise ValueError(
+                f"the depth gate {self.depth_min_m} to {self.depth_max_m} m is empty; "
+                "set 0 < depth_min_m < depth_max_m"
+            )
+        if self.points < 1:
+            raise ValueError(f"points is {self.points}; at least one must be kept")
