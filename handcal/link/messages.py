@@ -223,7 +223,7 @@ def _numbers(values: Sequence[float], count: int) -> Float64:
 def _rigid(values: Sequence[float]) -> Float64:
     T = np.vstack([_numbers(values, 12).reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
     R = T[:3, :3]
-    if not np.allclose(R @ R.T, np.eye(3), atol=_RIGID_TOLERANCE) or np.linalg.det(R) < 0:
+    if np.abs(R @ R.T - np.eye(3)).max() > _RIGID_TOLERANCE or np.linalg.det(R) < 0:
         raise MalformedError("a pose that is not a rotation and a translation")
     T.flags.writeable = False
     return T
