@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
@@ -112,31 +112,27 @@ class SyntheticCamera:
         return self._expose(state)
 
     def _expose(self, state: SceneState) -> Frame:
-        settings = self._settings
-        depth_m, color = render(self._world, state.T_W_D, state.T_W_hand, self.depth_intrinsics)
+        settings, world = self._settings, self._world
+        color_intrinsics, T_C_D = self.depth_intrinsics, np.eye(4)
+        depth_m, color = render(world, state.T_W_D, state.T_W_hand, self.depth_intrinsics)
+        if not settings.aligned:
+            color_intrinsics, T_C_D = _COLOR, _T_C_D
+            _, color = render(world, state.T_W_D @ invert(T_C_D), state.T_W_hand, _COLOR)
         depth = sense_depth(depth_m, self.depth_intrinsics.fx, self._rng, settings.sensor)
-        camera_s_per_s = 1.0 + settings.clock_drift
+        clock_rate = 1.0 + settings.clock_drift
         frame = Frame(
             index=self._index,
-            t_camera_ns=round(state.t_ns * camera_s_per_s + 1e9 * settings.clock_offset_s),
+            t_camera_ns=round(state.t_ns * clock_rate + 1e9 * settings.clock_offset_s),
             t_host_ns=time.monotonic_ns(),
             depth=depth,
             depth_scale_m=settings.sensor.depth_scale_m,
             depth_intrinsics=self.depth_intrinsics,
             color=color,
-            color_intrinsics=self.depth_intrinsics,
+            color_intrinsics=color_intrinsics,
+            T_C_D=T_C_D,
         )
         self._index += 1
-        if settings.aligned:
-            return frame
-        _, color = render(self._world, state.T_W_D @ invert(_T_C_D), state.T_W_hand, _COLOR)
-        return replace(
-            frame,
-            color=color,
-            color_intrinsics=_COLOR,
-            T_C_D=_T_C_D,
-            t_host_ns=time.monotonic_ns(),
-        )
+        return frame
 
     def close(self) -> None:
         """Stop; safe to call twice."""

@@ -17,14 +17,14 @@ from handcal.types import Float32, Float64, UInt8, _freeze
 
 Side: TypeAlias = Literal["left", "right"]
 
-# Mean lengths in mm of metacarpal, proximal, middle and distal phalanx (Buryanov & Kotiuk 2010,
-# "Proportions of hand segments"), the last with some 4 mm of soft tissue at the tip.
-_BONES_MM = {
+# Mean lengths in mm of the phalanges, the last with some 4 mm of soft tissue at the tip; the
+# thumb's begin with the metacarpal (Buryanov & Kotiuk 2010, "Proportions of hand segments").
+_PHALANGES_MM = {
     "thumb": (46, 32, 25),
-    "index": (68, 40, 22, 20),
-    "middle": (65, 45, 26, 21),
-    "ring": (58, 41, 26, 21),
-    "little": (54, 33, 18, 20),
+    "index": (40, 22, 20),
+    "middle": (45, 26, 21),
+    "ring": (41, 26, 21),
+    "little": (33, 18, 20),
 }
 # From the palm's centre: the joint where each finger leaves the palm, mm.
 _KNUCKLES_MM = {
@@ -43,7 +43,7 @@ _RADII_MM = {
 }
 _SPREAD_RAD = {"index": 0.14, "middle": 0.02, "ring": -0.1, "little": -0.26}
 _THUMB_BASE_MM = (21, 30, -8)
-_WRIST_MM = 50.0
+_WRIST_MM = np.array([0.0, 50.0, 0.0])
 _REFERENCE_LENGTH_MM = 187.0
 # Skin from very light to very dark, RGB of the back of the hand.
 _SKIN = np.array([[236, 200, 180], [205, 155, 125], [160, 108, 78], [98, 66, 50]], dtype=np.float64)
@@ -110,13 +110,13 @@ class HandModel:
 
 @dataclass(frozen=True, slots=True)
 class _Capsule:
-    """A tapered capsule from a to b, melting into what was there over `blend_m`."""
+    """A tapered capsule from a to b that melts into what was there, in mm of the mean hand."""
 
-    a_m: Float64
-    b_m: Float64
-    radius_a_m: float
-    radius_b_m: float
-    blend_m: float
+    a: Float64
+    b: Float64
+    radius_a: float
+    radius_b: float
+    blend: float
 
 
 def make_hand(seed: int, settings: HandSettings | None = None) -> HandModel:
@@ -134,23 +134,19 @@ def make_hand(seed: int, settings: HandSettings | None = None) -> HandModel:
     settings = settings or HandSettings()
     rng = np.random.default_rng(seed)
     length_m = settings.length_m + settings.length_sigma_m * np.clip(rng.normal(), -2.5, 2.5)
-    scale_m = length_m / _REFERENCE_LENGTH_MM
-    wrist_m = np.array([0.0, _WRIST_MM * scale_m, 0.0])
-    deviation, flexion = rng.uniform(-0.15, 0.15, 2)
-    arm_axis = _direction(np.pi + deviation, flexion)
-    capsules = [
-        *_forearm(wrist_m, arm_axis, settings.forearm_m, scale_m),
-        *_palm(scale_m),
-        *_fingers(rng, scale_m),
-    ]
-    vertices, triangles, normals = _skin(capsules, settings.grid_m)
+    m_per_mm = length_m / _REFERENCE_LENGTH_MM
+    arm_axis = _direction(np.pi + rng.uniform(-0.15, 0.15), rng.uniform(-0.15, 0.15))
+    capsules = [*_forearm(arm_axis, settings.forearm_m / m_per_mm), *_palm(), *_fingers(rng)]
+    vertices, triangles, normals = _skin(capsules, settings.grid_m / m_per_mm)
     side: Side = settings.side or ("left" if rng.random() < 0.5 else "right")
     colors = _skin_colors(vertices, normals, rng)
     if side == "left":
         mirror = np.array([-1.0, 1.0, 1.0])
         vertices, normals, arm_axis = vertices * mirror, normals * mirror, arm_axis * mirror
         triangles = triangles[:, ::-1]
-    return HandModel(vertices, normals, colors, triangles, wrist_m, arm_axis, side)
+    return HandModel(
+        vertices * m_per_mm, normals, colors, triangles, _WRIST_MM * m_per_mm, arm_axis, side
+    )
 
 
 def _direction(spread_rad: float, flexion_rad: float) -> Float64:
@@ -159,135 +155,107 @@ def _direction(spread_rad: float, flexion_rad: float) -> Float64:
     return np.array([np.sin(spread_rad) * cos, -np.cos(spread_rad) * cos, -np.sin(flexion_rad)])
 
 
-def _forearm(
-    wrist_m: Float64, arm_axis: Float64, length_m: float, scale_m: float
-) -> list[_Capsule]:
-    """Two capsules side by side (radius and ulna), widening toward the elbow."""
-    elbow_m = wrist_m + length_m * arm_axis
+def _forearm(arm_axis: Float64, length: float) -> list[_Capsule]:
+    """Return two capsules side by side, radius and ulna, widening toward the elbow."""
+    elbow = _WRIST_MM + length * arm_axis
     across = np.array([1.0, 0.0, 0.0])
     return [
-        _Capsule(
-            wrist_m + sign * 10 * scale_m * across,
-            elbow_m + sign * 14 * scale_m * across,
-            18 * scale_m,
-            33 * scale_m,
-            15 * scale_m,
-        )
-        for sign in (-1, 1)
+        _Capsule(_WRIST_MM + 10 * side * across, elbow + 14 * side * across, 18, 33, 15)
+        for side in (-1, 1)
     ]
 
 
-def _palm(scale_m: float) -> list[_Capsule]:
-    """Metacarpals, and the ball of the little finger's side."""
+def _palm() -> list[_Capsule]:
+    """Return the metacarpals, the ball of the little finger's side, and the carpus."""
     bases = {
         "index": (12, 26, 0),
         "middle": (4, 26, 0),
         "ring": (-4, 26, 0),
         "little": (-12, 28, 0),
     }
-    metacarpals = [
-        _capsule(bases[finger], _KNUCKLES_MM[finger], 14.5, 11, 12, scale_m) for finger in bases
-    ]
+    lines = [(base, _KNUCKLES_MM[finger], 14.5, 11) for finger, base in bases.items()]
+    lines += [((-20, 34, -4), (-29, -12, -4), 13, 11), ((0, 45, 0), (0, 5, 0), 16, 12)]
     return [
-        *metacarpals,
-        _capsule((-20, 34, -4), (-29, -12, -4), 13, 11, 12, scale_m),
-        _capsule((0, 45, 0), (0, 5, 0), 16, 12, 12, scale_m),
+        _Capsule(np.array(a, np.float64), np.array(b, np.float64), radius_a, radius_b, 12)
+        for a, b, radius_a, radius_b in lines
     ]
 
 
-def _capsule(
-    a_mm: tuple[float, ...],
-    b_mm: tuple[float, ...],
-    radius_a_mm: float,
-    radius_b_mm: float,
-    blend_mm: float,
-    scale_m: float,
-) -> _Capsule:
-    return _Capsule(
-        scale_m * np.array(a_mm, dtype=np.float64),
-        scale_m * np.array(b_mm, dtype=np.float64),
-        radius_a_mm * scale_m,
-        radius_b_mm * scale_m,
-        blend_mm * scale_m,
-    )
-
-
-def _fingers(rng: np.random.Generator, scale_m: float) -> list[_Capsule]:
-    """Chains of phalanges; spread and curl are the hand's, with a little of each finger's own."""
+def _fingers(rng: np.random.Generator) -> list[_Capsule]:
+    """Return all phalanges; spread and curl are the hand's, with a little of each finger's own."""
     spread = rng.uniform(0.6, 1.5)
     curl_rad = rng.uniform(0.02, 0.22)
     thickness = rng.normal(1.0, 0.04)
     capsules = []
-    for finger, lengths_mm in _BONES_MM.items():
-        own_curl_rad = curl_rad * rng.uniform(0.7, 1.3)
-        if finger == "thumb":
-            start_mm, blend_mm = _THUMB_BASE_MM, 10.0
-            spread_rad = rng.uniform(0.55, 0.85)
-            flexion_rad, bends_rad = 0.35, (0.0, -0.1, own_curl_rad)
-            turns_rad = (0.0, -0.15, -0.1)
-        else:
-            start_mm, blend_mm = _KNUCKLES_MM[finger], 4.0
-            lengths_mm = lengths_mm[1:]
-            spread_rad = spread * _SPREAD_RAD[finger] + rng.normal(0.0, 0.02)
-            flexion_rad, bends_rad = 0.0, (own_curl_rad, 1.3 * own_curl_rad, 0.8 * own_curl_rad)
-            turns_rad = (0.0, 0.0, 0.0)
-        radii_m = np.array(_RADII_MM[finger]) * thickness * scale_m
-        joint_m = scale_m * np.array(start_mm, dtype=np.float64)
-        for number, (length_mm, bend_rad, turn_rad) in enumerate(
-            zip(lengths_mm, bends_rad, turns_rad, strict=True)
-        ):
-            spread_rad += turn_rad
-            flexion_rad += bend_rad
-            is_last = number == len(lengths_mm) - 1
-            length_m = length_mm * scale_m - (radii_m[-1] if is_last else 0.0)
-            next_m = joint_m + length_m * _direction(spread_rad, flexion_rad)
-            capsules.append(
-                _Capsule(joint_m, next_m, radii_m[number], radii_m[number + 1], blend_mm * scale_m)
-            )
-            joint_m = next_m
+    for finger, knuckle in _KNUCKLES_MM.items():
+        bends = curl_rad * rng.uniform(0.7, 1.3) * np.array([1.0, 1.3, 0.8])
+        turns = np.array([spread * _SPREAD_RAD[finger] + rng.normal(0.0, 0.02), 0.0, 0.0])
+        radii = thickness * np.array(_RADII_MM[finger])
+        capsules += _chain(knuckle, _PHALANGES_MM[finger], radii, turns, bends, 4)
+    bends = np.array([0.35, -0.1, curl_rad * rng.uniform(0.7, 1.3)])
+    turns = np.array([rng.uniform(0.55, 0.85), -0.15, -0.1])
+    radii = thickness * np.array(_RADII_MM["thumb"])
+    return capsules + _chain(_THUMB_BASE_MM, _PHALANGES_MM["thumb"], radii, turns, bends, 10)
+
+
+def _chain(
+    start: tuple[int, ...],
+    lengths: tuple[int, ...],
+    radii: Float64,
+    turns_rad: Float64,
+    bends_rad: Float64,
+    blend: float,
+) -> list[_Capsule]:
+    """Return a finger's bones, each turned sideways and bent to the palm against the last."""
+    ends = np.array(lengths, dtype=np.float64)
+    ends[-1] -= radii[-1]  # the tip's cap belongs to the length
+    capsules = []
+    joint = np.array(start, dtype=np.float64)
+    for number, spread_rad, flexion_rad in zip(
+        range(len(ends)), np.cumsum(turns_rad), np.cumsum(bends_rad), strict=True
+    ):
+        following = joint + ends[number] * _direction(spread_rad, flexion_rad)
+        capsules.append(_Capsule(joint, following, radii[number], radii[number + 1], blend))
+        joint = following
     return capsules
 
 
 def _skin(
-    capsules: list[_Capsule], grid_m: float
+    capsules: list[_Capsule], grid: float
 ) -> tuple[Float32, np.ndarray[tuple[int, ...], np.dtype[np.int32]], Float32]:
     """Return vertices, triangles and outward normals of the capsules' smooth union."""
-    ends = np.array([[c.a_m, c.b_m] for c in capsules])
-    reach = max(max(c.radius_a_m, c.radius_b_m) for c in capsules) + 4 * grid_m
+    ends = np.array([[capsule.a, capsule.b] for capsule in capsules])
+    reach = max(max(capsule.radius_a, capsule.radius_b) for capsule in capsules) + 4 * grid
     low = ends.min((0, 1)) - reach
-    shape = np.ceil((ends.max((0, 1)) + reach - low) / grid_m).astype(int) + 1
-    field = np.full(shape, 0.02, dtype=np.float32)
+    shape = np.ceil((ends.max((0, 1)) + reach - low) / grid).astype(int) + 1
+    field = np.full(shape, 20.0, dtype=np.float32)
     for capsule in capsules:
-        _add(field, capsule, low, grid_m)
+        _add(field, capsule, low, grid)
     vertices, triangles, normals, _ = marching_cubes(  # type: ignore[no-untyped-call]
-        field, 0.0, spacing=(grid_m,) * 3, gradient_direction="descent"
+        field, 0.0, spacing=(grid,) * 3, gradient_direction="descent"
     )
     return (vertices + low).astype(np.float32), triangles, -normals
 
 
-def _add(field: Float32, capsule: _Capsule, low_m: Float64, grid_m: float) -> None:
+def _add(field: Float32, capsule: _Capsule, low: Float64, grid: float) -> None:
     """Melt a capsule into the distance field by the polynomial smooth minimum (Quilez 2013)."""
-    margin = max(capsule.radius_a_m, capsule.radius_b_m) + capsule.blend_m + 2 * grid_m
-    ends = np.stack([capsule.a_m, capsule.b_m])
-    first = np.floor((ends.min(0) - margin - low_m) / grid_m).astype(int).clip(0)
-    last = np.ceil((ends.max(0) + margin - low_m) / grid_m).astype(int) + 1
-    block = field[tuple(slice(*ends) for ends in zip(first, last, strict=True))]
+    margin = max(capsule.radius_a, capsule.radius_b) + capsule.blend + 2 * grid
+    near, far = np.minimum(capsule.a, capsule.b), np.maximum(capsule.a, capsule.b)
+    first = np.floor((near - margin - low) / grid).astype(int).clip(0)
+    last = np.ceil((far + margin - low) / grid).astype(int) + 1
+    block = field[tuple(map(slice, first, last))]
     axes = [
-        (low_m[i] + grid_m * np.arange(first[i], first[i] + block.shape[i])).astype(np.float32)
+        (low[i] - capsule.a[i] + grid * np.arange(first[i], first[i] + block.shape[i]))
         for i in range(3)
     ]
-    x, y, z = np.meshgrid(*axes, indexing="ij", sparse=True)
-    bone = capsule.b_m - capsule.a_m
-    ax, ay, az = capsule.a_m
-    along = ((x - ax) * bone[0] + (y - ay) * bone[1] + (z - az) * bone[2]) / (bone @ bone)
-    along = along.clip(0.0, 1.0)
+    x, y, z = np.meshgrid(*(axis.astype(np.float32) for axis in axes), indexing="ij", sparse=True)
+    bone = capsule.b - capsule.a
+    along = ((x * bone[0] + y * bone[1] + z * bone[2]) / (bone @ bone)).clip(0.0, 1.0)
     distance = np.sqrt(
-        (x - ax - along * bone[0]) ** 2
-        + (y - ay - along * bone[1]) ** 2
-        + (z - az - along * bone[2]) ** 2
-    ) - (capsule.radius_a_m + along * (capsule.radius_b_m - capsule.radius_a_m))
-    overlap = (capsule.blend_m - np.abs(block - distance)).clip(0.0)
-    block[:] = np.minimum(block, distance) - overlap**2 / (4.0 * capsule.blend_m)
+        (x - along * bone[0]) ** 2 + (y - along * bone[1]) ** 2 + (z - along * bone[2]) ** 2
+    ) - (capsule.radius_a + along * (capsule.radius_b - capsule.radius_a))
+    overlap = (capsule.blend - np.abs(block - distance)).clip(0.0)
+    block[:] = np.minimum(block, distance) - overlap**2 / (4.0 * capsule.blend)
 
 
 def _skin_colors(vertices: Float32, normals: Float32, rng: np.random.Generator) -> UInt8:
@@ -296,7 +264,7 @@ def _skin_colors(vertices: Float32, normals: Float32, rng: np.random.Generator) 
     skin = np.array([np.interp(tone, range(len(_SKIN)), channel) for channel in _SKIN.T])
     palm_skin = 0.75 * skin + 0.25 * np.array([240.0, 190.0, 170.0])
     palm = np.clip(0.5 - 1.5 * normals[:, 2:], 0.0, 1.0)
-    waves = vertices @ rng.normal(0.0, 70.0, (3, 4)) + rng.uniform(0.0, 6.3, 4)
+    waves = vertices @ rng.normal(0.0, 0.07, (3, 4)) + rng.uniform(0.0, 6.3, 4)
     blotch = 1.0 + 0.025 * np.sin(waves).sum(1, keepdims=True)
     rgb: Float64 = (palm * palm_skin + (1.0 - palm) * skin) * blotch
     return np.clip(rgb, 0, 255).astype(np.uint8)
