@@ -10,7 +10,10 @@ fail() {
 }
 
 # What the wheels load from the system: librealsense needs libusb and udev, Open3D needs OpenGL.
-apt_packages=(python3 python3-venv libusb-1.0-0 libudev1 libgl1 libegl1 libgomp1)
+apt_packages=(
+    python3 python3-venv
+    libusb-1.0-0 libudev1 libgl1 libegl1 libx11-6 libidn2-0
+)
 
 install_system_packages() {
     command -v dpkg-query >/dev/null || {
@@ -31,7 +34,7 @@ install_system_packages() {
     echo "Installing system packages: ${missing[*]}"
     "${as_root[@]}" apt-get update -qq &&
         "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-            apt-get install -y -qq --no-install-recommends "${missing[@]}" ||
+            apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null ||
         fail "apt-get failed; is this computer online? Needed: ${missing[*]}"
 }
 
@@ -49,14 +52,15 @@ sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; then
 
 install_python_packages() {
     local stamp=.venv/handcal.stamp wanted python
-    # The folder belongs to the stamp because a virtual environment does not survive a move.
-    wanted=$(echo "$root" | cat - installer/requirements.lock pyproject.toml | sha256sum)
-    if [[ -x .venv/bin/python && -f $stamp && $(<"$stamp") == "$wanted" ]]; then
+    wanted=$(cat installer/requirements.lock pyproject.toml | sha256sum)
+    # A virtual environment names its folder and does not survive a move.
+    if ! .venv/bin/python -c '' 2>/dev/null || ! grep -q " $root/.venv$" .venv/pyvenv.cfg; then
+        python=$(find_python)
+        "$python" -m venv --clear .venv
+    elif [[ -f $stamp && $(<"$stamp") == "$wanted" ]]; then
         return
     fi
-    python=$(find_python)
     echo "Installing Python packages into .venv (about 400 MB the first time)"
-    "$python" -m venv --clear .venv
     local pip=(.venv/bin/python -m pip --disable-pip-version-check --quiet)
     "${pip[@]}" install --require-hashes -r installer/requirements.lock ||
         fail "the packages could not be installed; is this computer online?"
