@@ -1,3 +1,6 @@
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -22,3 +25,13 @@ def alignment() -> Alignment:
         t_a_ns=1_700_000_000_123_456_789,
         t_b_ns=1_700_000_003_123_456_789,
     )
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Return the folder of real recordings made by others, which is not part of the project."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("HANDCAL_DATA", beside))
+    if not folder.is_dir():
+        pytest.skip("no real recordings: set HANDCAL_DATA to the folder that holds them")
+    return folder

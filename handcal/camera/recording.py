@@ -1,0 +1,311 @@
+"""Recordings made through librealsense, played back by it, and recordings made from any frames."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from itertools import chain
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.geometry import rigid
+from handcal.types import Float64, Frame, Intrinsics, UInt8
+
+_POLL_MS = 100
+_RATE_HZ = 30
+_BACKLOG_BYTES = 64 * 2**20
+_DISK_TIMEOUT_S = 10.0
+
+
+class RecordingCamera:
+    """Plays a recording back once, depth with colour if it has any; implements `Camera`.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.db3`` or ``.bag`` recording.
+    real_time : bool
+        Play at the recorded speed and drop what is read too late; otherwise every frame, as fast
+        as it is read.
+
+    Raises
+    ------
+    CameraError
+        If librealsense is not installed, or the file is missing, damaged or without depth.
+    """
+
+    def __init__(self, path: Path, real_time: bool = False) -> None:
+        rs = _librealsense()
+        if not path.is_file():
+            raise CameraError(f"there is no recording {path}")
+        self.name = f"Recording {path.name}"
+        self._stopped = rs.playback_status.stopped
+        self._pipeline = rs.pipeline()
+        self._is_open = False
+        self._last_index = -1
+        config = rs.config()
+        try:
+            config.enable_device_from_file(str(path), repeat_playback=False)
+            device = config.resolve(rs.pipeline_wrapper(self._pipeline)).get_device()
+            self._playback = device.as_playback()
+            self._playback.set_real_time(real_time)  # before it starts, or the first frames go by
+            profile = self._pipeline.start(config)
+            self._is_open = True
+            depth = profile.get_stream(rs.stream.depth)
+        except RuntimeError as error:
+            self.close()
+            raise CameraError(
+                f"{path} cannot be played as a RealSense recording with depth: {error}"
+            ) from error
+        self.depth_intrinsics = _intrinsics(depth)
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        """Return the next frame with depth; see `Camera.read`."""
+        deadline_s = time.monotonic() + timeout_s
+        while self._is_open:
+            ended = self._playback.current_status() == self._stopped
+            arrived, frames = self._pipeline.try_wait_for_frames(_POLL_MS)
+            depth = frames.get_depth_frame() if arrived else None
+            # The syncer may give one depth frame again with the next colour.
+            if depth and depth.get_frame_number() != self._last_index:
+                self._last_index = depth.get_frame_number()
+                return frame_from(frames)
+            if ended and not arrived:
+                break
+            if time.monotonic() > deadline_s:
+                raise CameraTimeoutError(f"{self.name}: no frame for {timeout_s:g} s")
+        raise CameraEndError(f"{self.name} has ended")
+
+    def close(self) -> None:
+        """Stop the playback; safe to call twice."""
+        if self._is_open:
+            self._is_open = False
+            self._pipeline.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def frame_from(frames: Any) -> Frame:
+    """Copy a librealsense frame set with depth, and perhaps colour, into a frame.
+
+    Depth is taken as it is, not aligned to colour. Colour more than its period apart from the
+    depth, or in a format that is not colour, is left out.
+    """
+    depth = frames.get_depth_frame()
+    color = frames.get_color_frame()
+    image = _rgb(color) if color and _is_pair(depth, color) else None
+    profile = color.profile if image is not None else None
+    return Frame(
+        index=depth.get_frame_number(),
+        t_camera_ns=round(depth.get_timestamp() * 1e6),
+        t_host_ns=time.monotonic_ns(),
+        depth=np.array(depth.get_data(), np.uint16),
+        depth_scale_m=depth.get_units(),
+        depth_intrinsics=_intrinsics(depth.profile),
+        color=image,
+        color_intrinsics=_intrinsics(profile) if profile else None,
+        T_C_D=_extrinsics(depth.profile, profile) if profile else np.eye(4),
+    )
+
+
+def record_db3(path: Path, frames: Iterable[Frame]) -> int:
+    """Record frames of one camera as a ``.db3`` file that librealsense plays back.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.db3``; written under another name until complete.
+    frames : iterable of Frame
+        All of one camera: the same intrinsics, depth scale and extrinsics.
+
+    Returns
+    -------
+    int
+        How many frames were recorded.
+
+    Raises
+    ------
+    CameraError
+        If librealsense is not installed or cannot write the file.
+    ValueError
+        If there is no frame, frames differ in camera, or `path` does not end in ``.db3``.
+    """
+    if path.suffix != ".db3":
+        raise ValueError(f"librealsense records only .db3 files, not {path.name}")
+    unfinished = path.with_name(f".{path.stem}.unfinished.db3")
+    unfinished.unlink(missing_ok=True)
+    try:
+        count = _record(unfinished, frames)
+        unfinished.replace(path)
+    except (RuntimeError, OSError) as error:
+        raise CameraError(f"{path} cannot be recorded: {error}") from error
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return count
+
+
+def _record(path: Path, frames: Iterable[Frame]) -> int:
+    rs = _librealsense()
+    remaining = iter(frames)
+    first = next(remaining, None)
+    if first is None:
+        raise ValueError("there is no frame to record")
+    device = rs.software_device()
+    outlets = [_Outlet(rs, device, "Stereo Module", rs.stream.depth, first.depth_intrinsics)]
+    outlets[0].sensor.add_read_only_option(rs.option.depth_units, first.depth_scale_m)
+    if first.color_intrinsics is not None:
+        outlets.append(_Outlet(rs, device, "RGB Camera", rs.stream.color, first.color_intrinsics))
+        outlets[0].profile.register_extrinsics_to(
+            outlets[1].profile, _rs_extrinsics(rs, first.T_C_D)
+        )
+    recorder = rs.recorder(str(path), device, False)  # compressed it would play at 16 Hz
+    sensors = recorder.query_sensors()
+    for sensor in sensors:
+        sensor.open(sensor.get_stream_profiles())
+        sensor.start(lambda _: None)
+    count = written = 0
+    for frame in chain([first], remaining):
+        _check_same_camera(frame, first)
+        for outlet in outlets:
+            written += outlet.push(frame)
+        _wait_for_disk(path, written)
+        count += 1
+    for sensor in sensors:
+        sensor.stop()
+        sensor.close()
+    return count
+
+
+class _Outlet:
+    """One stream of a software device."""
+
+    def __init__(self, rs: Any, device: Any, name: str, stream: Any, camera: Intrinsics) -> None:
+        self._rs = rs
+        self._is_depth = stream == rs.stream.depth
+        self.sensor = device.add_sensor(name)
+        video = rs.video_stream()
+        video.type, video.index, video.uid = stream, 0, int(not self._is_depth)
+        video.width, video.height, video.fps = camera.width, camera.height, _RATE_HZ
+        video.bpp, video.fmt = (2, rs.format.z16) if self._is_depth else (3, rs.format.rgb8)
+        video.intrinsics = _rs_intrinsics(rs, camera)
+        self._bytes_per_pixel, self._stride = video.bpp, video.bpp * camera.width
+        self.profile = self.sensor.add_video_stream(video)
+
+    def push(self, frame: Frame) -> int:
+        """Hand this stream's image of a frame to the recorder; return its size in bytes."""
+        rs = self._rs
+        image = np.ascontiguousarray(frame.depth if self._is_depth else frame.color)
+        # Without its rate, in mHz, the syncer never pairs a frame with another stream's.
+        self.sensor.set_metadata(rs.frame_metadata_value.actual_fps, 1000 * _RATE_HZ)
+        packet = rs.software_video_frame()
+        packet.pixels = image
+        packet.stride, packet.bpp = self._stride, self._bytes_per_pixel
+        packet.timestamp = frame.t_camera_ns * 1e-6
+        packet.domain = rs.timestamp_domain.hardware_clock
+        packet.frame_number = frame.index
+        packet.profile = self.profile.as_video_stream_profile()
+        if self._is_depth:
+            packet.depth_units = frame.depth_scale_m
+        self.sensor.on_video_frame(packet)
+        return image.nbytes
+
+
+def _check_same_camera(frame: Frame, first: Frame) -> None:
+    if (
+        frame.depth_intrinsics != first.depth_intrinsics
+        or frame.color_intrinsics != first.color_intrinsics
+        or frame.depth_scale_m != first.depth_scale_m
+        or not np.array_equal(frame.T_C_D, first.T_C_D)
+    ):
+        raise ValueError(f"frame {frame.index} is not from the camera of the first frame")
+
+
+def _wait_for_disk(path: Path, written: int) -> None:
+    """Wait until the recorder, which drops frames over some 250 MB behind, has nearly caught up."""
+    deadline_s = time.monotonic() + _DISK_TIMEOUT_S
+    while written - path.stat().st_size > _BACKLOG_BYTES:
+        if time.monotonic() > deadline_s:
+            raise CameraError(f"{path.parent} takes no more data; is the disk full?")
+        time.sleep(0.001)
+
+
+def _librealsense() -> Any:
+    try:
+        import pyrealsense2  # imported late: absent on macOS
+    except ImportError as error:
+        raise CameraError(
+            "RealSense recordings need librealsense: pip install pyrealsense2 "
+            "(no package exists for macOS)"
+        ) from error
+    return pyrealsense2
+
+
+def _intrinsics(profile: Any) -> Intrinsics:
+    """Convert a stream's intrinsics; an inverse distortion, which OpenCV has not, is left out.
+
+    It is zero for the depth of every RealSense camera, and within a pixel or two for colour.
+    """
+    camera = profile.as_video_stream_profile().get_intrinsics()
+    is_forward = "inverse" not in str(camera.model)
+    distortion = tuple(camera.coeffs) if is_forward and any(camera.coeffs) else ()
+    return Intrinsics(
+        camera.width, camera.height, camera.fx, camera.fy, camera.ppx, camera.ppy, distortion
+    )
+
+
+def _rs_intrinsics(rs: Any, camera: Intrinsics) -> Any:
+    intrinsics = rs.intrinsics()
+    intrinsics.width, intrinsics.height = camera.width, camera.height
+    intrinsics.fx, intrinsics.fy = camera.fx, camera.fy
+    intrinsics.ppx, intrinsics.ppy = camera.cx, camera.cy
+    intrinsics.model = rs.distortion.brown_conrady
+    intrinsics.coeffs = [*camera.distortion, 0.0, 0.0, 0.0, 0.0, 0.0][:5]
+    return intrinsics
+
+
+def _extrinsics(source: Any, target: Any) -> Float64:
+    extrinsics = source.get_extrinsics_to(target)
+    return rigid(np.reshape(extrinsics.rotation, (3, 3)).T, extrinsics.translation)  # column-major
+
+
+def _rs_extrinsics(rs: Any, T_target_source: Float64) -> Any:
+    extrinsics = rs.extrinsics()
+    extrinsics.rotation = T_target_source[:3, :3].T.ravel().tolist()
+    extrinsics.translation = T_target_source[:3, 3].tolist()
+    return extrinsics
+
+
+def _is_pair(depth: Any, color: Any) -> bool:
+    apart_ms = abs(depth.get_timestamp() - color.get_timestamp())
+    one_clock = depth.get_frame_timestamp_domain() == color.get_frame_timestamp_domain()
+    return not one_clock or apart_ms <= 1000.0 / color.profile.fps()
+
+
+def _rgb(color: Any) -> UInt8 | None:
+    """Copy a colour image as RGB; None for a format that is not colour."""
+    image: NDArray[Any] = np.asanyarray(color.get_data())
+    match color.profile.format().name:
+        case "rgb8":
+            return np.array(image)
+        case "bgr8":
+            return np.array(image[..., ::-1])
+        case "yuyv":
+            packed = image.view(np.uint8).reshape(*image.shape[:2], 2)
+            return np.array(cv2.cvtColor(packed, cv2.COLOR_YUV2RGB_YUYV), np.uint8)
+        case _:
+            return None

@@ -1,0 +1,135 @@
+"""Recordings made and played back through librealsense, with no camera attached."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.camera.recording import RecordingCamera, record_db3
+from handcal.errors import CameraEndError, CameraError
+from handcal.geometry import rigid
+from handcal.types import Frame, Intrinsics
+
+if sys.platform == "darwin":
+    pytest.skip("pyrealsense2 has no package for macOS", allow_module_level=True)
+
+DEPTH = Intrinsics(64, 48, 60.0, 61.0, 31.5, 23.5)
+COLOR = Intrinsics(80, 60, 75.0, 75.0, 40.0, 30.0, (0.1, -0.05, 0.001, 0.002, 0.01))
+T_C_D = rigid([0.01, -0.02, 0.03], [0.015, 0.001, -0.002])
+
+
+def make_frames(count: int, with_color: bool = True) -> Iterator[Frame]:
+    rng = np.random.default_rng(1)
+    for index in range(1, count + 1):
+        yield Frame(
+            index=index,
+            t_camera_ns=index * 33_000_000,
+            t_host_ns=0,
+            depth=rng.integers(0, 65535, (48, 64), np.uint16),
+            depth_scale_m=0.000125,
+            depth_intrinsics=DEPTH,
+            color=rng.integers(0, 255, (60, 80, 3), np.uint8) if with_color else None,
+            color_intrinsics=COLOR if with_color else None,
+            T_C_D=T_C_D if with_color else np.eye(4),
+        )
+
+
+def read_all(camera: RecordingCamera) -> Iterator[Frame]:
+    while True:
+        try:
+            yield camera.read()
+        except CameraEndError:
+            return
+
+
+def assert_same_camera(got: Intrinsics | None, want: Intrinsics) -> None:
+    assert got is not None
+    assert (got.width, got.height) == (want.width, want.height)
+    np.testing.assert_allclose(
+        [got.fx, got.fy, got.cx, got.cy, *got.distortion],
+        [want.fx, want.fy, want.cx, want.cy, *want.distortion],
+        rtol=1e-6,
+    )
+
+
+@pytest.mark.parametrize("with_color", [True, False])
+def test_recording_plays_back_what_was_recorded(tmp_path: Path, with_color: bool) -> None:
+    path = tmp_path / "hand.db3"
+    assert record_db3(path, make_frames(12, with_color)) == 12
+    assert [file.name for file in tmp_path.iterdir()] == ["hand.db3"]
+    with RecordingCamera(path) as camera:
+        assert_same_camera(camera.depth_intrinsics, DEPTH)
+        frames = list(read_all(camera))
+    recorded = {frame.index: frame for frame in make_frames(12, with_color)}
+    assert len(frames) >= 10  # the two streams race: librealsense may miss one of the first frames
+    assert [got.index for got in frames] == sorted({got.index for got in frames})
+    for got in frames:
+        want = recorded[got.index]
+        assert got.t_camera_ns == pytest.approx(want.t_camera_ns, abs=1000)
+        assert got.depth_scale_m == pytest.approx(want.depth_scale_m)
+        np.testing.assert_array_equal(got.depth, want.depth)
+    colors = {frame.color.tobytes() for frame in recorded.values() if frame.color is not None}
+    in_color = [got for got in frames if got.color is not None]
+    assert len(in_color) >= (10 if with_color else 0)
+    for got in in_color:
+        assert_same_camera(got.color_intrinsics, COLOR)
+        np.testing.assert_allclose(got.T_C_D, T_C_D, atol=1e-6)
+        assert got.color is not None
+        assert got.color.tobytes() in colors
+
+
+def test_closed_recording_gives_no_frame(tmp_path: Path) -> None:
+    path = tmp_path / "hand.db3"
+    record_db3(path, make_frames(3))
+    camera = RecordingCamera(path)
+    camera.close()
+    camera.close()
+    with pytest.raises(CameraEndError):
+        camera.read()
+
+
+def test_missing_and_damaged_recordings_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(CameraError, match="there is no recording"):
+        RecordingCamera(tmp_path / "absent.db3")
+    damaged = tmp_path / "damaged.db3"
+    damaged.write_bytes(b"not a data base" * 100)
+    with pytest.raises(CameraError, match="cannot be played"):
+        RecordingCamera(damaged)
+
+
+def test_only_frames_of_one_camera_are_recorded(tmp_path: Path) -> None:
+    frames = [*make_frames(1), *make_frames(1, with_color=False)]
+    with pytest.raises(ValueError, match="not from the camera"):
+        record_db3(tmp_path / "mixed.db3", frames)
+    with pytest.raises(ValueError, match="no frame"):
+        record_db3(tmp_path / "empty.db3", [])
+    with pytest.raises(ValueError, match=r"only \.db3"):
+        record_db3(tmp_path / "hand.bag", make_frames(1))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_librealsense_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyrealsense2", None)
+    with pytest.raises(CameraError, match="pip install pyrealsense2"):
+        RecordingCamera(tmp_path / "hand.db3")
+
+
+def test_real_recordings_with_larger_color_play(shared_data: Path) -> None:
+    paths = sorted((shared_data / "recordings").glob("*.bag"))
+    assert paths
+    for path in paths:
+        with RecordingCamera(path) as camera:
+            frame = camera.read(5.0)
+            assert frame.depth.shape == (720, 1280)
+            assert frame.color is not None
+            assert frame.color.shape == (1080, 1920, 3)
+            assert 0.0 < np.linalg.norm(frame.T_C_D[:3, 3]) < 0.1
+            assert frame.depth_scale_m == pytest.approx(0.001)
+            with pytest.raises(CameraEndError):
+                camera.read()
