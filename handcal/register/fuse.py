@@ -1,0 +1,158 @@
+"""Several alignments, two eyes, one estimate.
+
+An alignment gives one hand displacement: three numbers. With one eye open they are that eye's φ.
+With both open the wearer puts the hand where the errors of both eyes balance: by least squares in
+the image, at ``φ_seen = W_left φ_left + W_right φ_right`` with ``W_e = (N_left + N_right)^-1 N_e``
+and N_e the normal matrix of eye e's pixels for a moved hand. So six unknowns meet three numbers,
+and only a prior on how far two eyes can differ closes the gap. Everything is Gaussian, so this
+is one linear system; several alignments add up in it, weighed by their covariances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from handcal.geometry import transform
+from handcal.types import EYES, Alignment, Eye, EyeShift, Float64, Rig
+
+
+@dataclass(frozen=True, slots=True)
+class FuseSettings:
+    """What is known before, and how well people align.
+
+    Attributes
+    ----------
+    eye_box_sigma_m : float
+        Each component of φ, standard deviation: the eye box is about 2 cm wide (paper).
+    eye_difference_sigma_m : tuple of 3 float
+        Of the right φ from the left. x is the eye distance against the rig's (3.6 mm among
+        adults: Gordon et al. 2014, ANSUR II).
+    lateral_sigma_arcmin : float
+        How exactly a wearer overlays, about each of two axes.
+    depth_sigma : float
+        How exactly a wearer matches the size, relative.
+    """
+
+    eye_box_sigma_m: float = 0.010
+    eye_difference_sigma_m: tuple[float, float, float] = (0.0036, 0.001, 0.001)
+    lateral_sigma_arcmin: float = 3.0
+    depth_sigma: float = 0.003
+
+
+def with_eye_box(shift: EyeShift, sigma_m: float = FuseSettings.eye_box_sigma_m) -> EyeShift:
+    """Return the estimate with the eye box as prior: what is hardly known is drawn to C0."""
+    covariance_m2 = np.linalg.inv(np.linalg.inv(shift.covariance_m2) + np.eye(3) / sigma_m**2)
+    return replace(
+        shift,
+        shift_m=covariance_m2 @ np.linalg.solve(shift.covariance_m2, shift.shift_m),
+        covariance_m2=covariance_m2,
+    )
+
+
+def fuse_alignments(
+    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
+) -> dict[Eye, EyeShift]:
+    """Fuse solved alignments into one estimate for each eye that took part in any.
+
+    Parameters
+    ----------
+    solved : sequence of (Alignment, mapping of eye to EyeShift)
+        As `solve_alignment` gives them, without prior.
+    rig : Rig
+    settings : FuseSettings
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to fuse.
+    """
+    if not solved:
+        raise ValueError("at least one alignment is needed")
+    information = np.kron(np.eye(2), np.eye(3) / settings.eye_box_sigma_m**2)
+    apart = np.diag(1.0 / np.square(settings.eye_difference_sigma_m))
+    information += np.kron([[1.0, -1.0], [-1.0, 1.0]], apart)
+    state = np.zeros(6)
+    rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
+    for H, seen_m, covariance_m2 in rows:
+        information += H.T @ np.linalg.solve(covariance_m2, H)
+        state += H.T @ np.linalg.solve(covariance_m2, seen_m)
+    joint_m2 = np.linalg.inv(information)
+    estimate_m = joint_m2 @ state
+    joint_m2 *= _disagreement(rows, estimate_m)
+    took_part = [eye for eye in EYES if any(eye in shifts for _, shifts in solved)]
+    return {
+        eye: _summarise(
+            [shifts[eye] for _, shifts in solved if eye in shifts],
+            estimate_m[3 * EYES.index(eye) :][:3],
+            joint_m2[3 * EYES.index(eye) :, 3 * EYES.index(eye) :][:3, :3],
+        )
+        for eye in took_part
+    }
+
+
+def _observe(
+    alignment: Alignment, shifts: Mapping[Eye, EyeShift], rig: Rig, settings: FuseSettings
+) -> tuple[Float64, Float64, Float64]:
+    """Return H (3, 6), what was seen (3,) and its covariance: seen = H [φ_left; φ_right]."""
+    normals: dict[Eye, Float64] = {}
+    noises: dict[Eye, Float64] = {}
+    for eye in shifts:
+        hand_E = transform(alignment.T_E_W[eye], alignment.hand_m)
+        normals[eye] = _pixel_normal(hand_E)
+        noises[eye] = shifts[eye].covariance_m2 + _wearer_covariance(
+            float(hand_E[:, 2].mean()), rig.eyes[eye].z_C0_S_m, settings
+        )
+    total = np.sum(list(normals.values()), axis=0)
+    H = np.zeros((3, 6))
+    seen_m = np.zeros(3)
+    for eye in shifts:
+        weight = np.linalg.solve(total, normals[eye])
+        H[:, 3 * EYES.index(eye) :][:, :3] = weight
+        seen_m += weight @ shifts[eye].shift_m
+    return H, seen_m, np.mean(list(noises.values()), axis=0)
+
+
+def _pixel_normal(hand_E_m: Float64) -> Float64:
+    """Return Σ JᵀJ (3, 3) of the hand's pixels for its displacement, up to the focal length."""
+    depth = hand_E_m[:, 2]
+    J = np.zeros((len(hand_E_m), 2, 3))
+    J[:, 0, 0] = J[:, 1, 1] = 1.0 / depth
+    J[:, :, 2] = -hand_E_m[:, :2] / depth[:, None] ** 2
+    rows = J.reshape(-1, 3)
+    return np.asarray(rows.T @ rows)
+
+
+def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings) -> Float64:
+    """Covariance of φ from how exactly a wearer aligns a hand at a depth."""
+    lateral_m = depth_m * np.radians(settings.lateral_sigma_arcmin / 60.0)
+    along_m = depth_m * settings.depth_sigma
+    gain = 1.0 / (1.0 - depth_m / distance_m)
+    return np.diag(np.square([gain * lateral_m, gain * lateral_m, gain * along_m]))
+
+
+def _disagreement(rows: Sequence[tuple[Float64, Float64, Float64]], estimate_m: Float64) -> float:
+    """Return the Birge ratio, at least 1: by how much alignments differ beyond their covariances."""
+    chi_square = sum(
+        float((seen_m - H @ estimate_m) @ np.linalg.solve(covariance_m2, seen_m - H @ estimate_m))
+        for H, seen_m, covariance_m2 in rows
+    )
+    freedom = 3 * (len(rows) - 1)
+    return max(1.0, chi_square / freedom) if freedom else 1.0
+
+
+def _summarise(shifts: Sequence[EyeShift], shift_m: Float64, covariance_m2: Float64) -> EyeShift:
+    return EyeShift(
+        shift_m=shift_m,
+        covariance_m2=covariance_m2,
+        rms_m=float(np.sqrt(np.mean([shift.rms_m**2 for shift in shifts]))),
+        residuals_m=np.concatenate([shift.residuals_m for shift in shifts]),
+        inlier_ratio=float(np.mean([shift.inlier_ratio for shift in shifts])),
+        iterations=sum(shift.iterations for shift in shifts),
+        converged=all(shift.converged for shift in shifts),
+        stop_reason="; ".join(dict.fromkeys(shift.stop_reason for shift in shifts)),
+        history_m2=np.concatenate([shift.history_m2 for shift in shifts]),
+        method="fused",
+    )

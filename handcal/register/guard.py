@@ -1,0 +1,76 @@
+"""The rotation guard: how far the live hand is turned against the cursor, at camera rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from handcal.register.rigid import RigidSettings, register_rigid
+from handcal.register.solve import check_cloud
+from handcal.register.surface import Surface, describe_surface
+from handcal.types import Bool, Float64
+
+# Enough for half a degree in a few milliseconds.
+_SETTINGS = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
+
+
+@dataclass(frozen=True, slots=True)
+class GuardSettings:
+    """When an alignment is refused.
+
+    Attributes
+    ----------
+    limit_rad : float
+        Largest rotation; 9° in the paper, for its 4 mm line.
+    """
+
+    limit_rad: float = float(np.radians(9.0))
+
+
+class RotationGuard:
+    """Measures rotations against one cursor.
+
+    Parameters
+    ----------
+    cursor_m : (N, 3) float64
+    cursor_cut : (N,) bool or None
+    """
+
+    def __init__(self, cursor_m: Float64, cursor_cut: Bool | None = None) -> None:
+        self._cursor = _describe(cursor_m, cursor_cut)
+
+    def rotation(self, hand_m: Float64, hand_cut: Bool | None = None) -> Float64:
+        """Return the rotation vector from the cursor to the hand, (3,), rad.
+
+        Both clouds in the same frame, in whose axes the vector is.
+        """
+        fit = register_rigid(self._cursor, _describe(hand_m, hand_cut), _SETTINGS)
+        return Rotation.from_matrix(fit.T_target_source[:3, :3]).as_rotvec()
+
+
+def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
+    """Return the rotation vector that turns the cursor into the hand.
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (N, 3), (M, 3) array_like
+        Unordered clouds in one frame.
+
+    Returns
+    -------
+    (3,) float64
+        In rad, about the frame's axes.
+
+    Raises
+    ------
+    ValueError
+        For NaN, a wrong shape, or fewer than 100 points.
+    """
+    return RotationGuard(check_cloud("cursor_m", cursor_m)).rotation(check_cloud("hand_m", hand_m))
+
+
+def _describe(points_m: Float64, is_cut: Bool | None) -> Surface:
+    return describe_surface(points_m, is_cut, _SETTINGS.max_points)

@@ -1,0 +1,54 @@
+"""The alignment equation in φ: predict the cursor from the hand, and fit φ to given pairs.
+
+At alignment the cursor point d and the hand point s, both in E0(t_b), fall on one pixel:
+``κ d = UQ s``. The paper takes κ = 1 (``exact=False``). A hand does not change its size, so
+overlaying it fixes ``κ = 1 - φ3φ4`` (``exact=True``). Both are linear in φ. Per pair, b = d - s::
+
+    exact   (φ4 s_z - 1) φ1 + φ4 (d_x - s_x) φ3 = b_x      paper   (φ4 s_z - 1) φ1 - φ4 s_x φ3 = b_x
+            (φ4 s_z - 1) φ2 + φ4 (d_y - s_y) φ3 = b_y              (φ4 s_z - 1) φ2 - φ4 s_y φ3 = b_y
+                              (φ4 d_z - 1) φ3   = b_z                                    - φ3 = b_z
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from handcal.display import update_matrix
+from handcal.geometry import transform
+from handcal.types import Float64
+
+
+def predict(hand_m: Float64, shift_m: Float64, distance_m: float, *, exact: bool) -> Float64:
+    """Return where the cursor must be for `hand_m` to cover it, (N, 3), all in E0(t_b)."""
+    seen = transform(update_matrix(shift_m, distance_m), hand_m)
+    return seen / (1.0 - shift_m[2] / distance_m) if exact else seen
+
+
+def design(cursor_m: Float64, hand_m: Float64, distance_m: float, *, exact: bool) -> Float64:
+    """Return the rows of the alignment equation, (N, 3 rows, 3 unknowns)."""
+    phi_4 = 1.0 / distance_m
+    A = np.zeros((len(hand_m), 3, 3))
+    A[:, 0, 0] = A[:, 1, 1] = phi_4 * hand_m[:, 2] - 1.0
+    if exact:
+        A[:, :2, 2] = phi_4 * (cursor_m[:, :2] - hand_m[:, :2])
+        A[:, 2, 2] = phi_4 * cursor_m[:, 2] - 1.0
+    else:
+        A[:, :2, 2] = -phi_4 * hand_m[:, :2]
+        A[:, 2, 2] = -1.0
+    return A
+
+
+def fit_shift(cursor_m: Float64, hand_m: Float64, distance_m: float, *, exact: bool) -> Float64:
+    """Return the least-squares φ, (3,), for known pairs: the floor that no solver can pass.
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (N, 3) float64
+        Pairs, in E0(t_b).
+    distance_m : float
+        z(C0→S).
+    exact : bool
+        True for the exact factor, False for the paper's 1.
+    """
+    A = design(cursor_m, hand_m, distance_m, exact=exact).reshape(-1, 3)
+    return np.asarray(np.linalg.solve(A.T @ A, A.T @ (cursor_m - hand_m).ravel()))

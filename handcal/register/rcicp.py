@@ -1,0 +1,141 @@
+"""Rotation-constrained ICP as published, and its three-row form; and plain ICP, the baseline.
+
+All three pair each hand point with its nearest cursor point, start with the means on one
+another, and know nothing of cuts, outliers or a rotated hand. They are here to be compared with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from handcal.geometry import rigid, transform
+from handcal.register.model import fit_shift, predict
+from handcal.register.surface import nearest
+from handcal.types import Float64
+
+MAX_ITERATIONS = 800
+# The paper stops when the error falls by less than this factor from one iteration to the next.
+PAPER_RATIO = 0.9999
+# The three-row form and ICP reach the state where no pair changes any more.
+TOLERANCE_M = 1e-7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Iterated:
+    """What an iteration ended with: φ, the moved hand, its partners, and why it stopped."""
+
+    shift_m: Float64
+    moved_m: Float64
+    partner_m: Float64
+    history_m2: Float64
+    converged: bool
+    stop_reason: str
+
+
+def solve_paper(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterated:
+    """Solve as in Hu et al. 2021: rows contracted with λ, SVD, stop at 1 > e_k/e_(k-1) > 0.9999.
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (N, 3), (M, 3) float64
+        In E0(t_b).
+    distance_m : float
+        z(C0→S).
+    """
+    phi_4 = 1.0 / distance_m
+    tree = cKDTree(cursor_m)
+    shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
+    moved = hand_m - shift_m
+    history: list[float] = []
+    while True:
+        partner, error_m2 = _pair(tree, cursor_m, moved)
+        history.append(error_m2)
+        if error_m2 == 0.0 or (len(history) > 1 and 1.0 > history[-1] / history[-2] > PAPER_RATIO):
+            return _ended(shift_m, moved, partner, history, "error ratio above 0.9999")
+        if len(history) == MAX_ITERATIONS:
+            return _ended(shift_m, moved, partner, history, None)
+        lam = moved - partner
+        pull = 1.0 - phi_4 * hand_m[:, 2]
+        A = -np.column_stack(
+            [
+                lam[:, 0] * pull,
+                lam[:, 1] * pull,
+                phi_4 * np.sum(lam[:, :2] * hand_m[:, :2], axis=1) + lam[:, 2],
+            ]
+        )
+        b = np.sum((partner - hand_m) * lam, axis=1)
+        shift_m = np.linalg.lstsq(A, b, rcond=None)[0]
+        moved = predict(hand_m, shift_m, distance_m, exact=False)
+
+
+def solve_linear(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterated:
+    """Solve the paper's model with all three rows of each pair; arguments as `solve_paper`."""
+    tree = cKDTree(cursor_m)
+    shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
+    moved = hand_m - shift_m
+    history: list[float] = []
+    while True:
+        partner, error_m2 = _pair(tree, cursor_m, moved)
+        history.append(error_m2)
+        previous_m = shift_m
+        shift_m = fit_shift(partner, hand_m, distance_m, exact=False)
+        moved = predict(hand_m, shift_m, distance_m, exact=False)
+        if np.abs(shift_m - previous_m).max() < TOLERANCE_M:
+            return _ended(shift_m, moved, partner, history, "step below 0.1 µm")
+        if len(history) == MAX_ITERATIONS:
+            return _ended(shift_m, moved, partner, history, None)
+
+
+def solve_icp(cursor_m: Float64, hand_m: Float64) -> Iterated:
+    """Solve rigidly, point to point (Besl & McKay 1992), and read φ off the translation.
+
+    UQ's translation is -φ at E's origin; the paper compares with this. Arguments as `solve_paper`.
+    """
+    tree = cKDTree(cursor_m)
+    T = rigid(translation_m=cursor_m.mean(axis=0) - hand_m.mean(axis=0))
+    history: list[float] = []
+    while True:
+        moved = transform(T, hand_m)
+        partner, error_m2 = _pair(tree, cursor_m, moved)
+        history.append(error_m2)
+        step = best_rigid(moved, partner)
+        T = step @ T
+        if np.abs(transform(step, moved) - moved).max() < TOLERANCE_M:
+            return _ended(-T[:3, 3], moved, partner, history, "step below 0.1 µm")
+        if len(history) == MAX_ITERATIONS:
+            return _ended(-T[:3, 3], moved, partner, history, None)
+
+
+def best_rigid(source_m: Float64, target_m: Float64) -> Float64:
+    """Return the least-squares rigid ``T_target_source`` of pairs (Kabsch 1976)."""
+    source_mean, target_mean = source_m.mean(axis=0), target_m.mean(axis=0)
+    R = best_rotation(source_m - source_mean, target_m - target_mean)
+    return rigid(R, target_mean - R @ source_mean)
+
+
+def best_rotation(source_m: Float64, target_m: Float64) -> Float64:
+    """Return the (3, 3) rotation that brings centred `source_m` closest to `target_m`."""
+    U, _, Vt = np.linalg.svd(target_m.T @ source_m)
+    turn: Float64 = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    return turn
+
+
+def _pair(tree: cKDTree, cursor_m: Float64, moved_m: Float64) -> tuple[Float64, float]:
+    distance_m, index = nearest(tree, moved_m)
+    return cursor_m[index], float(distance_m @ distance_m) / len(moved_m)
+
+
+def _ended(
+    shift_m: Float64, moved: Float64, partner: Float64, history: list[float], reason: str | None
+) -> Iterated:
+    return Iterated(
+        shift_m,
+        moved,
+        partner,
+        np.array(history),
+        reason is not None,
+        reason or f"limit of {MAX_ITERATIONS} iterations",
+    )

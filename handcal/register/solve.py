@@ -1,0 +1,151 @@
+"""One call for every solver: two clouds in, an eye shift out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handcal.geometry import transform
+from handcal.register.consistent import fit_match, match_hands
+from handcal.register.fuse import with_eye_box
+from handcal.register.model import design
+from handcal.register.rcicp import Iterated, solve_icp, solve_linear, solve_paper
+from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
+
+MIN_POINTS = 100
+MAX_POINTS = 2_000_000
+
+
+def solve_eye_shift(
+    cursor_m: ArrayLike,
+    hand_m: ArrayLike,
+    *,
+    display_distance_m: float,
+    T_E_W: ArrayLike | None = None,
+    method: Method = "consistent",
+    cursor_cut: ArrayLike | None = None,
+    hand_cut: ArrayLike | None = None,
+) -> EyeShift:
+    """Solve one eye's shift from C0 to C1 from one alignment of the hand with its cursor.
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (N, 3), (M, 3) array_like
+        The hand at t_a and at t_b, unordered, in W, or in E0(t_b) if `T_E_W` is None.
+    display_distance_m : float
+        z(C0→S), from C0 to the display's focal plane.
+    T_E_W : (4, 4) array_like, optional
+        World to E at t_b.
+    method : {"consistent", "paper", "linear", "icp"}
+        ``paper``: Hu et al. 2021 as published. ``linear``: its model, all three rows of each
+        pair. ``consistent``: exact factor, and robust to cuts, sampling and a turned hand.
+        ``icp``: rigid, the paper's baseline. ``consistent`` also knows the eye box, as a wide
+        prior, which matters only where the alignment says little, as with a much turned hand.
+    cursor_cut, hand_cut : (N,), (M,) array_like of bool, optional
+        Points beside a cut edge, where the hand or arm goes on beyond the cloud. Only
+        ``consistent`` uses them.
+
+    Returns
+    -------
+    EyeShift
+
+    Raises
+    ------
+    ValueError
+        For an unknown method, wrong shapes, fewer than 100 points, NaN or infinity, or a
+        distance that is not positive.
+    """
+    if method not in METHODS:
+        raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
+    if not (np.isfinite(display_distance_m) and display_distance_m > 0):
+        raise ValueError(f"display_distance_m must be positive, got {display_distance_m}")
+    cursor = check_cloud("cursor_m", cursor_m)
+    hand = check_cloud("hand_m", hand_m)
+    T_E = np.eye(4) if T_E_W is None else np.asarray(T_E_W, dtype=np.float64)
+    if T_E.shape != (4, 4) or not np.isfinite(T_E).all():
+        raise ValueError("T_E_W must be a finite 4×4 matrix")
+    if method == "consistent":
+        cuts = _check_cut("cursor_cut", cursor_cut, cursor), _check_cut("hand_cut", hand_cut, hand)
+        return with_eye_box(fit_match(match_hands(cursor, hand, *cuts), T_E, display_distance_m))
+    cursor, hand = transform(T_E, cursor), transform(T_E, hand)
+    if method == "icp":
+        ended = solve_icp(cursor, hand)
+    else:
+        solver = solve_paper if method == "paper" else solve_linear
+        ended = solver(cursor, hand, display_distance_m)
+    return _summarise(ended, hand, display_distance_m, method)
+
+
+def solve_alignment(
+    alignment: Alignment, rig: Rig, method: Method = "consistent"
+) -> Mapping[Eye, EyeShift]:
+    """Solve every eye that took part in an alignment.
+
+    ``consistent`` registers the hand once for both eyes: its motion is the same for either. It
+    adds no prior: that is `fuse_alignments`'.
+    """
+    if method == "consistent":
+        match = match_hands(
+            alignment.cursor_m, alignment.hand_m, alignment.cursor_is_cut, alignment.hand_is_cut
+        )
+        return {
+            eye: fit_match(match, alignment.T_E_W[eye], rig.eyes[eye].z_C0_S_m)
+            for eye in alignment.eyes
+        }
+    return {
+        eye: solve_eye_shift(
+            alignment.cursor_m,
+            alignment.hand_m,
+            display_distance_m=rig.eyes[eye].z_C0_S_m,
+            T_E_W=alignment.T_E_W[eye],
+            method=method,
+        )
+        for eye in alignment.eyes
+    }
+
+
+def check_cloud(name: str, points_m: ArrayLike) -> Float64:
+    """Return `points_m` as (N, 3) float64, or raise ValueError that names what is wrong."""
+    cloud = np.asarray(points_m, dtype=np.float64)
+    if cloud.ndim != 2 or cloud.shape[1] != 3:
+        raise ValueError(f"{name} must have shape (N, 3), got {cloud.shape}")
+    if not MIN_POINTS <= len(cloud) <= MAX_POINTS:
+        raise ValueError(
+            f"{name} has {len(cloud)} points; between {MIN_POINTS} and {MAX_POINTS:,} are needed"
+        )
+    if not np.isfinite(cloud).all():
+        raise ValueError(f"{name} contains NaN or infinity")
+    return cloud
+
+
+def _check_cut(name: str, cut: ArrayLike | None, cloud: Float64) -> Bool | None:
+    if cut is None:
+        return None
+    flags = np.asarray(cut)
+    if flags.shape != (len(cloud),) or flags.dtype != np.bool_:
+        raise ValueError(f"{name} must hold one bool for each of the {len(cloud)} points")
+    return flags
+
+
+def _summarise(ended: Iterated, hand_m: Float64, distance_m: float, method: Method) -> EyeShift:
+    """Pack a baseline's result; its covariance is plain least squares, pairs taken as independent.
+
+    That is optimistic, as it is for every ICP (Censi 2007): only ``consistent`` claims more.
+    """
+    residuals_m = np.linalg.norm(ended.moved_m - ended.partner_m, axis=1)
+    A = design(ended.partner_m, hand_m, distance_m, exact=False).reshape(-1, 3)
+    variance_m2 = float(residuals_m @ residuals_m) / (3 * len(hand_m) - 3)
+    return EyeShift(
+        shift_m=ended.shift_m,
+        covariance_m2=np.asarray(variance_m2 * np.linalg.inv(A.T @ A)),
+        rms_m=float(np.sqrt(np.mean(residuals_m**2))),
+        residuals_m=residuals_m,
+        inlier_ratio=1.0,
+        iterations=len(ended.history_m2),
+        converged=ended.converged,
+        stop_reason=ended.stop_reason,
+        history_m2=ended.history_m2,
+        method=method,
+    )

@@ -1,0 +1,133 @@
+"""Alignments with known truth, made straight from the model: for tests, benchmarks and studies.
+
+Two ways to make the cursor from the hand: as the paper's simulation does (``exact=False``,
+κ = 1), and as a hand that does not change its size must be (``exact=True``). Alignments made by a
+simulated person who looks through a display are `handcal.sim.wearer`'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.geometry import invert, rigid, transform
+from handcal.register.model import predict
+from handcal.sim.hand import HandModel
+from handcal.sim.raster import visible_points
+from handcal.types import Bool, Float64
+
+
+@dataclass(frozen=True, slots=True)
+class AlignmentSettings:
+    """What an alignment is made of.
+
+    Attributes
+    ----------
+    count : int
+        Points of each cloud.
+    exact : bool
+        False makes the cursor as the paper does.
+    shift_max_m : float
+        Each component of φ is uniform within ± this.
+    display_distance_m : float
+        z(C0→S).
+    resample : bool
+        Sample cursor and hand apart; else both hold the same points in another order.
+    depth_sigma_m : float
+        Standard deviation of each point's depth noise.
+    cursor_forearm_m, hand_forearm_m : float
+        How far beyond the wrist each cloud reaches.
+    """
+
+    count: int = 5000
+    exact: bool = True
+    shift_max_m: float = 0.010
+    display_distance_m: float = 2.0
+    resample: bool = False
+    depth_sigma_m: float = 0.0
+    cursor_forearm_m: float = 0.04
+    hand_forearm_m: float = 0.04
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedAlignment:
+    """Two clouds and the truth about them.
+
+    Attributes
+    ----------
+    cursor_m, hand_m : (N, 3), (M, 3) float64
+        In W.
+    cursor_cut, hand_cut : (N,), (M,) bool
+    T_E_W : (4, 4) float64
+    shift_m : (3,) float64
+        The true φ.
+    rotation_rad : (3,) float64
+        By which the cursor is turned against the hand, in W.
+    known_cursor_m, known_hand_m : (K, 3) float64
+        Noise-free true pairs in E0(t_b), of what both clouds show.
+    display_distance_m : float
+    """
+
+    cursor_m: Float64
+    hand_m: Float64
+    cursor_cut: Bool
+    hand_cut: Bool
+    T_E_W: Float64
+    shift_m: Float64
+    rotation_rad: Float64
+    known_cursor_m: Float64
+    known_hand_m: Float64
+    display_distance_m: float
+
+
+def simulate_alignment(
+    rng: np.random.Generator, hand: HandModel, angle_rad: float, settings: AlignmentSettings
+) -> SimulatedAlignment:
+    """Make one alignment as in the paper's simulation.
+
+    The cursor is turned about a random axis by `angle_rad`, around a random point of its cloud.
+    """
+    T_E_hand = rigid(
+        rng.normal(0.0, 0.15, 3),
+        [rng.normal(0.0, 0.03), rng.normal(0.0, 0.03), rng.uniform(0.42, 0.58)],
+    )
+    T_E_W = rigid(rng.normal(0.0, 0.5, 3), rng.normal(0.0, 0.5, 3))
+    shift_m = rng.uniform(-settings.shift_max_m, settings.shift_max_m, 3)
+    hand_m, hand_cut = visible_points(
+        hand, T_E_hand, settings.count, rng, forearm_m=settings.hand_forearm_m
+    )
+    if settings.resample:
+        source_m, cursor_cut = visible_points(
+            hand, T_E_hand, settings.count, rng, forearm_m=settings.cursor_forearm_m
+        )
+    else:
+        order = rng.permutation(len(hand_m))
+        source_m, cursor_cut = hand_m[order], hand_cut[order]
+    distance_m = settings.display_distance_m
+    straight = predict(source_m, shift_m, distance_m, exact=settings.exact)
+    axis = rng.normal(size=3)
+    rotation_rad = angle_rad * axis / np.linalg.norm(axis)
+    centre = straight[rng.integers(len(straight))]
+    turn = rigid(translation_m=centre) @ rigid(rotation_rad) @ rigid(translation_m=-centre)
+    reach_m = (transform(invert(T_E_hand), hand_m) - hand.wrist_m) @ hand.arm_axis
+    common = hand_m[reach_m <= settings.cursor_forearm_m]
+    T_W_E = invert(T_E_W)
+    return SimulatedAlignment(
+        cursor_m=transform(T_W_E, _blur(transform(turn, straight), settings.depth_sigma_m, rng)),
+        hand_m=transform(T_W_E, _blur(hand_m, settings.depth_sigma_m, rng)),
+        cursor_cut=cursor_cut,
+        hand_cut=hand_cut,
+        T_E_W=T_E_W,
+        shift_m=shift_m,
+        rotation_rad=T_W_E[:3, :3] @ rotation_rad,
+        known_cursor_m=transform(turn, predict(common, shift_m, distance_m, exact=settings.exact)),
+        known_hand_m=common,
+        display_distance_m=distance_m,
+    )
+
+
+def _blur(points_m: Float64, sigma_m: float, rng: np.random.Generator) -> Float64:
+    """Move points along their rays by noise of standard deviation `sigma_m` in z."""
+    noise_m = rng.normal(0.0, sigma_m, (len(points_m), 1))
+    return points_m * (1.0 + noise_m / points_m[:, 2:])
