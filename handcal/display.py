@@ -101,4 +101,4 @@ def reprojection_error_px(
     """
     drawn = project(eye_projection(display, shift_m), points_E_m)
     needed = project(eye_projection(display, true_shift_m), points_E_m)
-    return np.linalg.norm(drawn - needed, axis=1)
+    return np.asarray(np.linalg.norm(drawn - needed, axis=1))

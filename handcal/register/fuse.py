@@ -42,9 +42,10 @@ class FuseSettings:
     depth_sigma: float = 0.003
 
 
-def with_eye_box(shift: EyeShift, sigma_m: float = FuseSettings.eye_box_sigma_m) -> EyeShift:
+def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> EyeShift:
     """Return the estimate with the eye box as prior: what is hardly known is drawn to C0."""
-    covariance_m2 = np.linalg.inv(np.linalg.inv(shift.covariance_m2) + np.eye(3) / sigma_m**2)
+    prior = np.eye(3) / settings.eye_box_sigma_m**2
+    covariance_m2 = np.asarray(np.linalg.inv(np.linalg.inv(shift.covariance_m2) + prior))
     return replace(
         shift,
         shift_m=covariance_m2 @ np.linalg.solve(shift.covariance_m2, shift.shift_m),
@@ -134,7 +135,7 @@ def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings
 
 
 def _disagreement(rows: Sequence[tuple[Float64, Float64, Float64]], estimate_m: Float64) -> float:
-    """Return the Birge ratio, at least 1: by how much alignments differ beyond their covariances."""
+    """Return the Birge ratio, at least 1: how far alignments differ beyond their covariances."""
     chi_square = sum(
         float((seen_m - H @ estimate_m) @ np.linalg.solve(covariance_m2, seen_m - H @ estimate_m))
         for H, seen_m, covariance_m2 in rows
