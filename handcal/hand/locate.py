@@ -14,7 +14,14 @@ import numpy as np
 
 from handcal.errors import HandError
 from handcal.hand.settings import SegmentSettings
-from handcal.hand.surface import NEIGHBOURS, components, goes_on, on_border, solid_surface
+from handcal.hand.surface import (
+    NEIGHBOURS,
+    component_of,
+    components,
+    goes_on,
+    on_border,
+    solid_surface,
+)
 from handcal.hand.view import DepthView, between, crop_view, deproject
 from handcal.types import Bool, Float32, Float64
 
@@ -111,10 +118,10 @@ def _locate_on(
     palm_m, palm_radius_m = _palm(near_tip, points_m, radius_m)
 
     from_palm_m = _distance(points_m, palm_m)
-    arm = _arm(surface & (from_palm_m > palm_radius_m + _PALM_TO_ARM_M), arm_end)
+    arm = component_of(surface & (from_palm_m > palm_radius_m + _PALM_TO_ARM_M), arm_end)
     wrist_m = _palm_to_wrist(surface, arm, palm_m, points_m, from_palm_m, radius_m)
     limit_m = wrist_m + forearm_m
-    arm = _arm(surface & (from_palm_m > limit_m), arm_end)
+    arm = component_of(surface & (from_palm_m > limit_m), arm_end)
     hand = surface & ~arm & (from_palm_m < _HAND_REACH_M)
     return LocatedHand(view, hand, arm, palm_m.astype(np.float64), palm_radius_m, limit_m)
 
@@ -151,14 +158,6 @@ def _palm(near_tip: Bool, points_m: Float32, radius_m: Float32) -> tuple[Float32
         _distance(points_m, points_m[:, best[0], best[1]]) < palm_radius_m
     )
     return points_m[:, top].mean(axis=1), palm_radius_m
-
-
-def _arm(beyond_palm: Bool, arm_end: Bool) -> Bool:
-    """Return the part that leads to the arm's end: not the fingers."""
-    for part in components(beyond_palm):
-        if (part & arm_end).any():
-            return part
-    return np.zeros_like(beyond_palm)
 
 
 def _palm_to_wrist(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from cv2.typing import MatLike
 
 from handcal.errors import HandError
 from handcal.hand.locate import LocatedHand
@@ -84,15 +85,18 @@ def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Boo
     """Return the image around the hand, and where in it the hand and the arm may be."""
     coarse, place = crop_view(located.view, located.hand, margin=2)
     view = view_depth(frame, coarse.box)
-    height, width = view.depth.shape
     hand, arm = (
-        cv2.dilate(part[place].astype(np.uint8), NEIGHBOURS)
-        .astype(bool)
-        .repeat(coarse.step_px, axis=0)
-        .repeat(coarse.step_px, axis=1)[:height, :width]
+        _enlarged(cv2.dilate(part[place].astype(np.uint8), NEIGHBOURS), coarse.step_px, view)
         for part in (located.hand, located.arm)
     )
     return view, hand, arm
+
+
+def _enlarged(mask: MatLike, step_px: int, view: DepthView) -> Bool:
+    """Repeat each pixel of a coarse mask `step_px` times each way, up to the size of a view."""
+    height, width = view.depth.shape
+    size = step_px * mask.shape[1], step_px * mask.shape[0]
+    return cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
 
 
 def _outline(within: Bool, hole_area_px: float) -> tuple[Pixels, UInt8]:

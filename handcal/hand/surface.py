@@ -47,7 +47,7 @@ def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
     """
     on_surface = np.where(surface, depth, _UNMEASURED)
     around = np.ones((size_px, size_px), np.uint8)
-    return on_surface - cv2.erode(on_surface, around)
+    return np.subtract(on_surface, cv2.erode(on_surface, around), dtype=np.uint16)
 
 
 def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
@@ -83,3 +83,11 @@ def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest_first = np.argsort(-areas, kind="stable")
     return [labels == 1 + i for i in largest_first if areas[i] >= area_min_px]
+
+
+def component_of(mask: Bool, seed: Bool) -> Bool:
+    """Return the 8-connected part of `mask` that a set of neighbouring pixels lies on, if any."""
+    _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    at_seed = labels[mask & seed]
+    part: Bool = labels == at_seed[0] if at_seed.size else np.zeros_like(mask)
+    return part

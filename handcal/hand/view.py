@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -72,9 +73,8 @@ def pixels_of(mask: Bool) -> Pixels:
 
 def between(view: DepthView, depth_min_m: float, depth_max_m: float) -> Bool:
     """Mark the pixels of a view within a range of depths."""
-    nearest = np.uint16(np.ceil(depth_min_m / view.scale_m))
-    farthest = np.uint16(depth_max_m / view.scale_m)
-    return (view.depth >= nearest) & (view.depth <= farthest)
+    nearest, farthest = depth_min_m / view.scale_m, depth_max_m / view.scale_m
+    return (view.depth >= math.ceil(nearest)) & (view.depth <= math.floor(farthest))
 
 
 def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Float32:

@@ -1,0 +1,109 @@
+"""Run the segmentation over everything a camera gives, and follow the hand from frame to frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handcal.camera.camera import Camera
+from handcal.errors import CameraEndError, HandError
+from handcal.geometry import transform
+from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.register.rigid import RigidSettings, register_rigid
+from handcal.register.surface import Surface, describe_surface
+from handcal.types import Float64, Frame, HandCloud, _freeze
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandMotion:
+    """How the hand moved since the last frame that showed it.
+
+    Attributes
+    ----------
+    rotation_rad : (3,) float64
+        Rotation vector, frame D.
+    shift_m : (3,) float64
+        Displacement of the hand's centroid, frame D.
+    """
+
+    rotation_rad: Float64
+    shift_m: Float64
+
+    def __post_init__(self) -> None:
+        _freeze(self, "rotation_rad", np.float64, 3)
+        _freeze(self, "shift_m", np.float64, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReplayStep:
+    """What one frame showed.
+
+    Attributes
+    ----------
+    frame : Frame
+    hand : HandCloud or None
+    problem : str
+        Why there is no hand; empty if there is one.
+    segment_s : float
+        How long the segmentation took.
+    motion : HandMotion or None
+        None for the first hand.
+    """
+
+    frame: Frame
+    hand: HandCloud | None
+    problem: str
+    segment_s: float
+    motion: HandMotion | None
+
+
+def replay(camera: Camera, settings: SegmentSettings) -> Iterator[ReplayStep]:
+    """Segment each frame until the camera has no more.
+
+    Parameters
+    ----------
+    camera : Camera
+        Stays open.
+    settings : SegmentSettings
+
+    Yields
+    ------
+    ReplayStep
+
+    Raises
+    ------
+    CameraError
+        As `Camera.read`, except for the end of a recording.
+    """
+    previous: Surface | None = None
+    while True:
+        try:
+            frame = camera.read()
+        except CameraEndError:
+            return
+        start_s = time.perf_counter()
+        try:
+            hand = segment_hand(frame, settings)
+        except HandError as error:
+            yield ReplayStep(frame, None, str(error), time.perf_counter() - start_s, None)
+            continue
+        segment_s = time.perf_counter() - start_s
+        surface = describe_surface(
+            hand.points_m.astype(np.float64), hand.is_cut, RigidSettings().max_points
+        )
+        motion = None if previous is None else _motion(previous, surface)
+        yield ReplayStep(frame, hand, "", segment_s, motion)
+        previous = surface
+
+
+def _motion(previous: Surface, surface: Surface) -> HandMotion:
+    T_now_then = register_rigid(previous, surface).T_target_source
+    centroid_m = previous.points_m.mean(axis=0)
+    return HandMotion(
+        Rotation.from_matrix(T_now_then[:3, :3]).as_rotvec(),
+        (transform(T_now_then, centroid_m[None]) - centroid_m)[0],
+    )
