@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from handcal.types import EYES, Alignment
+from handcal.types import EYES, Alignment, Eye
 
 _DTYPES = {
     "cursor_m": "<f8",
@@ -21,7 +21,7 @@ _DTYPES = {
     "rotation_rad": "<f8",
     "t_ns": "<i8",
     "eyes": "<U5",
-} | {f"T_E_W_{eye}": "<f8" for eye in EYES}
+} | {f"{name}_{eye}": "<f8" for name in ("T_E_W", "drawn_shift_m") for eye in EYES}
 
 # What zipfile, numpy's header parser and ndarray raise on damaged archives, besides ValueError.
 _DAMAGE = (
@@ -38,7 +38,8 @@ def encode_alignment(alignment: Alignment) -> bytes:
     """Return `alignment` as a .npz archive.
 
     It holds `cursor_m`, `hand_m`, `cursor_is_cut`, `hand_is_cut` and `rotation_rad` as in
-    `Alignment`, `t_ns` (t_a, t_b), `eyes`, and `T_E_W_left` and `T_E_W_right` if known.
+    `Alignment`, `t_ns` (t_a, t_b), `eyes`, and `T_E_W` and `drawn_shift_m` of each eye known,
+    as `T_E_W_left` and so on.
     """
     arrays: dict[str, Any] = {
         "cursor_m": alignment.cursor_m,
@@ -48,7 +49,9 @@ def encode_alignment(alignment: Alignment) -> bytes:
         "rotation_rad": alignment.rotation_rad,
         "t_ns": [alignment.t_a_ns, alignment.t_b_ns],
         "eyes": alignment.eyes,
-    } | {f"T_E_W_{eye}": T for eye, T in alignment.T_E_W.items()}
+    }
+    arrays |= {f"T_E_W_{eye}": T for eye, T in alignment.T_E_W.items()}
+    arrays |= {f"drawn_shift_m_{eye}": shift for eye, shift in alignment.drawn_shift_m.items()}
     stream = io.BytesIO()
     np.savez(
         stream,
@@ -78,7 +81,8 @@ def decode_alignment(data: bytes) -> Alignment:
             hand_m=arrays["hand_m"],
             cursor_is_cut=arrays["cursor_is_cut"],
             hand_is_cut=arrays["hand_is_cut"],
-            T_E_W={eye: arrays[key] for eye in EYES if (key := f"T_E_W_{eye}") in arrays},
+            T_E_W=_of_eyes(arrays, "T_E_W"),
+            drawn_shift_m=_of_eyes(arrays, "drawn_shift_m"),
             eyes=tuple(eye for name in arrays["eyes"] for eye in EYES if eye == name),
             rotation_rad=arrays["rotation_rad"],
             t_a_ns=t_a_ns,
@@ -88,6 +92,10 @@ def decode_alignment(data: bytes) -> Alignment:
         raise ValueError(f"the alignment has no array {error}") from error
     except _DAMAGE as error:
         raise ValueError(f"the alignment is damaged: {error}") from error
+
+
+def _of_eyes(arrays: dict[str, NDArray[Any]], name: str) -> dict[Eye, NDArray[Any]]:
+    return {eye: arrays[key] for eye in EYES if (key := f"{name}_{eye}") in arrays}
 
 
 def _decode_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:

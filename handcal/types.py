@@ -185,6 +185,8 @@ class Alignment:
         Rotation vector from the cursor to the hand seen by the guard at t_b, frame D.
     t_a_ns, t_b_ns : int
         Camera times of the two frames.
+    drawn_shift_m : mapping of eye to (3,) float64
+        The φ that each eye's cursor was drawn with at t_b; zero for the offline calibration.
     """
 
     cursor_m: Float64
@@ -196,6 +198,9 @@ class Alignment:
     rotation_rad: Float64
     t_a_ns: int
     t_b_ns: int
+    drawn_shift_m: Mapping[Eye, Float64] = field(
+        default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
+    )
 
     def __post_init__(self) -> None:
         _freeze(self, "cursor_m", np.float64, None, 3)
@@ -205,6 +210,8 @@ class Alignment:
         _freeze(self, "rotation_rad", np.float64, 3)
         poses = {eye: readonly(T, np.float64, (4, 4)) for eye, T in self.T_E_W.items()}
         object.__setattr__(self, "T_E_W", MappingProxyType(poses))
+        shifts = {eye: readonly(m, np.float64, (3,)) for eye, m in self.drawn_shift_m.items()}
+        object.__setattr__(self, "drawn_shift_m", MappingProxyType(shifts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,6 +24,7 @@ def alignment() -> Alignment:
         rotation_rad=rng.normal(size=3),
         t_a_ns=1_700_000_000_123_456_789,
         t_b_ns=1_700_000_003_123_456_789,
+        drawn_shift_m={"left": rng.normal(size=3), "right": rng.normal(size=3)},
     )
 
 

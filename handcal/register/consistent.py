@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from handcal.display import update_matrix
-from handcal.geometry import invert, transform
+from handcal.geometry import transform
 from handcal.register.model import design
 from handcal.register.rcicp import best_rotation
 from handcal.register.rigid import RigidResult, RigidSettings, register_rigid
@@ -82,7 +82,9 @@ def match_hands(
     )
 
 
-def fit_match(match: HandMatch, T_E: Float64, distance_m: float) -> EyeShift:
+def fit_match(
+    match: HandMatch, T_E: Float64, distance_m: float, T_drawn: Float64 | None = None
+) -> EyeShift:
     """Fit one eye's φ to registered clouds.
 
     Parameters
@@ -92,15 +94,18 @@ def fit_match(match: HandMatch, T_E: Float64, distance_m: float) -> EyeShift:
         To E0(t_b) from the frame of the clouds in `match`.
     distance_m : float
         z(C0→S).
+    T_drawn : (4, 4) float64, optional
+        Where the cursor was drawn in E if not with the offline calibration: see `model.drawn`.
     """
+    T_cursor = T_E if T_drawn is None else T_drawn @ T_E
+    T_back = np.asarray(np.linalg.inv(T_cursor))
     hand = transform(T_E, match.hand_m)
-    cursor = transform(T_E, match.cursor_m)
-    to_cursor = invert(T_E)
+    cursor = transform(T_cursor, match.cursor_m)
     shape = hand
-    expected = transform(T_E @ match.rigid.T_target_source @ to_cursor, hand)
+    expected = transform(T_cursor @ match.rigid.T_target_source, match.hand_m)
     history: list[float] = []
     while True:
-        gap_m, index = nearest(match.tree, transform(to_cursor, expected))
+        gap_m, index = nearest(match.tree, transform(T_back, expected))
         kept = ~match.cursor_near_cut[index]
         kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
         error_m2 = float(np.mean(gap_m[kept] ** 2))
@@ -167,7 +172,7 @@ def _covariance(
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
     displacement = R_E @ registration @ R_E.T + turned + least_m2 * np.eye(3)
     gain = np.linalg.inv(design(cursor_m, hand_m, distance_m, exact=True).mean(axis=0))
-    return np.asarray(gain @ displacement @ gain.T)
+    return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
 
 
 def _centred(points_m: Float64) -> Float64:

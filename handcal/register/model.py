@@ -20,8 +20,19 @@ from handcal.types import Float64
 
 def predict(hand_m: Float64, shift_m: Float64, distance_m: float, *, exact: bool) -> Float64:
     """Return where the cursor must be for `hand_m` to cover it, (N, 3), all in E0(t_b)."""
-    seen = transform(update_matrix(shift_m, distance_m), hand_m)
-    return seen / (1.0 - shift_m[2] / distance_m) if exact else seen
+    update = drawn if exact else update_matrix
+    return transform(update(shift_m, distance_m), hand_m)
+
+
+def drawn(shift_m: Float64, distance_m: float) -> Float64:
+    """Return the (4, 4) affine map of E that puts a cursor where a projection with φ draws it.
+
+    The equation above is for a cursor drawn with the offline calibration. Drawn with another φ,
+    it looks to the offline calibration like a cursor moved so, of the same size.
+    """
+    T = update_matrix(shift_m, distance_m)
+    T[:3] /= 1.0 - shift_m[2] / distance_m
+    return T
 
 
 def design(cursor_m: Float64, hand_m: Float64, distance_m: float, *, exact: bool) -> Float64:

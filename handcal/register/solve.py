@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from handcal.geometry import transform
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.fuse import with_eye_box
-from handcal.register.model import design
-from handcal.register.rcicp import Iterated, solve_icp, solve_linear, solve_paper
+from handcal.register.model import design, drawn
+from handcal.register.rcicp import solve_icp, solve_linear, solve_paper
 from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
 
 MIN_POINTS = 100
@@ -69,13 +69,7 @@ def solve_eye_shift(
     if method == "consistent":
         cuts = _check_cut("cursor_cut", cursor_cut, cursor), _check_cut("hand_cut", hand_cut, hand)
         return with_eye_box(fit_match(match_hands(cursor, hand, *cuts), T_E, display_distance_m))
-    cursor, hand = transform(T_E, cursor), transform(T_E, hand)
-    if method == "icp":
-        ended = solve_icp(cursor, hand)
-    else:
-        solver = solve_paper if method == "paper" else solve_linear
-        ended = solver(cursor, hand, display_distance_m)
-    return _summarise(ended, hand, display_distance_m, method)
+    return _solve_baseline(transform(T_E, cursor), transform(T_E, hand), display_distance_m, method)
 
 
 def solve_alignment(
@@ -90,20 +84,17 @@ def solve_alignment(
         match = match_hands(
             alignment.cursor_m, alignment.hand_m, alignment.cursor_is_cut, alignment.hand_is_cut
         )
-        return {
-            eye: fit_match(match, alignment.T_E_W[eye], rig.eyes[eye].z_C0_S_m)
-            for eye in alignment.eyes
-        }
-    return {
-        eye: solve_eye_shift(
-            alignment.cursor_m,
-            alignment.hand_m,
-            display_distance_m=rig.eyes[eye].z_C0_S_m,
-            T_E_W=alignment.T_E_W[eye],
-            method=method,
-        )
-        for eye in alignment.eyes
-    }
+    shifts: dict[Eye, EyeShift] = {}
+    for eye in alignment.eyes:
+        distance_m = rig.eyes[eye].z_C0_S_m
+        T_E, T_drawn = alignment.T_E_W[eye], drawn(alignment.drawn_shift_m[eye], distance_m)
+        if method == "consistent":
+            shifts[eye] = fit_match(match, T_E, distance_m, T_drawn)
+        else:
+            cursor = transform(T_drawn @ T_E, alignment.cursor_m)
+            hand = transform(T_E, alignment.hand_m)
+            shifts[eye] = _solve_baseline(cursor, hand, distance_m, method)
+    return shifts
 
 
 def check_cloud(name: str, points_m: ArrayLike) -> Float64:
@@ -129,11 +120,19 @@ def _check_cut(name: str, cut: ArrayLike | None, cloud: Float64) -> Bool | None:
     return flags
 
 
-def _summarise(ended: Iterated, hand_m: Float64, distance_m: float, method: Method) -> EyeShift:
-    """Pack a baseline's result; its covariance is plain least squares, pairs taken as independent.
+def _solve_baseline(
+    cursor_m: Float64, hand_m: Float64, distance_m: float, method: Method
+) -> EyeShift:
+    """Solve by one of the published ways, in E0(t_b).
 
-    That is optimistic, as it is for every ICP (Censi 2007): only ``consistent`` claims more.
+    The covariance is plain least squares with independent pairs, which is optimistic, as it is
+    for every ICP (Censi 2007): only ``consistent`` claims more.
     """
+    if method == "icp":
+        ended = solve_icp(cursor_m, hand_m)
+    else:
+        solver = solve_paper if method == "paper" else solve_linear
+        ended = solver(cursor_m, hand_m, distance_m)
     residuals_m = np.linalg.norm(ended.moved_m - ended.partner_m, axis=1)
     A = design(ended.partner_m, hand_m, distance_m, exact=False).reshape(-1, 3)
     variance_m2 = float(residuals_m @ residuals_m) / (3 * len(hand_m) - 3)
