@@ -35,10 +35,11 @@ _PALM_TO_ARM_M = 0.03
 _PALM_TO_WRIST_MAX_M = 0.11
 _HAND_REACH_M = 0.20
 _AREA_MIN_M2 = 0.004
-# The wrist is where the inscribed radius first comes this close to its minimum, in shells of this
-# thickness about the palm, in this cone about the arm.
+# Where the inscribed radius has fallen this close to its minimum, in shells of this thickness about
+# the palm and in this cone about the arm, averaged over so many shells; from there to the wrist.
 _WRIST_NARROW = 1.1
 _SHELL_M = 0.0025
+_SMOOTH_SHELLS = 9
 _ARMWARD_COS = 0.6
 _WRIST_BEYOND_M = 0.02
 
@@ -168,10 +169,11 @@ def _palm_to_wrist(
     from_palm_m: Float32,
     radius_m: Float32,
 ) -> float:
-    """Return the distance from the palm's centre to the wrist.
+    """Return the distance from the palm's centre to the wrist, along the arm.
 
-    Toward the arm the inscribed radius falls to that of the wrist, then grows along the forearm.
-    The wrist is placed where the fall ends: the minimum itself is too flat to be found twice.
+    In shells about the palm the inscribed radius falls to that of the wrist, then grows along the
+    forearm. The wrist is placed by where the fall ends: the minimum itself is too flat to be
+    found twice at one place.
     """
     near_arm = arm & (from_palm_m < _PALM_TO_WRIST_MAX_M)
     if not near_arm.any():
@@ -180,23 +182,37 @@ def _palm_to_wrist(
     axis = (points_m[:, near_arm] - palm_m[:, None]) @ weight
     axis /= np.linalg.norm(axis)
     along_axis_m = np.tensordot(axis, points_m, 1) - axis @ palm_m
-    armward = surface & (along_axis_m > _ARMWARD_COS * from_palm_m)
+    armward = (
+        surface & (along_axis_m > _ARMWARD_COS * from_palm_m) & (from_palm_m < _PALM_TO_WRIST_MAX_M)
+    )
     shell = (from_palm_m[armward] / _SHELL_M).astype(int)
-    profile_m = np.zeros(round(_PALM_TO_WRIST_MAX_M / _SHELL_M) + 1)
-    np.maximum.at(profile_m, np.minimum(shell, len(profile_m) - 1), radius_m[armward])
-    profile_m = profile_m[:-1]
-    profile_m[profile_m == 0] = np.inf
-    narrowest = int(np.argmin(profile_m))
-    wide = np.flatnonzero(profile_m[:narrowest] > _WRIST_NARROW * profile_m[narrowest])
-    falls_to = wide[-1] + 1 if len(wide) else narrowest
-    return float(falls_to * _SHELL_M) + _WRIST_BEYOND_M
+    profile_m = np.zeros(1 + shell.max())
+    np.maximum.at(profile_m, shell, radius_m[armward])
+    return _end_of_fall(profile_m) * _SHELL_M + _WRIST_BEYOND_M
+
+
+def _end_of_fall(profile_m: Float64) -> float:
+    """Return where, in shells, the smoothed profile falls nearly to its minimum."""
+    kernel = np.ones(_SMOOTH_SHELLS)
+    seen = np.convolve(profile_m > 0, kernel, "same")
+    smooth_m = np.convolve(profile_m, kernel, "same") / np.maximum(seen, 1)
+    smooth_m[profile_m == 0] = np.inf
+    narrowest = int(np.argmin(smooth_m))
+    level_m = _WRIST_NARROW * smooth_m[narrowest]
+    wide = np.flatnonzero(smooth_m[:narrowest] > level_m)
+    if not len(wide) or not np.isfinite(smooth_m[wide[-1]]):
+        return narrowest + 0.5
+    last = wide[-1]
+    drop_m = smooth_m[last] - smooth_m[last + 1]
+    return float(last + 0.5 + (smooth_m[last] - level_m) / drop_m)
 
 
 def _inscribed_radius_px(measured: Bool, solid: Bool) -> Float32:
     """Return each pixel's distance in pixels to the surface's edge, pinholes closed."""
     closed = cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS)
     closed[measured & ~solid] = 0
-    return cv2.distanceTransform(closed, cv2.DIST_L2, 5).astype(np.float32, copy=False)
+    distance_px = cv2.distanceTransform(closed, cv2.DIST_L2, 5)
+    return np.minimum(distance_px, np.float32(max(solid.shape)))  # without an edge it is endless
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:
