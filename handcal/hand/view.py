@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -72,9 +71,9 @@ def pixels_of(mask: Bool) -> Pixels:
 
 
 def between(view: DepthView, depth_min_m: float, depth_max_m: float) -> Bool:
-    """Mark the pixels of a view within a range of depths."""
+    """Mark the pixels of a view within a range of depths, ends included."""
     nearest, farthest = depth_min_m / view.scale_m, depth_max_m / view.scale_m
-    return (view.depth >= math.ceil(nearest)) & (view.depth <= math.floor(farthest))
+    return (view.depth >= round(nearest)) & (view.depth <= round(farthest))
 
 
 def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Float32:
