@@ -176,4 +176,5 @@ def _covariance(
 
 
 def _centred(points_m: Float64) -> Float64:
-    return points_m - points_m.mean(axis=0)
+    centred: Float64 = points_m - points_m.mean(axis=0)
+    return centred

@@ -28,8 +28,8 @@ class FuseSettings:
     eye_box_sigma_m : float
         Each component of φ, standard deviation: the eye box is about 2 cm wide (paper).
     eye_difference_sigma_m : tuple of 3 float
-        Of the right φ from the left. x is the eye distance against the rig's (3.6 mm among
-        adults: Gordon et al. 2014, ANSUR II).
+        Of the right φ from the left. x is the eye distance against the rig's: 2 mm where the
+        headset is set to the wearer's; 3.6 mm among adults (Gordon et al. 2014, ANSUR II).
     lateral_sigma_arcmin : float
         How exactly a wearer overlays, about each of two axes.
     depth_sigma : float
@@ -37,7 +37,7 @@ class FuseSettings:
     """
 
     eye_box_sigma_m: float = 0.010
-    eye_difference_sigma_m: tuple[float, float, float] = (0.0036, 0.001, 0.001)
+    eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
     lateral_sigma_arcmin: float = 3.0
     depth_sigma: float = 0.003
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.geometry import invert, transform
-from handcal.types import EYES, Eye, EyeShift, Rig, Verdict
+from handcal.display import arcmin_from_px, eye_projection
+from handcal.geometry import invert, project, transform
+from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Float64, Rig, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +22,9 @@ class VerdictSettings:
         Longest plausible φ.
     eye_distance_min_m, eye_distance_max_m : float
         Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm).
-    sigma_max_m : float
-        Largest standard deviation of any component of φ. The literature's error of
-        alignment-based eye positions is 4 mm (paper, section on the simulation).
+    error_max_arcmin : float
+        Largest error to expect in the display. Published methods leave medians of 10 to 17′ (paper,
+        its table of reprojection errors).
     rms_max_m : float
     inlier_ratio_min : float
     """
@@ -31,7 +32,7 @@ class VerdictSettings:
     eye_box_m: float = 0.020
     eye_distance_min_m: float = 0.050
     eye_distance_max_m: float = 0.080
-    sigma_max_m: float = 0.004
+    error_max_arcmin: float = 15.0
     rms_max_m: float = 0.005
     inlier_ratio_min: float = 0.6
 
@@ -53,12 +54,36 @@ def judge(
 ) -> dict[Eye, Verdict]:
     """Judge every solved eye; the first reason that applies is given."""
     apart_m = eye_distance_m(rig, shifts)
-    return {eye: _judge(shift, apart_m, settings) for eye, shift in shifts.items()}
+    return {eye: _judge(shift, rig.eyes[eye], apart_m, settings) for eye, shift in shifts.items()}
 
 
-def _judge(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict:
+def expected_error_arcmin(display: EyeDisplay, shift: EyeShift) -> float:
+    """Return the root mean square error to expect from φ's covariance, in arcmin.
+
+    At four corners of an 8 cm square straight ahead at half a metre.
+    """
+    corners_m = np.array([[x, y, 0.5] for x in (-0.04, 0.04) for y in (-0.04, 0.04)])
+
+    def drawn_px(shift_m: Float64) -> Float64:
+        return project(eye_projection(display, shift_m), corners_m)
+
+    steps_m = 1e-5 * np.eye(3)
+    J = np.stack(
+        [
+            (drawn_px(shift.shift_m + step) - drawn_px(shift.shift_m - step)) / 2e-5
+            for step in steps_m
+        ],
+        axis=-1,
+    )
+    variance_px2 = np.einsum("nij,jk,nik->n", J, shift.covariance_m2, J)
+    return float(arcmin_from_px(display, np.sqrt(variance_px2.mean())))
+
+
+def _judge(
+    shift: EyeShift, display: EyeDisplay, apart_m: float | None, settings: VerdictSettings
+) -> Verdict:
     length_m = float(np.linalg.norm(shift.shift_m))
-    sigma_m = float(np.sqrt(np.diag(shift.covariance_m2).max()))
+    error_arcmin = expected_error_arcmin(display, shift)
     if length_m > settings.eye_box_m:
         return Verdict(
             "implausible",
@@ -87,12 +112,9 @@ def _judge(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
             f"hand and cursor differ by {1e3 * shift.rms_m:.1f} mm; "
             "hold the hand in the cursor's shape",
         )
-    if sigma_m > settings.sigma_max_m:
+    if error_arcmin > settings.error_max_arcmin:
         return Verdict(
             "repeat",
-            f"still uncertain by {1e3 * sigma_m:.1f} mm; align once more with less rotation",
+            f"still uncertain by {error_arcmin:.0f}′ in the display; align once more",
         )
-    return Verdict(
-        "accept",
-        f"registered within {1e3 * shift.rms_m:.1f} mm, φ known within {1e3 * sigma_m:.1f} mm",
-    )
+    return Verdict("accept", f"expected error {error_arcmin:.1f}′ in the display")

@@ -1,0 +1,458 @@
+"""The procedure as a state machine: show hand, align, solve, apply, and again.
+
+::
+
+    SHOW_HAND --make_cursor--> ALIGN --confirmation, guard passed--> ALIGNED
+        ^                        |  ^________________ refused            |
+        |_________redo___________|                                     solve
+        |_________redo______________________________________________    |
+        |                                                           |   v
+        '--make_cursor-- APPLIED <--acknowledged-- APPLYING <--apply-- SOLVED
+
+It composes the other rooms and computes nothing new. One thread drives it: `step` for every
+frame, the rest in between.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+
+from handcal.camera.clock import FrameClock
+from handcal.display import projection_matrix, view_of_eye
+from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
+from handcal.geometry import transform
+from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.link.reliable import Outgoing
+from handcal.link.server import Confirmation, HeadsetServer
+from handcal.register.guard import GuardSettings, RotationGuard
+from handcal.results import Results, SolveSettings, results_json, solve_session
+from handcal.session import Session
+from handcal.types import (
+    EYES,
+    Alignment,
+    Eye,
+    Float64,
+    Frame,
+    HandCloud,
+    Projection,
+    Rig,
+)
+
+_KEPT_CLOUDS = 30
+
+
+class State(StrEnum):
+    """Where the procedure stands."""
+
+    SHOW_HAND = "show_hand"
+    ALIGN = "align"
+    ALIGNED = "aligned"
+    SOLVED = "solved"
+    APPLYING = "applying"
+    APPLIED = "applied"
+
+
+class ProcedureError(HandcalError):
+    """Something was asked for out of turn; the text says what must come first."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationSettings:
+    """How a calibration runs.
+
+    Attributes
+    ----------
+    segment : SegmentSettings
+    guard : GuardSettings
+    solve : SolveSettings
+    camera_latency_s : float
+        From a frame's exposure to its earliest arrival.
+    match_tolerance_s : float
+        The frame of an alignment may lie this far from t_b.
+    steady_s, steady_m : float
+        The hand is steady if it moved less than this for so long.
+    """
+
+    segment: SegmentSettings = field(default_factory=SegmentSettings)
+    guard: GuardSettings = field(default_factory=GuardSettings)
+    solve: SolveSettings = field(default_factory=SolveSettings)
+    camera_latency_s: float = 0.03
+    match_tolerance_s: float = 0.1
+    steady_s: float = 0.4
+    steady_m: float = 0.005
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedHand:
+    """A hand cloud with its place in the world.
+
+    Attributes
+    ----------
+    cloud : HandCloud
+    t_host_ns : int
+        Of its exposure, host's monotonic clock.
+    T_W_D : (4, 4) float64
+    """
+
+    cloud: HandCloud
+    t_host_ns: int
+    T_W_D: Float64
+
+    def points_W_m(self) -> Float64:
+        """Return the surface, (N, 3), in W."""
+        return transform(self.T_W_D, self.cloud.points_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """What one step saw.
+
+    Attributes
+    ----------
+    state : State
+        After the step.
+    hand : PlacedHand or None
+        None if there is no hand, or its place is not known.
+    problem : str
+        Why there is no hand; empty if there is one.
+    is_steady : bool
+        Whether a cursor may be made now.
+    rotation_rad : (3,) float64 or None
+        From the cursor to the live hand, about D's axes, while aligning.
+    is_red : bool
+        Whether that is beyond the guard's limit.
+    segment_ms, guard_ms : float or None
+        What those stages took.
+    """
+
+    state: State
+    hand: PlacedHand | None
+    problem: str
+    is_steady: bool
+    rotation_rad: Float64 | None = None
+    is_red: bool = False
+    segment_ms: float | None = None
+    guard_ms: float | None = None
+
+
+class Calibration:
+    """One wearer's calibration.
+
+    Parameters
+    ----------
+    rig : Rig
+    link : HeadsetServer
+    session : Session or None
+        Where everything is recorded, at the moment it happens.
+    settings : CalibrationSettings
+
+    Attributes
+    ----------
+    state : State
+    eyes : tuple of eye
+        Those that the present alignment is for.
+    alignments : list of Alignment
+    results : Results or None
+        Of all alignments; None before `solve`.
+    refused : int
+        Confirmations refused by the guard.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        link: HeadsetServer,
+        session: Session | None = None,
+        settings: CalibrationSettings | None = None,
+    ) -> None:
+        self.rig = rig
+        self.state = State.SHOW_HAND
+        self.eyes: tuple[Eye, ...] = EYES
+        self.alignments: list[Alignment] = []
+        self.results: Results | None = None
+        self.refused = 0
+        self._link = link
+        self._session = session
+        self._settings = settings or CalibrationSettings()
+        self._clock = FrameClock(self._settings.camera_latency_s)
+        self._hands: deque[PlacedHand] = deque(maxlen=_KEPT_CLOUDS)
+        self._unplaced: deque[tuple[HandCloud, int]] = deque(maxlen=_KEPT_CLOUDS)
+        self._seen_ns = 0
+        self._cursor: PlacedHand | None = None
+        self._cursor_id = 0
+        self._guard: RotationGuard | None = None
+        self._confirmation: Confirmation | None = None
+        self._drawn_shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
+        self._sent: list[Outgoing] = []
+
+    def step(self, frame: Frame) -> Observation:
+        """Take a frame: find the hand, guide the alignment, take a confirmation.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        FileError
+            If the session cannot be written; the alignment is kept in memory.
+        """
+        started_s = time.perf_counter()
+        self._seen_ns = self._clock.exposure_ns(frame)
+        problem = ""
+        try:
+            cloud = segment_hand(frame, self._settings.segment)
+            self._unplaced.append((cloud, self._seen_ns))
+        except HandError as error:
+            problem = str(error)
+        segment_ms = 1e3 * (time.perf_counter() - started_s)
+        problem = self._place_hands() or problem
+        hand = self._hands[-1] if self._hands and not problem else None
+        observation = Observation(
+            self.state, hand, problem, self._is_steady(), segment_ms=segment_ms
+        )
+        if self.state is State.ALIGN:
+            observation = self._guide(observation)
+        return replace(observation, state=self.state)
+
+    def make_cursor(self, eyes: Sequence[Eye] = EYES) -> None:
+        """Freeze the newest hand as cursor, to be aligned with the given eyes open.
+
+        Raises
+        ------
+        ProcedureError
+            If there is no steady hand, or projections still wait for their acknowledgement.
+        """
+        if self.state not in (State.SHOW_HAND, State.APPLIED, State.ALIGN):
+            raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
+        if not self._is_steady():
+            raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
+        self._cursor = self._hands[-1]
+        self._cursor_id += 1
+        self.eyes = tuple(eyes)
+        self._confirmation = None
+        self._guard = RotationGuard(self._cursor.points_W_m(), self._cursor.cloud.is_cut)
+        contour_W = transform(self._cursor.T_W_D, self._cursor.cloud.contour_m)
+        self._link.send_cursor(contour_W, self._cursor_id)
+        self._link.send_prompt(_align_prompt(self.eyes), self.eyes)
+        self._record("cursor_made", cursor_id=self._cursor_id, eyes=list(self.eyes))
+        self.state = State.ALIGN
+
+    def confirm(self) -> None:
+        """Confirm the alignment from the PC, as of the newest frame.
+
+        Raises
+        ------
+        ProcedureError
+            If there is nothing to confirm.
+        """
+        if self.state is not State.ALIGN:
+            raise ProcedureError(f"there is no cursor to confirm ({self.state})")
+        if not self._hands:
+            raise ProcedureError("no hand has been seen since the cursor was made")
+        t_ns = self._hands[-1].t_host_ns
+        T_W_H = self._link.pose_at_host_ns(t_ns)
+        T_E_W = {eye: view_of_eye(self.rig.eyes[eye], T_W_H) for eye in EYES}
+        self._confirmation = Confirmation(t_ns, t_ns, T_E_W, self._cursor_id)
+
+    def redo(self) -> None:
+        """Give up the present cursor, or the last alignment if it is not applied yet."""
+        if self.state in (State.ALIGNED, State.SOLVED) and self.alignments:
+            self.alignments.pop()
+            self._record("alignment_dropped", number=len(self.alignments) + 1)
+        elif self.state is not State.ALIGN:
+            raise ProcedureError(f"there is nothing to redo ({self.state})")
+        self.results = None
+        self._clear_cursor()
+        self.state = State.SHOW_HAND
+
+    def solve(self) -> Results:
+        """Solve all alignments so far.
+
+        Raises
+        ------
+        ProcedureError
+            If there is no alignment.
+        """
+        if not self.alignments:
+            raise ProcedureError("align the hand with the cursor first")
+        self.results = solve_session(self.alignments, self.rig, self._settings.solve)
+        self._record("solved", **results_json(self.results))
+        if self._session is not None:
+            self._session.save_results(results_json(self.results))
+        self.state = State.SOLVED
+        return self.results
+
+    def apply(self) -> None:
+        """Send the solved projections to the headset and take the cursor away.
+
+        Raises
+        ------
+        ProcedureError
+            If nothing is solved.
+        """
+        if self.results is None or self.state is not State.SOLVED:
+            raise ProcedureError("solve first")
+        self._clear_cursor()
+        self._sent = [
+            self._link.send_projection(
+                Projection(
+                    eye,
+                    projection_matrix(self.rig.eyes[eye], shift.shift_m),
+                    self.rig.eyes[eye].width_px,
+                    self.rig.eyes[eye].height_px,
+                )
+            )
+            for eye, shift in self.results.shifts.items()
+        ]
+        self.state = State.APPLYING
+
+    def wait_applied(self, timeout_s: float = 5.0) -> None:
+        """Wait until the headset has acknowledged every projection.
+
+        Raises
+        ------
+        ProcedureError
+            If nothing was sent.
+        LinkError
+            If it does not in time; `apply` may be called again.
+        """
+        if self.state is not State.APPLYING or self.results is None:
+            raise ProcedureError("apply first")
+        try:
+            for handle in self._sent:
+                self._link.wait_acked(handle, timeout_s)
+        except HandcalError:
+            self.state = State.SOLVED
+            raise
+        for eye, shift in self.results.shifts.items():
+            self._drawn_shift_m[eye] = shift.shift_m
+        self._record("applied", eyes=list(self.results.shifts))
+        self.state = State.APPLIED
+
+    def _place_hands(self) -> str:
+        """Place the clouds whose pose has come by now; say why the newest has none, if so."""
+        while self._unplaced:
+            cloud, t_ns = self._unplaced[0]
+            try:
+                T_W_H = self._link.pose_at_host_ns(t_ns)
+            except PosePendingError as error:
+                return str(error)
+            except PoseError as error:
+                self._unplaced.popleft()
+                if not self._unplaced:
+                    return str(error)
+                continue
+            self._unplaced.popleft()
+            self._hands.append(PlacedHand(cloud, t_ns, T_W_H @ self.rig.T_H_D))
+        return ""
+
+    def _is_steady(self) -> bool:
+        """Tell whether a hand is in view, placed, and has hardly moved for a while."""
+        settings = self._settings
+        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > 1e9 * settings.steady_s:
+            return False
+        since_ns = self._seen_ns - round(1e9 * settings.steady_s)
+        if self._hands[0].t_host_ns > since_ns:
+            return False
+        places = [
+            np.median(hand.points_W_m(), axis=0)
+            for hand in self._hands
+            if hand.t_host_ns >= since_ns
+        ]
+        return len(places) > 2 and float(np.ptp(places, axis=0).max()) < settings.steady_m
+
+    def _guide(self, observation: Observation) -> Observation:
+        """Show the live hand in its colour and take a confirmation."""
+        hand = observation.hand
+        if hand is not None:
+            started_s = time.perf_counter()
+            rotation_W = self._rotation(hand)
+            is_red = self._is_over(rotation_W)
+            observation = replace(
+                observation,
+                rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
+                is_red=is_red,
+                guard_ms=1e3 * (time.perf_counter() - started_s),
+            )
+            self._link.send_live_hand(hand.points_W_m(), is_red)
+        for confirmation in self._link.confirmations():
+            if confirmation.cursor_id == self._cursor_id:
+                self._confirmation = confirmation
+        # A frame from after t_b must have come before the nearest one is known.
+        if self._confirmation is not None and self._seen_ns >= self._confirmation.t_host_ns:
+            confirmation, self._confirmation = self._confirmation, None
+            self._take(confirmation)
+        return observation
+
+    def _take(self, confirmation: Confirmation) -> None:
+        """Accept or refuse a confirmation."""
+        assert self._cursor is not None
+        nearest = min(
+            self._hands,
+            key=lambda hand: abs(hand.t_host_ns - confirmation.t_host_ns),
+            default=None,
+        )
+        tolerance_ns = 1e9 * self._settings.match_tolerance_s
+        if nearest is None or abs(nearest.t_host_ns - confirmation.t_host_ns) > tolerance_ns:
+            self._refuse("The camera did not see your hand. Align and confirm again.", "no hand")
+            return
+        rotation_W = self._rotation(nearest)
+        angle_deg = float(np.degrees(np.linalg.norm(rotation_W)))
+        if self._is_over(rotation_W):
+            self.refused += 1
+            limit_deg = np.degrees(self._settings.guard.limit_rad)
+            self._refuse(
+                f"Your hand is turned by {angle_deg:.0f}°, more than {limit_deg:.0f}°. "
+                "Turn it as the cursor is and confirm again.",
+                "turned",
+                angle_deg,
+            )
+            return
+        alignment = Alignment(
+            cursor_m=self._cursor.points_W_m(),
+            hand_m=nearest.points_W_m(),
+            cursor_is_cut=self._cursor.cloud.is_cut,
+            hand_is_cut=nearest.cloud.is_cut,
+            T_E_W=confirmation.T_E_W,
+            eyes=self.eyes,
+            rotation_rad=nearest.T_W_D[:3, :3].T @ rotation_W,
+            t_a_ns=self._cursor.cloud.t_camera_ns,
+            t_b_ns=nearest.cloud.t_camera_ns,
+            drawn_shift_m=dict(self._drawn_shift_m),
+        )
+        self.alignments.append(alignment)
+        self.state = State.ALIGNED
+        if self._session is not None:
+            self._session.save_alignment(alignment)
+
+    def _refuse(self, prompt: str, reason: str, angle_deg: float | None = None) -> None:
+        self._link.send_prompt(prompt, self.eyes)
+        self._record("refused", reason=reason, angle_deg=angle_deg, cursor_id=self._cursor_id)
+
+    def _rotation(self, hand: PlacedHand) -> Float64:
+        assert self._guard is not None
+        return self._guard.rotation(hand.points_W_m(), hand.cloud.is_cut)
+
+    def _is_over(self, rotation: Float64) -> bool:
+        return float(np.linalg.norm(rotation)) > self._settings.guard.limit_rad
+
+    def _clear_cursor(self) -> None:
+        self._cursor = self._guard = self._confirmation = None
+        self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
+        self._link.send_prompt("", EYES)
+
+    def _record(self, event: str, **data: object) -> None:
+        if self._session is not None:
+            self._session.record(event, **data)
+
+
+def _align_prompt(eyes: Sequence[Eye]) -> str:
+    if len(eyes) == 1:
+        other = "right" if eyes[0] == "left" else "left"
+        return f"Close your {other} eye. Move your hand under the cursor, then confirm."
+    return "Keep both eyes open. Move your hand under the cursor, then confirm."

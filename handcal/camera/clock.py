@@ -1,0 +1,31 @@
+"""When a frame was exposed, on the host's clock."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from handcal.types import Frame
+
+_WINDOW = 300
+
+
+class FrameClock:
+    """Maps the camera's clock to the host's.
+
+    A frame arrives some time after its exposure, and how long varies with the load. The least
+    delay among the last 300 frames is taken for the camera's own latency.
+
+    Parameters
+    ----------
+    latency_s : float
+        From the exposure to the earliest arrival.
+    """
+
+    def __init__(self, latency_s: float) -> None:
+        self._latency_ns = round(1e9 * latency_s)
+        self._delays_ns: deque[int] = deque(maxlen=_WINDOW)
+
+    def exposure_ns(self, frame: Frame) -> int:
+        """Return the time of a frame's exposure on the host's monotonic clock."""
+        self._delays_ns.append(frame.t_host_ns - frame.t_camera_ns)
+        return frame.t_camera_ns + min(self._delays_ns) - self._latency_ns

@@ -1,0 +1,274 @@
+"""One whole calibration on the simulator, by itself: the technician's part played by a script.
+
+The wearer and the headset live in a process of their own and reach the engine only through
+rendered frames and real datagrams. What they really are is drawn again from the seed, after the
+fact, to judge the result.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from handcal.calibrate import Calibration, CalibrationSettings, Observation, State
+from handcal.camera.synthetic import SyntheticCamera
+from handcal.display import arcmin_from_px, reprojection_error_px, view_of_eye
+from handcal.errors import CameraTimeoutError, HandcalError, LinkError
+from handcal.geometry import transform
+from handcal.link.pairing import KEY_VARIABLE, new_pairing_key
+from handcal.link.server import HeadsetServer
+from handcal.register.solve import solve_alignment
+from handcal.rig.rig_file import read_rig
+from handcal.session import Session
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World
+from handcal.sim.room import make_room
+from handcal.sim.scene import SceneReceiver
+from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.types import EYES, Eye, Float64, Rig
+
+EyePlan = Literal["both", "each"]
+Report = Callable[[str, float], None]
+
+_CONNECT_S = 20.0
+_STEP_S = 60.0
+_TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
+_TARGET_HALF_M = 0.04
+
+
+@dataclass(frozen=True, slots=True)
+class DemoSettings:
+    """What the demonstration runs.
+
+    Attributes
+    ----------
+    seed : int
+        Of the wearer, the hand, the room and all noise.
+    alignments : int
+        How many times the wearer aligns (with each eye, if one at a time).
+    eyes : {"both", "each"}
+    loss, reorder : float
+        Share of the link's datagrams lost, and reordered, in each direction.
+    """
+
+    seed: int = 1
+    alignments: int = 1
+    eyes: EyePlan = "both"
+    loss: float = 0.0
+    reorder: float = 0.0
+
+
+def run_demo(
+    settings: DemoSettings, rig_path: Path, output: Path, report: Report
+) -> dict[str, Any]:
+    """Calibrate one simulated wearer and judge the result by the truth.
+
+    Parameters
+    ----------
+    settings : DemoSettings
+    rig_path : Path
+    output : Path
+        Folder in which the session is created.
+    report : callable
+        Told what is going on and which share of the whole is done.
+
+    Returns
+    -------
+    dict
+        JSON-able: see docs/commands.md.
+
+    Raises
+    ------
+    HandcalError
+        If the headset does not answer, the wearer does not get on, or the disk is full.
+    """
+    rig = read_rig(rig_path)
+    world = World(make_hand(settings.seed), make_room(settings.seed))
+    key = new_pairing_key()
+    with (
+        Session.create(output, rig, {"demo": asdict(settings)}) as session,
+        HeadsetServer(key.encode()) as server,
+        SceneReceiver() as scene,
+        SyntheticCamera(world, scene.latest, seed=settings.seed) as camera,
+        _Headset(settings, rig_path, server.address[1], scene.port, key) as headset,
+    ):
+        report("Connecting to the virtual headset", 0.0)
+        try:
+            server.wait_connected(_CONNECT_S)
+        except LinkError as error:
+            raise LinkError(f"{error} {headset.last_words()}".strip()) from error
+        calibration = Calibration(rig, server, session, CalibrationSettings())
+        observations = _follow_plan(calibration, camera, settings, report)
+        statistics = server.statistics()
+        session.record("link", **asdict(statistics))
+        return {
+            "seed": settings.seed,
+            "session": str(session.path),
+            **_judge(calibration, rig, settings),
+            "guard": {
+                "rejected": calibration.refused,
+                "accepted_deg": max(
+                    float(np.degrees(np.linalg.norm(alignment.rotation_rad)))
+                    for alignment in calibration.alignments
+                ),
+            },
+            "link": {
+                "sent": statistics.sent,
+                "lost": statistics.lost + statistics.lost_inbound,
+                "acked": statistics.acked,
+            },
+            "timing_ms": _timing(calibration, rig, observations),
+        }
+
+
+def reprojection_arcmin(
+    rig: Rig, shifts_m: Mapping[Eye, Float64], true_shifts_m: Mapping[Eye, Float64]
+) -> float:
+    """Return the mean error seen by the true eyes, in arcmin.
+
+    At four corners of an 8 cm square straight ahead, at 0.4, 0.5 and 0.6 m, in both displays.
+    """
+    corners = [
+        [x, y, depth_m]
+        for depth_m in _TARGET_DEPTHS_M
+        for x in (-_TARGET_HALF_M, _TARGET_HALF_M)
+        for y in (-_TARGET_HALF_M, _TARGET_HALF_M)
+    ]
+    errors = []
+    for eye in EYES:
+        display = rig.eyes[eye]
+        targets_E = transform(view_of_eye(display, np.eye(4)), corners)
+        error_px = reprojection_error_px(display, shifts_m[eye], true_shifts_m[eye], targets_E)
+        errors.append(arcmin_from_px(display, error_px))
+    return float(np.mean(errors))
+
+
+def _follow_plan(
+    calibration: Calibration, camera: SyntheticCamera, settings: DemoSettings, report: Report
+) -> list[Observation]:
+    """Do every planned alignment, solving and applying after each."""
+    each: tuple[tuple[Eye, ...], ...] = (
+        (EYES,) if settings.eyes == "both" else (("left",), ("right",))
+    )
+    plan = each * settings.alignments
+    observations: list[Observation] = []
+
+    def watch(until: Callable[[Observation], bool], complaint: str) -> None:
+        deadline_s = time.monotonic() + _STEP_S
+        while time.monotonic() < deadline_s:
+            try:
+                observations.append(calibration.step(camera.read()))
+            except CameraTimeoutError:
+                continue
+            if until(observations[-1]):
+                return
+        raise HandcalError(f"{complaint} within {_STEP_S:.0f} s")
+
+    for number, eyes in enumerate(plan):
+        which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
+        label = f"Alignment {number + 1} of {len(plan)}, {which}"
+        report(f"{label}: waiting for a steady hand", (number + 0.1) / len(plan))
+        watch(lambda seen: seen.is_steady, "the wearer did not hold the hand still")
+        calibration.make_cursor(eyes)
+        report(f"{label}: wearer aligns", (number + 0.3) / len(plan))
+        watch(lambda seen: seen.state is State.ALIGNED, "the wearer did not align the hand")
+        report(f"{label}: solving", (number + 0.9) / len(plan))
+        calibration.solve()
+        calibration.apply()
+        calibration.wait_applied()
+        report(f"{label}: applied and acknowledged", (number + 1.0) / len(plan))
+    return observations
+
+
+def _judge(calibration: Calibration, rig: Rig, settings: DemoSettings) -> dict[str, Any]:
+    """Compare the result with the wearer's true eyes."""
+    assert calibration.results is not None
+    truth_m = draw_eyes(np.random.default_rng(settings.seed), WearerSettings())
+    results = calibration.results
+    solved_m = {eye: shift.shift_m for eye, shift in results.shifts.items()}
+    nothing_m = {eye: np.zeros(3) for eye in EYES}
+    return {
+        "eyes": {
+            eye: {
+                "shift_mm": (1e3 * shift.shift_m).tolist(),
+                "true_shift_mm": (1e3 * truth_m[eye]).tolist(),
+                "sigma_mm": (1e3 * np.sqrt(np.diag(shift.covariance_m2))).tolist(),
+                "error_mm": float(1e3 * np.linalg.norm(shift.shift_m - truth_m[eye])),
+                "verdict": results.verdicts[eye].name,
+                "reason": results.verdicts[eye].reason,
+            }
+            for eye, shift in results.shifts.items()
+        },
+        "reprojection_arcmin": {
+            "before": reprojection_arcmin(rig, nothing_m, truth_m),
+            "after": reprojection_arcmin(rig, solved_m, truth_m),
+        },
+    }
+
+
+def _timing(
+    calibration: Calibration, rig: Rig, observations: list[Observation]
+) -> dict[str, float | None]:
+    """Return the median milliseconds of each stage, as this run took them."""
+    solve_ms = []
+    for alignment in calibration.alignments:
+        started_s = time.perf_counter()
+        solve_alignment(alignment, rig)
+        solve_ms.append(1e3 * (time.perf_counter() - started_s) * 2 / len(alignment.eyes))
+    segment_ms = [seen.segment_ms for seen in observations if seen.hand is not None]
+    guard_ms = [seen.guard_ms for seen in observations if seen.guard_ms is not None]
+    return {
+        "segment": float(np.median(np.array(segment_ms, dtype=float))),
+        "guard": float(np.median(np.array(guard_ms, dtype=float))),
+        "solve_both_eyes": float(np.median(solve_ms)),
+    }
+
+
+class _Headset:
+    """The virtual headset's process, ended when left."""
+
+    def __init__(
+        self, settings: DemoSettings, rig_path: Path, port: int, scene_port: int, key: str
+    ) -> None:
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+        command = [sys.executable, "-m", "handcal", "headset"]
+        options = {
+            "--port": port,
+            "--scene-port": scene_port,
+            "--rig": rig_path,
+            "--seed": settings.seed,
+            "--loss": settings.loss,
+            "--reorder": settings.reorder,
+        }
+        command += [str(part) for option in options.items() for part in option]
+        self._process = subprocess.Popen(  # noqa: S603 (our own program)
+            command, env=os.environ | {KEY_VARIABLE: key}, stderr=self._errors
+        )
+
+    def last_words(self) -> str:
+        """Return what the process complained of, if it has ended."""
+        if self._process.poll() is None:
+            return ""
+        self._errors.seek(0)
+        return self._errors.read(1000).decode(errors="replace").strip()
+
+    def __enter__(self) -> _Headset:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        try:
+            self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._errors.close()

@@ -1,0 +1,150 @@
+"""What is installed and plugged in, and what to do about each problem."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from handcal.camera.realsense import Device, connected_devices
+from handcal.errors import HandcalError
+from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
+from handcal.link.settings import DEFAULT_SETTINGS
+from handcal.link.transport import UdpTransport
+from handcal.resources import resource_path
+from handcal.rig.rig_file import read_rig
+
+_PACKAGES = ("numpy", "scipy", "opencv-python-headless", "protobuf", "scikit-image")
+_LEAST_FREE_BYTES = 500 * 2**20
+
+
+class Health(Enum):
+    """How it stands with one thing."""
+
+    GOOD = "ok"
+    LIMITED = "note"
+    BROKEN = "PROBLEM"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked at.
+
+    Attributes
+    ----------
+    what : str
+    health : Health
+        LIMITED where the simulator and recordings work all the same.
+    found : str
+    advice : str
+        What to do; empty if nothing.
+    """
+
+    what: str
+    health: Health
+    found: str
+    advice: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at everything that a calibration needs; never raises."""
+    return [
+        _python(),
+        *_packages(),
+        _examples(),
+        _network(),
+        _pairing(),
+        *_cameras(),
+        _screen(),
+        _disk(),
+    ]
+
+
+def _python() -> Finding:
+    found = f"Python {platform.python_version()} on {platform.platform()}, {os.cpu_count()} cores"
+    if (3, 11) <= sys.version_info[:2] <= (3, 13):
+        return Finding("Python", Health.GOOD, found)
+    return Finding("Python", Health.BROKEN, found, "use Python 3.11, 3.12 or 3.13")
+
+
+def _packages() -> list[Finding]:
+    findings = []
+    for name in _PACKAGES:
+        try:
+            version = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            advice = "run bash installer/run.sh, or pip install handcal"
+            findings.append(Finding(name, Health.BROKEN, "not installed", advice))
+        else:
+            findings.append(Finding(name, Health.GOOD, version))
+    return findings
+
+
+def _examples() -> Finding:
+    return _try("Example rig", lambda: read_rig(resource_path("example_rig.yaml")).name)
+
+
+def _network() -> Finding:
+    def bind() -> str:
+        transport = UdpTransport(("127.0.0.1", 0), DEFAULT_SETTINGS.receive_buffer_bytes)
+        port = transport.address[1]
+        transport.close()
+        return f"UDP works on the loopback interface (port {port})"
+
+    return _try("Network", bind)
+
+
+def _pairing() -> Finding:
+    try:
+        read_pairing_key()
+    except HandcalError:
+        advice = f"for a real headset, set {KEY_VARIABLE} to the key that it shows"
+        return Finding("Pairing key", Health.LIMITED, "not set", advice)
+    return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
+
+
+def _cameras() -> list[Finding]:
+    try:
+        devices = connected_devices()
+    except HandcalError as error:
+        return [Finding("RealSense SDK", Health.LIMITED, str(error), "needed for real cameras")]
+    if not devices:
+        advice = "plug a RealSense into a USB 3 port; the simulator works without"
+        return [Finding("Camera", Health.LIMITED, "none connected", advice)]
+    return [_camera(device) for device in devices]
+
+
+def _camera(device: Device) -> Finding:
+    found = f"{device.name}, serial {device.serial}, firmware {device.firmware}, USB {device.usb}"
+    if device.usb.startswith("2"):
+        advice = "USB 2 is too slow for 1280x720: use a USB 3 port and cable"
+        return Finding("Camera", Health.LIMITED, found, advice)
+    return Finding("Camera", Health.GOOD, found)
+
+
+def _screen() -> Finding:
+    if sys.platform != "linux" or any(os.environ.get(v) for v in ("DISPLAY", "WAYLAND_DISPLAY")):
+        return Finding("Screen", Health.GOOD, "there is one")
+    advice = "commands run without one; windows need one"
+    return Finding("Screen", Health.LIMITED, "none", advice)
+
+
+def _disk() -> Finding:
+    free_bytes = shutil.disk_usage(Path.cwd()).free
+    found = f"{free_bytes / 2**30:.1f} GiB free here"
+    if free_bytes < _LEAST_FREE_BYTES:
+        return Finding("Disk", Health.BROKEN, found, "make room: a session takes some megabytes")
+    return Finding("Disk", Health.GOOD, found)
+
+
+def _try(what: str, look: Callable[[], str]) -> Finding:
+    try:
+        return Finding(what, Health.GOOD, look())
+    except HandcalError as error:
+        return Finding(what, Health.BROKEN, str(error), "install handcal again, or free the port")

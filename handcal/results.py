@@ -1,0 +1,103 @@
+"""From alignments to what a session reports: solved, fused and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from handcal.register.fuse import FuseSettings, fuse_alignments
+from handcal.register.solve import solve_alignment
+from handcal.register.verdict import VerdictSettings, eye_distance_m, judge
+from handcal.types import Alignment, Eye, EyeShift, Method, Rig, Verdict
+
+RESULTS_VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class SolveSettings:
+    """How alignments are solved.
+
+    Attributes
+    ----------
+    method : str
+        One of `handcal.types.METHODS`.
+    fuse : FuseSettings
+    verdict : VerdictSettings
+    """
+
+    method: Method = "consistent"
+    fuse: FuseSettings = field(default_factory=FuseSettings)
+    verdict: VerdictSettings = field(default_factory=VerdictSettings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Results:
+    """What all alignments so far say.
+
+    Attributes
+    ----------
+    method : str
+    alignments : tuple of mapping of eye to EyeShift
+        Each alignment alone, without prior.
+    shifts : mapping of eye to EyeShift
+        Fused; what the headset shall render with.
+    verdicts : mapping of eye to Verdict
+    eye_distance_m : float or None
+        Implied by the shifts; None unless both eyes are solved.
+    """
+
+    method: Method
+    alignments: tuple[Mapping[Eye, EyeShift], ...]
+    shifts: Mapping[Eye, EyeShift]
+    verdicts: Mapping[Eye, Verdict]
+    eye_distance_m: float | None
+
+
+def solve_session(alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> Results:
+    """Solve, fuse and judge alignments; equal input gives equal output, bit for bit.
+
+    Raises
+    ------
+    ValueError
+        If there are no alignments, or a cloud cannot be solved.
+    """
+    solved = [solve_alignment(alignment, rig, settings.method) for alignment in alignments]
+    shifts = fuse_alignments(list(zip(alignments, solved, strict=True)), rig, settings.fuse)
+    return Results(
+        method=settings.method,
+        alignments=tuple(solved),
+        shifts=shifts,
+        verdicts=judge(rig, shifts, settings.verdict),
+        eye_distance_m=eye_distance_m(rig, shifts),
+    )
+
+
+def results_json(results: Results) -> dict[str, Any]:
+    """Return results as JSON-able values, metres, without rounding."""
+    return {
+        "version": RESULTS_VERSION,
+        "method": results.method,
+        "eyes": {
+            eye: _shift_json(shift)
+            | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
+            for eye, shift in results.shifts.items()
+        },
+        "eye_distance_m": results.eye_distance_m,
+        "alignments": [
+            {eye: _shift_json(shift) for eye, shift in shifts.items()}
+            for shifts in results.alignments
+        ],
+    }
+
+
+def _shift_json(shift: EyeShift) -> dict[str, Any]:
+    return {
+        "shift_m": shift.shift_m.tolist(),
+        "covariance_m2": shift.covariance_m2.tolist(),
+        "rms_m": shift.rms_m,
+        "inlier_ratio": shift.inlier_ratio,
+        "iterations": shift.iterations,
+        "converged": shift.converged,
+        "stop_reason": shift.stop_reason,
+    }
