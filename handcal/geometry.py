@@ -5,6 +5,7 @@ Transforms are (4, 4) float64, ``T_dst_src``; points are rows of (N, 3) arrays.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
@@ -55,6 +56,18 @@ def camera_matrix(intrinsics: Intrinsics) -> Float64:
             [0.0, 0.0, 1.0],
         ]
     )
+
+
+def image_points(points_m: ArrayLike, intrinsics: Intrinsics) -> Float64:
+    """Project (N, 3) points in front of a camera, in its frame, to (N, 2) pixels, lens included."""
+    pixels, _ = cv2.projectPoints(
+        np.asarray(points_m, dtype=np.float64),
+        np.zeros(3),
+        np.zeros(3),
+        camera_matrix(intrinsics),
+        np.array(intrinsics.distortion),
+    )
+    return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
 
 def interpolate_pose(T_0: Float64, T_1: Float64, fraction: float) -> Float64:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.files import make_folder, write_atomic, write_json, write_ply
-from handcal.geometry import camera_matrix
+from handcal.geometry import image_points
 from handcal.types import Frame, HandCloud, UInt8
 
 _HAND_RGB = (0, 200, 80)
@@ -66,15 +66,7 @@ def draw_overlay(cloud: HandCloud, frame: Frame) -> UInt8:
     picture = _picture(frame)
     on_hand = cloud.mask > 0
     picture[on_hand] = picture[on_hand] // 2 + np.array(_HAND_RGB, np.uint8) // 2
-    camera = frame.depth_intrinsics
-    pixels, _ = cv2.projectPoints(
-        cloud.contour_m.astype(np.float64),
-        np.zeros(3),
-        np.zeros(3),
-        camera_matrix(camera),
-        np.array(camera.distortion),
-    )
-    columns, rows = np.rint(pixels.reshape(-1, 2)).astype(int).T
+    columns, rows = np.rint(image_points(cloud.contour_m, frame.depth_intrinsics)).astype(int).T
     picture[rows, columns] = _contour_colors(cloud)
     x0, y0, x1, y1 = cloud.box_px
     cv2.rectangle(picture, (x0, y0), (x1 - 1, y1 - 1), _BOX_RGB)

@@ -95,16 +95,21 @@ def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
         part, place = crop_view(view, surface, margin=2)
         radius_m = radius_px[place] * part.depth * np.float32(pitch * view.scale_m)
         located = _locate_on(part, surface[place], ends[place], radius_m, settings.forearm_m)
-        plausible = _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
-        if plausible and (found is None or located.palm_m[2] < found.palm_m[2]):
+        nearest = found is None or located.palm_m[2] < found.palm_m[2]
+        if nearest and _is_plausible(located, pitch):
             found = located
     if found is None:
         raise HandError(
             f"no hand-sized thing between {settings.depth_min_m:.2f} and "
-            f"{settings.depth_max_m:.2f} m; "
-            "raise the bare hand in front of the camera"
+            f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
         )
     return found
+
+
+def _is_plausible(located: LocatedHand, pitch: float) -> bool:
+    area_m2 = np.count_nonzero(located.hand) * (pitch * located.palm_m[2]) ** 2
+    has_palm = _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
+    return bool(has_palm and area_m2 >= _AREA_MIN_M2)
 
 
 def _locate_on(
@@ -175,18 +180,17 @@ def _palm_to_wrist(
     forearm. The wrist is placed by where the fall ends: the minimum itself is too flat to be
     found twice at one place.
     """
-    near_arm = arm & (from_palm_m < _PALM_TO_WRIST_MAX_M)
+    near_palm = surface & (from_palm_m < _PALM_TO_WRIST_MAX_M)
+    near_arm = arm & near_palm
     if not near_arm.any():
         return _PALM_TO_WRIST_MAX_M
     weight = radius_m[near_arm] ** 2  # a thumb that leaves with the arm is thin
     axis = (points_m[:, near_arm] - palm_m[:, None]) @ weight
     axis /= np.linalg.norm(axis)
     along_axis_m = np.tensordot(axis, points_m, 1) - axis @ palm_m
-    armward = (
-        surface & (along_axis_m > _ARMWARD_COS * from_palm_m) & (from_palm_m < _PALM_TO_WRIST_MAX_M)
-    )
+    armward = near_palm & (along_axis_m > _ARMWARD_COS * from_palm_m)
     shell = (from_palm_m[armward] / _SHELL_M).astype(int)
-    profile_m = np.zeros(1 + shell.max())
+    profile_m = np.zeros(1 + int(_PALM_TO_WRIST_MAX_M / _SHELL_M))
     np.maximum.at(profile_m, shell, radius_m[armward])
     return _end_of_fall(profile_m) * _SHELL_M + _WRIST_BEYOND_M
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from handcal.geometry import camera_matrix, transform
+from handcal.geometry import image_points, transform
 from handcal.hand.locate import locate_hand
 from handcal.hand.mask import HandMask, mask_hand
 from handcal.hand.settings import SegmentSettings
@@ -116,14 +116,8 @@ def _colors(frame: Frame, points_m: Float32) -> UInt8 | None:
     camera = frame.color_intrinsics
     if frame.color is None or camera is None:
         return None
-    pixels, _ = cv2.projectPoints(
-        transform(frame.T_C_D, points_m),
-        np.zeros(3),
-        np.zeros(3),
-        camera_matrix(camera),
-        np.array(camera.distortion),
-    )
-    columns, rows = np.rint(pixels.reshape(-1, 2)).astype(int).T
+    pixels = image_points(transform(frame.T_C_D, points_m), camera)
+    columns, rows = np.rint(pixels).astype(int).T
     seen = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     colors = np.zeros((len(points_m), 3), np.uint8)
     colors[seen] = frame.color[rows[seen], columns[seen]]

@@ -8,6 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from handcal.errors import HandError
 from handcal.geometry import camera_matrix, project, rigid
@@ -170,6 +172,42 @@ def test_wall_is_no_hand(shot: Shot) -> None:
     flat = np.full_like(shot.frame.depth, 6000)
     with pytest.raises(HandError, match="no hand-sized"):
         segment_hand(with_depth(shot.frame, flat), SETTINGS)
+
+
+@given(
+    blobs=st.lists(
+        st.tuples(
+            st.integers(-20, 660),
+            st.integers(-20, 380),
+            st.integers(2, 250),
+            st.integers(2, 250),
+            st.integers(0, 7500),
+            st.integers(-60, 60),
+        ),
+        max_size=8,
+    ),
+    seed=st.integers(0, 1000),
+    holes=st.floats(0.0, 1.0),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_scene_gives_a_hand_or_a_reason(
+    blobs: list[tuple[int, int, int, int, int, int]], seed: int, holes: float
+) -> None:
+    rows, columns = np.indices((CAMERA.height, CAMERA.width))
+    depth = np.zeros((CAMERA.height, CAMERA.width))
+    for x, y, a, b, z, slope in blobs:
+        inside = ((columns - x) / a) ** 2 + ((rows - y) / b) ** 2 < 1.0
+        depth[inside] = z + slope * (columns - x)[inside]
+    depth[np.random.default_rng(seed).random(depth.shape) < holes**4] = 0.0
+    frame = Frame(1, 0, 0, depth.clip(0, 65535).astype(np.uint16), 1e-4, CAMERA)
+    try:
+        cloud = segment_hand(frame, SETTINGS)
+    except HandError:
+        return
+    assert 0 < len(cloud.points_m) < 1.1 * SETTINGS.points
+    assert np.isfinite(cloud.points_m).all()
+    assert cloud.points_m[:, 2].min() > SETTINGS.depth_min_m - 1e-4
+    assert cloud.points_m[:, 2].max() < SETTINGS.depth_max_m + 1e-4
 
 
 def test_small_holes_are_closed_in_the_mask_but_give_no_points(shot: Shot) -> None:
