@@ -5,265 +5,293 @@ Commands import what they need when they run, so that ``handcal --help`` answers
 
 from __future__ import annotations
 
+import argparse
+import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
-import click
-import numpy as np
-import typer
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from handcal.errors import FileError, HandcalError
 from handcal.files import make_folder, write_json
+from handcal.types import METHODS
 
-app = typer.Typer(
-    help="Calibrate an optical see-through headset with the wearer's bare hand.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    add_completion=False,
-)
-console = Console(soft_wrap=True)
+if TYPE_CHECKING:
+    from handcal.replay import ReplayStep
 
-Json = Annotated[Path | None, typer.Option("--json", help="Also write the result to this file.")]
-RigFile = Annotated[
-    Path | None, typer.Option("--rig", help="Rig file; without it, the shipped example.")
-]
-Probability = typer.Option(min=0.0, max=1.0)
+console = Console(soft_wrap=True, highlight=False)
 
 
-class EyePlan(StrEnum):
-    """Which eyes align at a time."""
-
-    BOTH = "both"
-    EACH = "each"
-
-
-class MethodName(StrEnum):
-    """How alignments are solved."""
-
-    CONSISTENT = "consistent"
-    PAPER = "paper"
-    LINEAR = "linear"
-    ICP = "icp"
-
-
-@app.command()
-def demo(
-    output: Annotated[Path, typer.Option(help="Folder for the session.")] = Path("results/demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Of wearer, hand, room and noise.")] = 1,
-    alignments: Annotated[int, typer.Option(min=1, max=20, help="How often to align.")] = 1,
-    eyes: Annotated[EyePlan, typer.Option(help="Both at once, or one at a time.")] = EyePlan.BOTH,
-    loss: Annotated[float, Probability] = 0.0,
-    reorder: Annotated[float, Probability] = 0.0,
-    rig: RigFile = None,
-    json: Json = None,
-) -> None:
+def demo(arguments: argparse.Namespace) -> None:
     """Calibrate a simulated wearer from start to end, and judge the result by the truth."""
     from handcal.demo import DemoSettings, run_demo
 
     settings = DemoSettings(
-        seed=seed, alignments=alignments, eyes=eyes.value, loss=loss, reorder=reorder
+        seed=arguments.seed,
+        alignments=arguments.alignments,
+        eyes=arguments.eyes,
+        loss=arguments.loss,
+        reorder=arguments.reorder,
     )
     with _progress() as report:
-        result = run_demo(settings, _rig_path(rig), make_folder(output), report)
-    _save(json, result)
-    table = Table("eye", "φ solved, mm", "± σ", "true φ", "error, mm", "verdict")
+        result = run_demo(settings, _rig_path(arguments.rig), make_folder(arguments.output), report)
+    _save(arguments.json, result)
+    table = _table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "off, mm", "verdict")
     for eye, found in result["eyes"].items():
-        triples = [
-            " ".join(f"{value:.1f}" for value in found[key])
-            for key in ("shift_mm", "sigma_mm", "true_shift_mm")
-        ]
+        triples = [_triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
         table.add_row(eye, *triples, f"{found['error_mm']:.2f}", found["verdict"])
     console.print(table)
-    error = result["reprojection_arcmin"]
+    for eye, found in result["eyes"].items():
+        console.print(f"{eye}: {found['verdict']}: {found['reason']}")
+    error, guard = result["reprojection_arcmin"], result["guard"]
     console.print(
-        f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after. "
-        f"Confirmations refused: {result['guard']['rejected']}."
+        f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after\n"
+        f"Confirmations refused for a turned hand: {guard['rejected']}; "
+        f"accepted at up to {guard['accepted_deg']:.1f}°\n"
+        f"Session: {result['session']}"
     )
-    console.print(f"Session: {result['session']}")
 
 
-@app.command()
-def segment(
-    color: Annotated[Path, typer.Option(help="Colour image.")],
-    depth: Annotated[Path, typer.Option(help="16-bit PNG aligned to it.")],
-    intrinsics: Annotated[
-        Path, typer.Option(help="JSON: width, height, fx, fy, cx, cy, depth_scale (m a unit).")
-    ],
-    output: Annotated[Path, typer.Option(help="Folder for the results.")],
-) -> None:
-    """Segment the hand in one image pair: clouds, mask, overlay and hand.json."""
-    from handcal.camera.images import read_frame, write_segmentation
+def segment(arguments: argparse.Namespace) -> None:
+    """Segment the hand in one image pair: hand.ply, contour.ply, mask, overlay and hand.json."""
+    from handcal.camera.images import read_frame
     from handcal.hand.segment import SegmentSettings, segment_hand
+    from handcal.segmentation_file import write_segmentation
 
-    frame = read_frame(color, depth, intrinsics)
+    frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)
     cloud = segment_hand(frame, SegmentSettings())
-    write_segmentation(cloud, frame, make_folder(output))
+    write_segmentation(cloud, frame, make_folder(arguments.output))
     console.print(
-        f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, box {cloud.box_px}. "
-        f"Results: {output}"
+        f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
+        f"box {', '.join(map(str, cloud.box_px))} px. Results: {arguments.output}"
     )
 
 
-@app.command()
-def solve(
-    session: Annotated[Path, typer.Argument(help="A session's folder.")],
-    method: Annotated[MethodName, typer.Option(help="How to solve.")] = MethodName.CONSISTENT,
-    json: Json = None,
-) -> None:
+def solve(arguments: argparse.Namespace) -> None:
     """Solve a session's alignments again; the session itself stays as it is."""
+    import numpy as np
+
     from handcal.results import SolveSettings, results_json, solve_session
     from handcal.session import Session
 
-    record = Session.open(session)
+    record = Session.open(arguments.session)
+    if record.torn_bytes:
+        console.print("The journal's last line is unfinished, as after a crash, and left out.")
     if not record.alignments:
-        raise FileError(f"{session} holds no alignment to solve")
-    results = solve_session(record.alignments, record.rig, SolveSettings(method.value))
-    _save(json, results_json(results))
-    stored = (record.results or {}).get("eyes", {})
-    table = Table("eye", "φ, mm", "± σ", "RMS, mm", "inliers", "verdict", "φ stored, mm")
+        raise FileError(f"{arguments.session} holds no alignment to solve")
+    results = solve_session(record.alignments, record.rig, SolveSettings(arguments.method))
+    _save(arguments.json, results_json(results))
+    table = _table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.shifts.items():
-        before = stored.get(eye, {}).get("shift_m")
         table.add_row(
             eye,
-            _millimetres(shift.shift_m),
-            _millimetres(np.sqrt(np.diag(shift.covariance_m2))),
+            _triple(1e3 * shift.shift_m),
+            _triple(1e3 * np.sqrt(np.diag(shift.covariance_m2))),
             f"{1e3 * shift.rms_m:.2f}",
             f"{100 * shift.inlier_ratio:.0f} %",
             results.verdicts[eye].name,
-            _millimetres(before) if before else "–",
         )
     console.print(table)
-    if results.eye_distance_m is not None:
-        console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
     for eye, verdict in results.verdicts.items():
         console.print(f"{eye}: {verdict.name}: {verdict.reason}")
+    if results.eye_distance_m is not None:
+        console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
 
 
-@app.command()
-def replay(
-    recording: Annotated[Path, typer.Argument(help="RealSense recording, .db3 or .bag.")],
-    real_time: Annotated[bool, typer.Option(help="At the recorded pace.")] = False,
-    json: Json = None,
-) -> None:
-    """Play a recording through librealsense and segment the hand in every frame."""
+def replay(arguments: argparse.Namespace) -> None:
+    """Play a RealSense recording and segment the hand in every frame."""
     from handcal.camera.recording import RecordingCamera
     from handcal.hand.segment import SegmentSettings
     from handcal.replay import replay as play
 
-    table = Table("frame", "points", "depth, m", "turned, °", "moved, mm", "segmented, ms")
+    table = _table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
     rows: list[dict[str, Any]] = []
-    with RecordingCamera(recording, real_time=real_time) as camera:
+    with RecordingCamera(arguments.recording, real_time=arguments.real_time) as camera:
         for step in play(camera, SegmentSettings()):
-            row = _replay_row(step)
-            rows.append(row)
-            if step.hand is None:
-                table.add_row(str(step.frame.index), step.problem)
-            else:
-                table.add_row(
-                    *(f"{value:.4g}" if value is not None else "" for value in row.values())
-                )
+            rows.append(_replay_row(step))
+            shown = list(rows[-1].values())[:-1]
+            table.add_row(*("–" if value is None else f"{value:.4g}" for value in shown))
     console.print(table)
-    _save(json, {"frames": rows})
-    found = sum(row["points"] is not None for row in rows)
+    _save(arguments.json, {"frames": rows})
+    for row in rows:
+        if row["problem"]:
+            console.print(f"Frame {row['frame']}: {row['problem']}")
+    found = sum(not row["problem"] for row in rows)
     console.print(f"{found} of {len(rows)} frames show a hand.")
 
 
-@app.command()
-def headset(
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Where the PC listens.")],
-    scene_port: Annotated[
-        int, typer.Option(min=1, max=65535, help="Where the simulated camera listens.")
-    ],
-    host: Annotated[str, typer.Option(help="The PC.")] = "127.0.0.1",
-    key_file: Annotated[
-        Path | None, typer.Option(help="Pairing key; else from HANDCAL_PAIRING_KEY.")
-    ] = None,
-    rig: RigFile = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the wearer.")] = 1,
-    loss: Annotated[float, Probability] = 0.0,
-    reorder: Annotated[float, Probability] = 0.0,
-    duplicate: Annotated[float, Probability] = 0.0,
-    delay_ms: Annotated[float, typer.Option(min=0.0, max=10_000.0)] = 0.0,
-    clock_offset_ms: Annotated[
-        float, typer.Option(help="Headset's clock less the PC's.")
-    ] = 12345.0,
-    duration_s: Annotated[float | None, typer.Option(min=0.0, help="When to end.")] = None,
-) -> None:
+def headset(arguments: argparse.Namespace) -> None:
     """Wear the virtual headset: a process that speaks the real datagrams, with a wearer in it."""
     from handcal.link.impair import Impairment
     from handcal.link.pairing import read_pairing_key
     from handcal.sim.headset import HeadsetSettings, run_headset, until_terminated
 
     settings = HeadsetSettings(
-        rig_path=str(_rig_path(rig)),
-        host=host,
-        port=port,
-        scene_port=scene_port,
-        seed=seed,
+        rig_path=str(_rig_path(arguments.rig)),
+        host=arguments.host,
+        port=arguments.port,
+        scene_port=arguments.scene_port,
+        seed=arguments.seed,
         impairment=Impairment(
-            loss=loss, duplicate=duplicate, reorder=reorder, delay_s=delay_ms / 1e3, seed=seed
+            loss=arguments.loss,
+            duplicate=arguments.duplicate,
+            reorder=arguments.reorder,
+            delay_s=arguments.delay_ms / 1e3,
+            seed=arguments.seed,
         ),
-        clock_offset_s=clock_offset_ms / 1e3,
-        duration_s=duration_s,
+        clock_offset_s=arguments.clock_offset_ms / 1e3,
+        duration_s=arguments.duration_s,
     )
-    run_headset(settings, read_pairing_key(key_file), until_terminated())
+    run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())
 
 
-@app.command()
-def bench(
-    quick: Annotated[bool, typer.Option(help="Few repetitions: a look, not a figure.")] = False,
-    json: Json = None,
-) -> None:
+def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, each beside its target and a baseline of the same run."""
     from handcal.bench import BenchSettings, bench_table, run_bench
 
     with _progress() as report:
-        result = run_bench(BenchSettings(quick=quick), report)
-    _save(json, result)
-    table = Table("what", "measured", "target", "met")
+        result = run_bench(BenchSettings(quick=arguments.quick), report)
+    _save(arguments.json, result)
+    table = _table("what", "measured", "target", "met")
     for row in bench_table(result):
         table.add_row(*row)
     console.print(table)
 
 
-@app.command()
-def doctor() -> None:
+def doctor(_arguments: argparse.Namespace) -> None:
     """Tell what is installed, which camera is there, and what to do about each problem."""
     from handcal.doctor import Health, examine
 
     findings = examine()
-    table = Table("", "what", "found", "what to do")
     for finding in findings:
-        table.add_row(finding.health.value, finding.what, finding.found, finding.advice)
-    console.print(table)
+        advice = f"\n         → {finding.advice}" if finding.advice else ""
+        console.print(f"{finding.health.value:8} {finding.what}: {finding.found}{advice}")
     if any(finding.health is Health.BROKEN for finding in findings):
-        raise typer.Exit(1)
+        raise HandcalError("something must be mended first; see above")
 
 
 def main() -> None:
     """Run a command; every foreseen error is one line."""
+    arguments = _parser().parse_args()
     try:
-        code = app(standalone_mode=False)
-    except click.ClickException as error:
-        _fail(error.format_message(), error.exit_code)
+        arguments.command(arguments)
     except HandcalError as error:
         _fail(str(error), 1)
-    except (click.Abort, KeyboardInterrupt):
+    except KeyboardInterrupt:
         _fail("interrupted", 130)
-    sys.exit(code if isinstance(code, int) else 0)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
 
 
-def _fail(message: str, code: int) -> None:
-    line = " ".join(message.split())
-    sys.stderr.write(f"handcal: {line}\n")
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        _fail(f"{message}; see {self.prog} --help", 2)
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    sys.stderr.write(f"handcal: {' '.join(message.split())}\n")
     sys.exit(code)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="handcal",
+        description="Calibrate an optical see-through headset with the wearer's bare hand.",
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=_Parser)
+
+    def add(command: Callable[[argparse.Namespace], None], *, json: bool = True) -> _Parser:
+        text = command.__doc__
+        added: _Parser = commands.add_parser(
+            command.__name__,
+            help=text,
+            description=text,
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+        added.set_defaults(command=command)
+        if json:
+            added.add_argument("--json", type=Path, metavar="FILE", help="also write it here")
+        return added
+
+    share, count, seed = _number(float, 0.0, 1.0), _number(int, 1, 20), _number(int, 0, 2**32 - 1)
+    milliseconds = _number(float, 0.0, 10_000.0)
+
+    one = add(demo)
+    one.add_argument("--output", type=Path, default=Path("results/demo"), help="session's folder")
+    one.add_argument("--seed", type=seed, default=1, help="of wearer, hand, room and noise")
+    one.add_argument("--alignments", type=count, default=1, metavar="K", help="how often to align")
+    one.add_argument("--eyes", choices=("both", "each"), default="both", help="open at a time")
+    one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
+    one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")
+    one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
+
+    one = add(segment, json=False)
+    one.add_argument("--color", type=Path, required=True, help="colour image")
+    one.add_argument("--depth", type=Path, required=True, help="16-bit PNG aligned to it")
+    one.add_argument(
+        "--intrinsics",
+        type=Path,
+        required=True,
+        help="JSON with width, height, fx, fy, cx, cy and depth_scale (metres a unit)",
+    )
+    one.add_argument("--output", type=Path, required=True, help="folder for the results")
+
+    one = add(solve)
+    one.add_argument("session", type=Path, help="a session's folder")
+    one.add_argument("--method", choices=METHODS, default="consistent", help="solver")
+
+    one = add(replay)
+    one.add_argument("recording", type=Path, help=".db3 or .bag file")
+    one.add_argument("--real-time", action="store_true", help="at the recorded pace")
+
+    one = add(headset, json=False)
+    port = _number(int, 1, 65535)
+    one.add_argument("--port", type=port, required=True, help="where the PC listens")
+    one.add_argument(
+        "--scene-port", type=port, required=True, help="where the simulated camera listens"
+    )
+    one.add_argument("--host", default="127.0.0.1", help="the PC")
+    one.add_argument("--key-file", type=Path, help="pairing key; else in HANDCAL_PAIRING_KEY")
+    one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
+    one.add_argument("--seed", type=seed, default=1, help="of the wearer")
+    one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
+    one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")
+    one.add_argument("--duplicate", type=share, default=0.0, help="share of datagrams doubled")
+    one.add_argument("--delay-ms", type=milliseconds, default=0.0, help="of every datagram")
+    one.add_argument(
+        "--clock-offset-ms",
+        type=_number(float, -1e9, 1e9),
+        default=12345.0,
+        help="headset's clock less the PC's",
+    )
+    one.add_argument("--duration-s", type=_number(float, 0.0, 1e6), help="when to end")
+
+    add(bench).add_argument("--quick", action="store_true", help="few repetitions: only a look")
+    add(doctor, json=False)
+    return parser
+
+
+def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[[str], float]:
+    """Return a converter for argparse that accepts numbers from `low` to `high`."""
+
+    def convert(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            what = "whole number" if kind is int else "number"
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what} from {low:g} to {high:g}")
+        return value
+
+    return convert
 
 
 def _rig_path(rig: Path | None) -> Path:
@@ -278,11 +306,20 @@ def _save(path: Path | None, result: dict[str, Any]) -> None:
         write_json(path, result)
 
 
-def _millimetres(values_m: Any) -> str:
-    return " ".join(f"{1e3 * value:7.3f}" for value in values_m)
+def _table(*columns: str) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="right" if number else "left", no_wrap=True)
+    return table
 
 
-def _replay_row(step: Any) -> dict[str, Any]:
+def _triple(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.2f}" for value in values)
+
+
+def _replay_row(step: ReplayStep) -> dict[str, Any]:
+    import numpy as np
+
     hand, motion = step.hand, step.motion
     return {
         "frame": step.frame.index,
@@ -291,14 +328,15 @@ def _replay_row(step: Any) -> dict[str, Any]:
         "turned_deg": float(np.degrees(np.linalg.norm(motion.rotation_rad))) if motion else None,
         "moved_mm": float(1e3 * np.linalg.norm(motion.shift_m)) if motion else None,
         "segment_ms": 1e3 * step.segment_s,
+        "problem": step.problem,
     }
 
 
 @contextmanager
-def _progress() -> Iterator[Any]:
+def _progress() -> Iterator[Callable[[str, float], None]]:
     """Yield a function that shows what is going on: a bar on a terminal, else plain lines."""
     if not console.is_terminal:
-        yield lambda what, share: console.print(f"[{100 * share:3.0f} %] {what}", markup=False)
+        yield lambda what, share: console.print(f"{100 * share:3.0f} % {what}")
         return
     columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as bar:

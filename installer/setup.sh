@@ -64,7 +64,7 @@ install_python_packages() {
     local pip=(.venv/bin/python -m pip --disable-pip-version-check --quiet)
     "${pip[@]}" install --require-hashes -r installer/requirements.lock ||
         fail "the packages could not be installed; is this computer online?"
-    "${pip[@]}" install --no-deps -e . || fail "handcal itself could not be installed"
+    "${pip[@]}" install --no-deps --no-build-isolation -e . || fail "handcal itself could not be installed"
     echo "$wanted" >"$stamp"
 }
 
