@@ -92,7 +92,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
 
     found = None
     for surface in components(gated, _AREA_MIN_M2 / (pitch * settings.depth_max_m) ** 2):
-        part, place = crop_view(view, surface, margin=2)
+        part, place = crop_view(view, surface, margin=3)
         radius_m = radius_px[place] * part.depth * np.float32(pitch * view.scale_m)
         located = _locate_on(part, surface[place], ends[place], radius_m, settings.forearm_m)
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
@@ -128,6 +128,8 @@ def _locate_on(
     wrist_m = _palm_to_wrist(surface, arm, palm_m, points_m, from_palm_m, radius_m)
     limit_m = wrist_m + forearm_m
     arm = component_of(surface & (from_palm_m > limit_m), arm_end)
+    if not (radius_m[arm] >= _PALM_RADIUS_M[0]).any():  # too thin for an arm: a finger
+        arm = np.zeros_like(arm)
     hand = surface & ~arm & (from_palm_m < _HAND_REACH_M)
     return LocatedHand(view, hand, arm, palm_m.astype(np.float64), palm_radius_m, limit_m)
 

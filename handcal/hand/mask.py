@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from cv2.typing import MatLike
 
 from handcal.errors import HandError
 from handcal.hand.locate import LocatedHand
@@ -83,20 +82,20 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
 
 def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool]:
     """Return the image around the hand, and where in it the hand and the arm may be."""
-    coarse, place = crop_view(located.view, located.hand, margin=2)
+    coarse, place = crop_view(located.view, located.hand, margin=3)
     view = view_depth(frame, coarse.box)
     hand, arm = (
-        _enlarged(cv2.dilate(part[place].astype(np.uint8), NEIGHBOURS), coarse.step_px, view)
-        for part in (located.hand, located.arm)
+        _enlarged(part[place], coarse.step_px, view) for part in (located.hand, located.arm)
     )
     return view, hand, arm
 
 
-def _enlarged(mask: MatLike, step_px: int, view: DepthView) -> Bool:
-    """Repeat each pixel of a coarse mask `step_px` times each way, up to the size of a view."""
+def _enlarged(mask: Bool, step_px: int, view: DepthView) -> Bool:
+    """Widen a coarse mask by two pixels and bring it to the resolution and size of a view."""
+    wider = cv2.dilate(mask.astype(np.uint8), NEIGHBOURS, iterations=2)
     height, width = view.depth.shape
     size = step_px * mask.shape[1], step_px * mask.shape[0]
-    return cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
+    return cv2.resize(wider, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
 
 
 def _outline(within: Bool, hole_area_px: float) -> tuple[Pixels, UInt8]:

@@ -156,6 +156,14 @@ def test_arm_that_leaves_through_the_gate_is_cut() -> None:
     assert cloud.points_m[:, 2].min() >= 0.44 - 1e-4
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_arm_that_ends_in_view_is_told_from_the_fingers(seed: int) -> None:
+    shot = shoot(seed, forearm_m=0.12, at_m=(0.0, -0.01, 0.55))
+    cloud = segment_hand(shot.frame, SETTINGS)
+    assert 0.0 < cut_beyond_wrist_m(shot, cloud) < 0.035
+    assert (cloud.mask > 0)[shot.is_hand() & (shot.frame.depth > 0)].mean() > 0.95
+
+
 def test_hand_at_the_border_is_refused() -> None:
     with pytest.raises(HandError, match="cut by the image border"):
         segment_hand(shoot(at_m=(0.0, -0.11, 0.52)).frame, SETTINGS)
