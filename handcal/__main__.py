@@ -10,6 +10,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -42,10 +43,10 @@ def demo(arguments: argparse.Namespace) -> None:
     with _progress() as report:
         result = run_demo(settings, _rig_path(arguments.rig), make_folder(arguments.output), report)
     _save(arguments.json, result)
-    table = _table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "off, mm", "verdict")
+    table = _table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "off by", "verdict")
     for eye, found in result["eyes"].items():
         triples = [_triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
-        table.add_row(eye, *triples, f"{found['error_mm']:.2f}", found["verdict"])
+        table.add_row(eye, *triples, f"{found['error_mm']:.1f}", found["verdict"])
     console.print(table)
     for eye, found in result["eyes"].items():
         console.print(f"{eye}: {found['verdict']}: {found['reason']}")
@@ -77,7 +78,9 @@ def solve(arguments: argparse.Namespace) -> None:
     """Solve a session's alignments again; the session itself stays as it is."""
     import numpy as np
 
-    from handcal.results import SolveSettings, results_json, solve_session
+    from handcal.calibrate import CalibrationSettings
+    from handcal.config import read_settings
+    from handcal.results import results_json, solve_session
     from handcal.session import Session
 
     record = Session.open(arguments.session)
@@ -85,7 +88,11 @@ def solve(arguments: argparse.Namespace) -> None:
         console.print("The journal's last line is unfinished, as after a crash, and left out.")
     if not record.alignments:
         raise FileError(f"{arguments.session} holds no alignment to solve")
-    results = solve_session(record.alignments, record.rig, SolveSettings(arguments.method))
+    calibration = read_settings(CalibrationSettings, record.settings.get("calibration", {}))
+    settings = calibration.solve
+    if arguments.method:
+        settings = replace(settings, method=arguments.method)
+    results = solve_session(record.alignments, record.rig, settings)
     _save(arguments.json, results_json(results))
     table = _table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.shifts.items():
@@ -245,7 +252,7 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add(solve)
     one.add_argument("session", type=Path, help="a session's folder")
-    one.add_argument("--method", choices=METHODS, default="consistent", help="solver")
+    one.add_argument("--method", choices=METHODS, help="solver; the session's own if absent")
 
     one = add(replay)
     one.add_argument("recording", type=Path, help=".db3 or .bag file")
@@ -314,7 +321,7 @@ def _table(*columns: str) -> Table:
 
 
 def _triple(values: Iterable[float]) -> str:
-    return ", ".join(f"{value:.2f}" for value in values)
+    return " ".join(f"{value:.1f}" for value in values)
 
 
 def _replay_row(step: ReplayStep) -> dict[str, Any]:

@@ -21,6 +21,7 @@ import numpy as np
 
 from handcal.calibrate import Calibration, CalibrationSettings, Observation, State
 from handcal.camera.synthetic import SyntheticCamera
+from handcal.config import settings_json
 from handcal.display import arcmin_from_px, reprojection_error_px, view_of_eye
 from handcal.errors import CameraTimeoutError, HandcalError, LinkError
 from handcal.geometry import transform
@@ -39,6 +40,7 @@ from handcal.types import EYES, Eye, Float64, Rig
 EyePlan = Literal["both", "each"]
 Report = Callable[[str, float], None]
 
+CALIBRATION = CalibrationSettings()
 _CONNECT_S = 20.0
 _STEP_S = 60.0
 _TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
@@ -94,8 +96,9 @@ def run_demo(
     rig = read_rig(rig_path)
     world = World(make_hand(settings.seed), make_room(settings.seed))
     key = new_pairing_key()
+    stored = {"calibration": settings_json(CALIBRATION), "demo": settings_json(settings)}
     with (
-        Session.create(output, rig, {"demo": asdict(settings)}) as session,
+        Session.create(output, rig, stored) as session,
         HeadsetServer(key.encode()) as server,
         SceneReceiver() as scene,
         SyntheticCamera(world, scene.latest, seed=settings.seed) as camera,
@@ -106,7 +109,7 @@ def run_demo(
             server.wait_connected(_CONNECT_S)
         except LinkError as error:
             raise LinkError(f"{error} {headset.last_words()}".strip()) from error
-        calibration = Calibration(rig, server, session, CalibrationSettings())
+        calibration = Calibration(rig, server, session, CALIBRATION)
         observations = _follow_plan(calibration, camera, settings, report)
         statistics = server.statistics()
         session.record("link", **asdict(statistics))

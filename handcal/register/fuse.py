@@ -12,11 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from handcal.geometry import transform
 from handcal.types import EYES, Alignment, Eye, EyeShift, Float64, Rig
+
+# H (3, 6), what was seen (3,), and its covariance (3, 3).
+Observed: TypeAlias = tuple[Float64, Float64, Float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +76,11 @@ def fuse_alignments(
     """
     if not solved:
         raise ValueError("at least one alignment is needed")
-    information = np.kron(np.eye(2), np.eye(3) / settings.eye_box_sigma_m**2)
-    apart = np.diag(1.0 / np.square(settings.eye_difference_sigma_m))
-    information += np.kron([[1.0, -1.0], [-1.0, 1.0]], apart)
-    state = np.zeros(6)
     rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
-    for H, seen_m, covariance_m2 in rows:
-        information += H.T @ np.linalg.solve(covariance_m2, H)
-        state += H.T @ np.linalg.solve(covariance_m2, seen_m)
-    joint_m2 = np.linalg.inv(information)
-    estimate_m = joint_m2 @ state
-    joint_m2 *= _disagreement(rows, estimate_m)
+    estimate_m, joint_m2 = _combine(rows, 1.0, settings)
+    disagreement = _disagreement(rows, estimate_m)
+    if disagreement > 1.0:
+        estimate_m, joint_m2 = _combine(rows, disagreement, settings)
     took_part = [eye for eye in EYES if any(eye in shifts for _, shifts in solved)]
     return {
         eye: _summarise(
@@ -94,9 +92,25 @@ def fuse_alignments(
     }
 
 
+def _combine(
+    rows: Sequence[Observed], inflation: float, settings: FuseSettings
+) -> tuple[Float64, Float64]:
+    """Return [φ_left; φ_right] (6,) and its covariance, with inflated observation noise."""
+    information = np.kron(np.eye(2), np.eye(3) / settings.eye_box_sigma_m**2)
+    apart = np.diag(1.0 / np.square(settings.eye_difference_sigma_m))
+    information += np.kron([[1.0, -1.0], [-1.0, 1.0]], apart)
+    state = np.zeros(6)
+    for H, seen_m, covariance_m2 in rows:
+        weighted = np.linalg.solve(inflation * covariance_m2, H).T
+        information += weighted @ H
+        state += weighted @ seen_m
+    covariance_m2 = np.asarray(np.linalg.inv(information))
+    return covariance_m2 @ state, covariance_m2
+
+
 def _observe(
     alignment: Alignment, shifts: Mapping[Eye, EyeShift], rig: Rig, settings: FuseSettings
-) -> tuple[Float64, Float64, Float64]:
+) -> Observed:
     """Return H (3, 6), what was seen (3,) and its covariance: seen = H [φ_left; φ_right]."""
     normals: dict[Eye, Float64] = {}
     noises: dict[Eye, Float64] = {}
@@ -134,7 +148,7 @@ def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings
     return np.diag(np.square([gain * lateral_m, gain * lateral_m, gain * along_m]))
 
 
-def _disagreement(rows: Sequence[tuple[Float64, Float64, Float64]], estimate_m: Float64) -> float:
+def _disagreement(rows: Sequence[Observed], estimate_m: Float64) -> float:
     """Return the Birge ratio, at least 1: how far alignments differ beyond their covariances."""
     chi_square = sum(
         float((seen_m - H @ estimate_m) @ np.linalg.solve(covariance_m2, seen_m - H @ estimate_m))

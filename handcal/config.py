@@ -1,0 +1,82 @@
+"""Settings to JSON and back: every stage's settings are a frozen dataclass of plain values."""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Mapping
+from dataclasses import asdict, fields, is_dataclass
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from handcal.errors import FileError
+
+Settings = TypeVar("Settings")
+
+
+def settings_json(settings: Any) -> dict[str, Any]:
+    """Return a settings dataclass, nested ones included, as JSON-able values."""
+    return asdict(settings)
+
+
+def read_settings(kind: type[Settings], data: object, where: str = "settings") -> Settings:
+    """Return settings of a kind from JSON values; what is absent takes its default.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass whose fields are numbers, texts, booleans, tuples of them, or such dataclasses.
+    data : object
+        As `json.loads` gives it.
+    where : str
+        What to call `data` in an error.
+
+    Raises
+    ------
+    FileError
+        For an unknown name, a value of the wrong type, or one that the settings refuse.
+    """
+    if not isinstance(data, Mapping):
+        raise FileError(f"{where} must be an object")
+    hints = get_type_hints(kind)
+    names = {field.name for field in fields(kind)}  # type: ignore[arg-type]
+    unknown = ", ".join(sorted(str(name) for name in set(data) - names))
+    if unknown:
+        raise FileError(f"{where} has no {unknown}; it has {', '.join(sorted(names))}")
+    values = {name: _convert(hints[name], value, f"{where}.{name}") for name, value in data.items()}
+    try:
+        return kind(**values)
+    except ValueError as error:
+        raise FileError(f"{where}: {error}") from error
+
+
+def _convert(kind: Any, value: object, where: str) -> Any:
+    """Return a JSON value as the type that a field is declared with."""
+    origin, choices = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):
+        if value is None and type(None) in choices:
+            return None
+        return _convert(
+            next(choice for choice in choices if choice is not type(None)), value, where
+        )
+    if origin is Literal:
+        if value in choices:
+            return value
+        raise FileError(f"{where} must be one of {', '.join(map(str, choices))}")
+    if origin is tuple and isinstance(value, list) and len(value) == len(choices):
+        return tuple(_convert(kind, part, where) for kind, part in zip(choices, value, strict=True))
+    if is_dataclass(kind) and isinstance(kind, type):
+        return read_settings(kind, value, where)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if kind is float and is_number and math.isfinite(value):  # type: ignore[arg-type]
+        return float(value)  # type: ignore[arg-type]
+    if kind in (int, str, bool) and type(value) is kind:
+        return value
+    raise FileError(f"{where} must be {_name(kind, choices)}, not {str(value)[:40]!r}")
+
+
+def _name(kind: Any, choices: tuple[Any, ...]) -> str:
+    if get_origin(kind) is tuple:
+        return f"a list of {len(choices)} values"
+    return {float: "a finite number", int: "a whole number", bool: "true or false"}.get(
+        kind, "a text"
+    )
