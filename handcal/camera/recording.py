@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from types import TracebackType
@@ -18,6 +20,7 @@ from handcal.geometry import rigid
 from handcal.types import Float64, Frame, Intrinsics, UInt8
 
 _POLL_MS = 100
+_COLOR_TIMEOUT_S = 1.0
 _RATE_HZ = 30
 _BACKLOG_BYTES = 64 * 2**20
 _DISK_TIMEOUT_S = 10.0
@@ -25,6 +28,8 @@ _DISK_TIMEOUT_S = 10.0
 
 class RecordingCamera:
     """Plays a recording back once, depth with colour if it has any; implements `Camera`.
+
+    Depth is given as it was recorded, not aligned to colour, with the colour nearest in time.
 
     Parameters
     ----------
@@ -45,48 +50,43 @@ class RecordingCamera:
         if not path.is_file():
             raise CameraError(f"there is no recording {path}")
         self.name = f"Recording {path.name}"
-        self._stopped = rs.playback_status.stopped
-        self._pipeline = rs.pipeline()
-        self._is_open = False
-        self._last_index = -1
-        config = rs.config()
+        self._depth: _Playback | None = None
+        self._color: _ColorTrack | None = None
         try:
-            config.enable_device_from_file(str(path), repeat_playback=False)
-            device = config.resolve(rs.pipeline_wrapper(self._pipeline)).get_device()
-            self._playback = device.as_playback()
-            self._playback.set_real_time(real_time)  # before it starts, or the first frames go by
-            profile = self._pipeline.start(config)
-            self._is_open = True
-            depth = profile.get_stream(rs.stream.depth)
+            self._depth = _Playback(rs, path, rs.stream.depth, real_time)
+            color = self._depth.recorded_profile(rs.stream.color)
+            if color is not None:
+                T_C_D = _extrinsics(self._depth.profile, color)
+                self._color = _ColorTrack(_Playback(rs, path, rs.stream.color, real_time), T_C_D)
         except RuntimeError as error:
             self.close()
             raise CameraError(
                 f"{path} cannot be played as a RealSense recording with depth: {error}"
             ) from error
-        self.depth_intrinsics = _intrinsics(depth)
+        self.depth_intrinsics = _intrinsics(self._depth.profile)
 
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame with depth; see `Camera.read`."""
-        deadline_s = time.monotonic() + timeout_s
-        while self._is_open:
-            ended = self._playback.current_status() == self._stopped
-            arrived, frames = self._pipeline.try_wait_for_frames(_POLL_MS)
-            depth = frames.get_depth_frame() if arrived else None
-            # The syncer may give one depth frame again with the next colour.
-            if depth and depth.get_frame_number() != self._last_index:
-                self._last_index = depth.get_frame_number()
-                return frame_from(frames)
-            if ended and not arrived:
-                break
-            if time.monotonic() > deadline_s:
-                raise CameraTimeoutError(f"{self.name}: no frame for {timeout_s:g} s")
-        raise CameraEndError(f"{self.name} has ended")
+        if self._depth is None:
+            raise CameraEndError(f"{self.name} is closed")
+        depth = self._depth.read(timeout_s).get_depth_frame()
+        frame = Frame(
+            index=depth.get_frame_number(),
+            t_camera_ns=round(depth.get_timestamp() * 1e6),
+            t_host_ns=time.monotonic_ns(),
+            depth=np.array(depth.get_data(), np.uint16),
+            depth_scale_m=depth.get_units(),
+            depth_intrinsics=self.depth_intrinsics,
+        )
+        return frame if self._color is None else self._color.add_to(frame, depth)
 
     def close(self) -> None:
         """Stop the playback; safe to call twice."""
-        if self._is_open:
-            self._is_open = False
-            self._pipeline.stop()
+        if self._color is not None:
+            self._color.playback.close()
+        if self._depth is not None:
+            self._depth.close()
+        self._depth = self._color = None
 
     def __enter__(self) -> Self:
         return self
@@ -100,27 +100,89 @@ class RecordingCamera:
         self.close()
 
 
-def frame_from(frames: Any) -> Frame:
-    """Copy a librealsense frame set with depth, and perhaps colour, into a frame.
+class _Playback:
+    """One stream of a recording: librealsense's pairing of several loses frames under load."""
 
-    Depth is taken as it is, not aligned to colour. Colour more than its period apart from the
-    depth, or in a format that is not colour, is left out.
-    """
-    depth = frames.get_depth_frame()
-    color = frames.get_color_frame()
-    image = _rgb(color) if color and _is_pair(depth, color) else None
-    profile = color.profile if image is not None else None
-    return Frame(
-        index=depth.get_frame_number(),
-        t_camera_ns=round(depth.get_timestamp() * 1e6),
-        t_host_ns=time.monotonic_ns(),
-        depth=np.array(depth.get_data(), np.uint16),
-        depth_scale_m=depth.get_units(),
-        depth_intrinsics=_intrinsics(depth.profile),
-        color=image,
-        color_intrinsics=_intrinsics(profile) if profile else None,
-        T_C_D=_extrinsics(depth.profile, profile) if profile else np.eye(4),
-    )
+    def __init__(self, rs: Any, path: Path, stream: Any, real_time: bool) -> None:
+        self._name = path.name
+        self._stopped = rs.playback_status.stopped
+        self._pipeline = rs.pipeline()
+        config = rs.config()
+        config.enable_device_from_file(str(path), repeat_playback=False)
+        config.enable_stream(stream)
+        self._device = config.resolve(rs.pipeline_wrapper(self._pipeline)).get_device()
+        self._playback = self._device.as_playback()
+        self._playback.set_real_time(real_time)  # before it starts, or the first frames go by
+        self.profile = self._pipeline.start(config).get_stream(stream)
+
+    def recorded_profile(self, stream: Any) -> Any | None:
+        """Return the profile of any stream in the recording."""
+        for sensor in self._device.query_sensors():
+            for profile in sensor.get_stream_profiles():
+                if profile.stream_type() == stream:
+                    return profile
+        return None
+
+    def read(self, timeout_s: float) -> Any:
+        """Return the next frame set, of one frame."""
+        deadline_s = time.monotonic() + timeout_s
+        while True:
+            ended = self._playback.current_status() == self._stopped
+            arrived, frames = self._pipeline.try_wait_for_frames(_POLL_MS)
+            if arrived:
+                return frames
+            if ended:
+                raise CameraEndError(f"recording {self._name} has ended")
+            if time.monotonic() > deadline_s:
+                raise CameraTimeoutError(f"recording {self._name}: no frame for {timeout_s:g} s")
+
+    def close(self) -> None:
+        """Stop the pipeline."""
+        self._pipeline.stop()
+
+
+class _ColorTrack:
+    """The colour images of a recording, each found by its time."""
+
+    def __init__(self, playback: _Playback, T_C_D: Float64) -> None:
+        self.playback = playback
+        self._T_C_D = T_C_D
+        self._period_ms = 1000.0 / playback.profile.fps()
+        self._around: list[Any] = []  # the last image before the depth, and the first after
+        self._ended = False
+
+    def add_to(self, frame: Frame, depth: Any) -> Frame:
+        """Return a frame with the colour nearest in time, if there is any."""
+        color = self._nearest(depth)
+        image = None if color is None else _rgb(color)
+        if color is None or image is None:
+            return frame
+        return replace(
+            frame, color=image, color_intrinsics=_intrinsics(color.profile), T_C_D=self._T_C_D
+        )
+
+    def _nearest(self, depth: Any) -> Any | None:
+        """Return the colour nearest in time within its period, if their clock is the same."""
+        t_ms, clock = depth.get_timestamp(), depth.get_frame_timestamp_domain()
+        self._advance(t_ms)
+        candidates = [
+            (abs(color.get_timestamp() - t_ms), i)
+            for i, color in enumerate(self._around)
+            if color.get_frame_timestamp_domain() == clock
+        ]
+        apart_ms, i = min(candidates, default=(math.inf, 0))
+        return self._around[i] if apart_ms <= self._period_ms else None
+
+    def _advance(self, t_ms: float) -> None:
+        while not self._ended and (not self._around or self._around[-1].get_timestamp() < t_ms):
+            try:
+                color = self.playback.read(_COLOR_TIMEOUT_S).get_color_frame()
+            except CameraTimeoutError:
+                return
+            except CameraEndError:
+                self._ended = True
+                return
+            self._around = [*self._around[-1:], color]
 
 
 def record_db3(path: Path, frames: Iterable[Frame]) -> int:
@@ -288,12 +350,6 @@ def _rs_extrinsics(rs: Any, T_target_source: Float64) -> Any:
     extrinsics.rotation = T_target_source[:3, :3].T.ravel().tolist()
     extrinsics.translation = T_target_source[:3, 3].tolist()
     return extrinsics
-
-
-def _is_pair(depth: Any, color: Any) -> bool:
-    apart_ms = abs(depth.get_timestamp() - color.get_timestamp())
-    one_clock = depth.get_frame_timestamp_domain() == color.get_frame_timestamp_domain()
-    return not one_clock or apart_ms <= 1000.0 / color.profile.fps()
 
 
 def _rgb(color: Any) -> UInt8 | None:
