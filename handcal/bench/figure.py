@@ -1,0 +1,42 @@
+"""A measured figure beside its target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One measured number.
+
+    Attributes
+    ----------
+    what : str
+    value : float
+    unit : str
+        Empty for a ratio.
+    at_least, at_most : float or None
+        The target; None where there is none on that side.
+    """
+
+    what: str
+    value: float
+    unit: str
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what was measured, the target as text, and whether it is met: None without one."""
+        bounds = []
+        if self.at_least is not None:
+            bounds.append((f"≥ {self.at_least:g}", self.value >= self.at_least))
+        if self.at_most is not None:
+            bounds.append((f"≤ {self.at_most:g}", self.value <= self.at_most))
+        return {
+            "what": self.what,
+            "value": self.value,
+            "unit": self.unit,
+            "target": " and ".join(text for text, _ in bounds),
+            "met": all(met for _, met in bounds) if bounds else None,
+        }

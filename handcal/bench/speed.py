@@ -1,0 +1,128 @@
+"""How long the steps take that a person waits for, or that run at camera rate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+from handcal.bench.figure import Figure
+from handcal.bench.settings import BenchSettings
+from handcal.bench.trials import Measured, Progress, trial_hand
+from handcal.bench.wearer import overlay_by_eye
+from handcal.camera.synthetic import SyntheticCamera
+from handcal.geometry import rigid
+from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.register.guard import RotationGuard, rotation_between
+from handcal.register.solve import solve_alignment
+from handcal.rig.example import example_rig
+from handcal.sim.render import World
+from handcal.sim.room import make_room
+from handcal.sim.scene import SceneState
+from handcal.types import EYES, Alignment, Float64
+
+Input = TypeVar("Input")
+
+_SIGMA_M = 0.001
+_SHIFT_M = 0.005
+_PALM_H_M = np.array([0.0, 0.09, 0.5])
+_ICP_REACH_M = 0.05
+_SPEED_UP = 30.0
+_SOLVE_MS, _GUARD_MS, _SEGMENT_MS = 100.0, 10.0, 6.0
+
+
+def measure_speed(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure segmentation, registration and solving, one after the other in one thread."""
+    trials = range(settings.paper_repeats)
+    alignments = [_noisy_alignment(trial, settings.points) for trial in trials]
+    figures = _segmentation(settings.repeats)
+    progress(0.1)
+    figures += _registration(alignments, settings.repeats)
+    progress(0.2)
+    figures += _solving(alignments, settings.repeats)
+    progress(1.0)
+    return Measured(figures, {"points": settings.points, "alignments": len(alignments)})
+
+
+def _noisy_alignment(trial: int, points: int) -> Alignment:
+    rng = np.random.default_rng(trial)
+    true_shift_m = {eye: rng.uniform(-_SHIFT_M, _SHIFT_M, 3) for eye in EYES}
+    hand, rig = trial_hand(trial), example_rig()
+    return overlay_by_eye(rng, hand, rig, true_shift_m, points, _SIGMA_M)
+
+
+def _segmentation(repeats: int) -> list[Figure]:
+    """Time the segmentation of one simulated frame, 1280x720."""
+    T_W_D, T_W_hand = example_rig().T_H_D, rigid(translation_m=_PALM_H_M)
+    world = World(trial_hand(0), make_room(0))
+    with SyntheticCamera(world, lambda: SceneState(0, T_W_D, T_W_hand)) as camera:
+        frame = camera.read()
+    segmenting = SegmentSettings()
+    roi_px = segment_hand(frame, segmenting).box_px
+    with_roi_ms = _median_ms(lambda f: segment_hand(f, segmenting, roi_px), [frame] * repeats)
+    alone_ms = _median_ms(lambda f: segment_hand(f, segmenting), [frame] * repeats)
+    return [
+        Figure("segmentation of 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
+        Figure("segmentation of 1280x720, no ROI", alone_ms, "ms"),
+    ]
+
+
+def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
+    """Time the guard, and a whole registration against Open3D's, where that is installed."""
+    guards = [(RotationGuard(a.cursor_m, a.cursor_is_cut), a) for a in alignments]
+    guard_ms = _median_ms(lambda g: g[0].rotation(g[1].hand_m, g[1].hand_is_cut), guards * repeats)
+    clouds = [(a.cursor_m, a.hand_m) for a in alignments]
+    own_ms = _median_ms(lambda pair: rotation_between(*pair), clouds * repeats)
+    figures = [
+        Figure("guard update", guard_ms, "ms", at_most=_GUARD_MS),
+        Figure("rotation_between", own_ms, "ms"),
+    ]
+    if (icp := _open3d_icp()) is None:
+        return figures
+    icp_ms = _median_ms(icp, clouds * repeats)
+    return [
+        *figures,
+        Figure("Open3D's point-to-point ICP, same clouds", icp_ms, "ms"),
+        Figure("rotation_between / Open3D's ICP", own_ms / icp_ms, "", at_most=1.0),
+    ]
+
+
+def _open3d_icp() -> Callable[[tuple[Float64, Float64]], object] | None:
+    """Return Open3D's ICP with its defaults, from two clouds; None if it is not installed."""
+    try:
+        import open3d as o3d
+    except ImportError:
+        return None
+
+    def cloud(points_m: Float64) -> o3d.geometry.PointCloud:
+        return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.array(points_m)))
+
+    def register(clouds: tuple[Float64, Float64]) -> object:
+        cursor, hand = map(cloud, clouds)
+        return o3d.pipelines.registration.registration_icp(cursor, hand, _ICP_REACH_M)
+
+    return register
+
+
+def _solving(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
+    """Time solving both eyes, by the default and as published, on the same alignments."""
+    rig = example_rig()
+    consistent_ms = _median_ms(lambda a: solve_alignment(a, rig), [*alignments] * repeats)
+    paper_ms = _median_ms(lambda a: solve_alignment(a, rig, "paper"), alignments)
+    return [
+        Figure("solve both eyes", consistent_ms, "ms", at_most=_SOLVE_MS),
+        Figure("solve both eyes, paper", paper_ms, "ms"),
+        Figure("solve both eyes: paper / consistent", paper_ms / consistent_ms, "", _SPEED_UP),
+    ]
+
+
+def _median_ms(action: Callable[[Input], object], inputs: Sequence[Input]) -> float:
+    """Return the median duration of an action over its inputs; one cold first run is no matter."""
+    durations_s = []
+    for value in inputs:
+        start_s = perf_counter()
+        action(value)
+        durations_s.append(perf_counter() - start_s)
+    return 1e3 * float(np.median(durations_s))
