@@ -160,10 +160,10 @@ def headset(arguments: argparse.Namespace) -> None:
 
 def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, each beside its target and a baseline of the same run."""
-    from handcal.bench import BenchSettings, bench_table, run_bench
+    from handcal.bench import QUICK, BenchSettings, bench_table, run_bench
 
     with _progress() as report:
-        result = run_bench(BenchSettings(quick=arguments.quick), report)
+        result = run_bench(QUICK if arguments.quick else BenchSettings(), report)
     _save(arguments.json, result)
     table = _table("what", "measured", "target", "met")
     for row in bench_table(result):
