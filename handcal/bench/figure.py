@@ -37,6 +37,6 @@ class Figure:
             "what": self.what,
             "value": self.value,
             "unit": self.unit,
-            "target": " and ".join(text for text, _ in bounds),
+            "target": ", ".join(text for text, _ in bounds),
             "met": all(met for _, met in bounds) if bounds else None,
         }

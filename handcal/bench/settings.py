@@ -19,8 +19,8 @@ class BenchSettings:
         The same, for clouds that are cut differently; 0 among them.
     trials : int
         Alignments at each angle, for the methods that are quick.
-    paper_trials : int
-        Of these, the ones that ``paper`` solves too, at some seconds each.
+    slow_trials : int
+        Of these, the ones that ``paper`` and ``linear`` solve too, ``paper`` at some seconds each.
     covariance_trials : int
         Alignments that the covariance is judged by.
     repeats : int
@@ -33,7 +33,7 @@ class BenchSettings:
     angles_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 20.0)
     cut_angles_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0)
     trials: int = 40
-    paper_trials: int = 3
+    slow_trials: int = 3
     covariance_trials: int = 200
     repeats: int = 25
     paper_repeats: int = 3
@@ -44,7 +44,7 @@ QUICK = BenchSettings(
     angles_deg=(0.0, 9.0),
     cut_angles_deg=(0.0, 9.0),
     trials=2,
-    paper_trials=1,
+    slow_trials=1,
     covariance_trials=10,
     repeats=3,
     paper_repeats=1,

@@ -64,8 +64,8 @@ def _segmentation(repeats: int) -> list[Figure]:
     with_roi_ms = _median_ms(lambda f: segment_hand(f, segmenting, roi_px), [frame] * repeats)
     alone_ms = _median_ms(lambda f: segment_hand(f, segmenting), [frame] * repeats)
     return [
-        Figure("segmentation of 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
-        Figure("segmentation of 1280x720, no ROI", alone_ms, "ms"),
+        Figure("segmentation, 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
+        Figure("segmentation, 1280x720, no ROI", alone_ms, "ms"),
     ]
 
 
@@ -84,7 +84,7 @@ def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]
     icp_ms = _median_ms(icp, clouds * repeats)
     return [
         *figures,
-        Figure("Open3D's point-to-point ICP, same clouds", icp_ms, "ms"),
+        Figure("Open3D's ICP, same clouds", icp_ms, "ms"),
         Figure("rotation_between / Open3D's ICP", own_ms / icp_ms, "", at_most=1.0),
     ]
 

@@ -11,8 +11,8 @@ from handcal.bench.figure import Figure
         (30.5, None, "≥ 30.5", False),
         (None, 30.0, "≤ 30", True),
         (None, 29.0, "≤ 29", False),
-        (2.4, 36.0, "≥ 2.4 and ≤ 36", True),
-        (2.4, 3.6, "≥ 2.4 and ≤ 3.6", False),
+        (2.4, 36.0, "≥ 2.4, ≤ 36", True),
+        (2.4, 3.6, "≥ 2.4, ≤ 3.6", False),
     ],
 )
 def test_a_figure_is_judged_by_its_target(

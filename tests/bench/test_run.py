@@ -45,8 +45,8 @@ def test_the_table_has_a_row_for_every_figure(results: dict[str, Any]) -> None:
 
 def test_the_paper_misses_the_hands_depth_over_the_displays(results: dict[str, Any]) -> None:
     # A hand 0.5 to 0.6 m away, a display at 2 m.
-    assert 25.0 < _value(results, "it misses") < 31.0
-    assert _value(results, "bias of φ3") < 1.0
+    assert 25.0 < _value(results, "paper misses") < 31.0
+    assert _value(results, "bias at φ3") < 1.0
 
 
 def test_the_paper_is_the_slowest(results: dict[str, Any]) -> None:
