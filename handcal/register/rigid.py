@@ -82,12 +82,12 @@ def register_rigid(
         From `describe_surface`.
     settings : RigidSettings
     T_target_source : (4, 4) float64, optional
-        Where to start; by default the medians are laid on one another.
+        Where to start; by default the means are laid on one another.
     """
     if T_target_source is None:
-        offset_m = np.median(target.points_m, axis=0) - np.median(source.points_m, axis=0)
+        offset_m = target.points_m.mean(axis=0) - source.points_m.mean(axis=0)
         T_target_source = rigid(translation_m=offset_m)
-    reach_m = np.sqrt(np.max(np.var(source.points_m, axis=0)))
+    reach_m = np.sqrt(source.points_m.var(axis=0).sum())
     history: list[float] = []
     information = np.eye(6)
     reason = None
@@ -118,14 +118,9 @@ def _step(
     T_source_target = invert(T_target_source)
     centre = moved.mean(axis=0)
 
-    outline, partner, distance_m = _outline_pairs(source, target, moved, T_source_target)
-    toward = outward[outline] + target.outward[partner]
-    agreement = 0.5 * np.linalg.norm(toward, axis=1, keepdims=True)
-    toward /= np.maximum(2.0 * agreement, 1e-9)
-    scale_m = max(settings.outlier_m, 3.0 * float(np.median(distance_m)) if len(outline) else 0.0)
-    weight = np.concatenate([source.outline_weight, target.outline_weight])
-    weight *= agreement[:, 0] ** 4 / (1.0 + (distance_m / scale_m) ** 2) ** 2
-
+    outline, partner, toward, weight = _outline_pairs(
+        source, target, moved, T_source_target, outward, settings
+    )
     inner, inner_partner, normal = _interior_pairs(
         source, target, moved, T_source_target, R, settings
     )
@@ -147,15 +142,30 @@ def _step(
 
 
 def _outline_pairs(
-    source: Surface, target: Surface, moved: Float64, T_source_target: Float64
-) -> tuple[Indices, Indices, Float64]:
-    """Pairs of outline points sought from both sides: source and target indices, distances."""
+    source: Surface,
+    target: Surface,
+    moved: Float64,
+    T_source_target: Float64,
+    outward: Float64,
+    settings: RigidSettings,
+) -> tuple[Indices, Indices, Float64, Float64]:
+    """Pairs of outline points sought from both sides: both indices, mean outward, weights."""
+    if not (len(source.outline) and len(target.outline)):
+        none = np.empty(0, dtype=np.intp)
+        return none, none, np.empty((0, 3)), np.empty(0)
     d_1, i_1 = nearest(target.outline_tree, moved[source.outline])
     back = transform(T_source_target, target.points_m[target.outline])
     d_2, i_2 = nearest(source.outline_tree, back)
     first = np.concatenate([source.outline, source.outline[i_2]])
     second = np.concatenate([target.outline[i_1], target.outline])
-    return first, second, np.concatenate([d_1, d_2])
+    distance_m = np.concatenate([d_1, d_2])
+    toward = outward[first] + target.outward[second]
+    agreement = 0.5 * np.linalg.norm(toward, axis=1)
+    toward /= np.maximum(2.0 * agreement, 1e-9)[:, None]
+    scale_m = max(settings.outlier_m, 3.0 * float(np.median(distance_m)))
+    weight = np.concatenate([source.outline_weight, target.outline_weight])
+    weight *= agreement**4 / (1.0 + (distance_m / scale_m) ** 2) ** 2
+    return first, second, toward, weight
 
 
 def _interior_pairs(
