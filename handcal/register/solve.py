@@ -16,6 +16,7 @@ from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Meth
 
 MIN_POINTS = 100
 MAX_POINTS = 2_000_000
+_LEAST_WIDTH_M = 1e-4
 
 
 def solve_eye_shift(
@@ -54,8 +55,10 @@ def solve_eye_shift(
     Raises
     ------
     ValueError
-        For an unknown method, wrong shapes, fewer than 100 points, NaN or infinity, or a
-        distance that is not positive.
+        For an unknown method, wrong shapes, fewer than 100 points, NaN or infinity, points on
+        one line, or a distance that is not positive.
+    HandError
+        If hardly a point lies off the cut edges.
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
@@ -108,6 +111,8 @@ def check_cloud(name: str, points_m: ArrayLike) -> Float64:
         )
     if not np.isfinite(cloud).all():
         raise ValueError(f"{name} contains NaN or infinity")
+    if np.linalg.eigvalsh(np.cov(cloud.T))[1] < _LEAST_WIDTH_M**2:
+        raise ValueError(f"{name} has all its points on one line; a hand's surface is needed")
     return cloud
 
 

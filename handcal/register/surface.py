@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from handcal.errors import HandError
 from handcal.types import Bool, Float64
 
 Indices: TypeAlias = NDArray[np.intp]
@@ -21,6 +22,8 @@ _EDGE_NONE, _EDGE_FULL = 0.45, 0.75
 _CUT_BAND_SPACINGS = 1.5
 # The 4th neighbour lies one spacing off on a grid and 1.09 in a random cloud.
 _SPACING_NEIGHBOUR = 4
+# Points off the cut edges, without which there is nothing to register.
+_LEAST_FREE = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +70,11 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
         True beside a cut edge; None if nothing is known of cuts.
     max_points : int
         The thinning is random with a fixed seed, so that equal input gives equal output.
+
+    Raises
+    ------
+    HandError
+        If hardly a point lies off the cut edges.
     """
     order = np.random.default_rng(0).permutation(len(points_m))
     thinned = points_m[order[:max_points]]
@@ -84,6 +92,10 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
     weight = np.clip((offset_m / radius_m - _EDGE_NONE) / (_EDGE_FULL - _EDGE_NONE), 0.0, 1.0)
     spacing_m = float(np.median(distances_m[:, _SPACING_NEIGHBOUR]))
     near_cut = near_cut_edge(thinned, points_m, is_cut, spacing_m)
+    if np.count_nonzero(~near_cut) < _LEAST_FREE:
+        raise HandError(
+            "all of the hand lies beside cut edges; hold it free, in the middle of view"
+        )
     outline = np.flatnonzero((weight > 0.0) & ~near_cut)
     return Surface(
         points_m=thinned,
