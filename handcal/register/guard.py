@@ -10,11 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from handcal.register.rigid import RigidSettings, register_rigid
 from handcal.register.solve import check_cloud
-from handcal.register.surface import Surface, describe_surface
+from handcal.register.surface import describe_surface
 from handcal.types import Bool, Float64
 
-# Enough for half a degree in a few milliseconds.
-_SETTINGS = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
+# Half a degree in a few milliseconds, and a quarter of one in thrice the time.
+_LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
+_ONCE = RigidSettings(max_points=1000, max_interior=300, tolerance_m=1e-4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,17 +38,31 @@ class RotationGuard:
     ----------
     cursor_m : (N, 3) float64
     cursor_cut : (N,) bool or None
+    settings : RigidSettings
+        The default is quick enough for every frame.
     """
 
-    def __init__(self, cursor_m: Float64, cursor_cut: Bool | None = None) -> None:
-        self._cursor = _describe(cursor_m, cursor_cut)
+    def __init__(
+        self,
+        cursor_m: Float64,
+        cursor_cut: Bool | None = None,
+        settings: RigidSettings = _LIVE,
+    ) -> None:
+        self._settings = settings
+        self._cursor = describe_surface(cursor_m, cursor_cut, settings.max_points)
 
     def rotation(self, hand_m: Float64, hand_cut: Bool | None = None) -> Float64:
         """Return the rotation vector from the cursor to the hand, (3,), rad.
 
         Both clouds in the same frame, in whose axes the vector is.
+
+        Raises
+        ------
+        HandError
+            If hardly a point lies off the cut edges.
         """
-        fit = register_rigid(self._cursor, _describe(hand_m, hand_cut), _SETTINGS)
+        hand = describe_surface(hand_m, hand_cut, self._settings.max_points)
+        fit = register_rigid(self._cursor, hand, self._settings)
         return Rotation.from_matrix(fit.T_target_source[:3, :3]).as_rotvec()
 
 
@@ -67,10 +82,7 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
     Raises
     ------
     ValueError
-        For NaN, a wrong shape, or fewer than 100 points.
+        For NaN, a wrong shape, fewer than 100 points, or points on one line.
     """
-    return RotationGuard(check_cloud("cursor_m", cursor_m)).rotation(check_cloud("hand_m", hand_m))
-
-
-def _describe(points_m: Float64, is_cut: Bool | None) -> Surface:
-    return describe_surface(points_m, is_cut, _SETTINGS.max_points)
+    guard = RotationGuard(check_cloud("cursor_m", cursor_m), settings=_ONCE)
+    return guard.rotation(check_cloud("hand_m", hand_m))
