@@ -21,10 +21,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from handcal.alignment_file import decode_alignment, encode_alignment
+from handcal.closable import Closable
 from handcal.errors import FileError
 from handcal.files import make_folder, read_json, read_limited, write_atomic, write_json
 from handcal.lock import FileLock
@@ -89,7 +89,7 @@ class SessionRecord:
     torn_bytes: int
 
 
-class Session:
+class Session(Closable):
     """Writes to an existing session folder, which no other program can write to until `close`.
 
     Whatever a method writes is on the disk when it returns; if it raises FileError, all that was
@@ -224,17 +224,6 @@ class Session:
     def close(self) -> None:
         """Let other programs write to the session; safe to call twice."""
         self._lock.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _append(self, event: str, data: dict[str, Any]) -> None:
         line = _journal_line(self._events + 1, event, data)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import rigid
 from handcal.hand.segment import SegmentSettings
@@ -25,7 +24,7 @@ TURN_RAD = np.array([0.03, -0.05, 0.04])
 SHIFT_M = np.array([0.01, -0.008, 0.015])
 
 
-class FrameList:
+class FrameList(Closable):
     """A camera that gives the frames of a list."""
 
     name = "List"
@@ -42,17 +41,6 @@ class FrameList:
 
     def close(self) -> None:
         pass
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 class DeadCamera(FrameList):

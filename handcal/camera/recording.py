@@ -8,13 +8,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.geometry import rigid
 from handcal.types import Float64, Frame, Intrinsics, UInt8
@@ -26,7 +26,7 @@ _BACKLOG_BYTES = 64 * 2**20
 _DISK_TIMEOUT_S = 10.0
 
 
-class RecordingCamera:
+class RecordingCamera(Closable):
     """Plays a recording back once, depth with colour if it has any; implements `Camera`.
 
     Depth is given as it was recorded, not aligned to colour, with the colour nearest in time.
@@ -87,17 +87,6 @@ class RecordingCamera:
         if self._depth is not None:
             self._depth.close()
         self._depth = self._color = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 class _Playback:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
+from handcal.closable import Closable
 from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import invert, rigid
 from handcal.sim.raster import D415
@@ -47,7 +46,7 @@ class SyntheticSettings:
     sensor: SensorSettings = field(default_factory=SensorSettings)
 
 
-class SyntheticCamera:
+class SyntheticCamera(Closable):
     """Renders the world as a D415 would measure it; implements `Camera`.
 
     Parameters
@@ -137,14 +136,3 @@ class SyntheticCamera:
     def close(self) -> None:
         """Stop; safe to call twice."""
         self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

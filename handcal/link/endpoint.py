@@ -6,12 +6,11 @@ import logging
 import math
 import threading
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import Counter, deque
 from dataclasses import dataclass, field, replace
-from types import TracebackType
-from typing import Self
 
+from handcal.closable import Closable
 from handcal.errors import LinkError
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
@@ -38,7 +37,7 @@ class Channel:
     inbox: Inbox = field(default_factory=Inbox)
 
 
-class Endpoint(ABC):
+class Endpoint(Closable):
     """One end of the link; its thread runs from `_start` to `close`.
 
     Every method is safe to call from any thread. Names with an underscore are for the two
@@ -128,17 +127,6 @@ class Endpoint(ABC):
                 self._send(pb.Envelope(bye=pb.Bye()))
         self._thread.join()
         self._transport.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     @abstractmethod
     def _greet(self, envelope: pb.Envelope, address: Address) -> None:

@@ -12,11 +12,10 @@ import struct
 import time
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
+from handcal.closable import Closable
 from handcal.types import Float64, _freeze
 
 _MAGIC = b"hcS1"
@@ -75,7 +74,7 @@ def _is_rigid(T: Float64) -> bool:
     return bool(np.allclose(R @ R.T, np.eye(3), atol=_RIGID_TOLERANCE) and np.linalg.det(R) > 0)
 
 
-class ScenePublisher:
+class ScenePublisher(Closable):
     """Sends states to a receiver on this machine."""
 
     def __init__(self, port: int) -> None:
@@ -91,19 +90,8 @@ class ScenePublisher:
         """Close the socket; safe to call twice."""
         self._socket.close()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-
-class SceneReceiver:
+class SceneReceiver(Closable):
     """Keeps the newest state that a publisher sent.
 
     Parameters
@@ -142,14 +130,3 @@ class SceneReceiver:
     def close(self) -> None:
         """Close the socket; safe to call twice."""
         self._socket.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
