@@ -19,6 +19,8 @@ from handcal.types import Float64
 MAX_ITERATIONS = 800
 # The paper stops when the error falls by less than this factor from one iteration to the next.
 PAPER_RATIO = 0.9999
+# Where pairs coincide to a nanometre the error is rounding, whose ratio tells nothing.
+_EXACT_M2 = 1e-18
 # The three-row form and ICP reach the state where no pair changes any more.
 TOLERANCE_M = 1e-7
 
@@ -53,7 +55,9 @@ def solve_paper(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterat
     while True:
         partner, error_m2 = _pair(tree, cursor_m, moved)
         history.append(error_m2)
-        if error_m2 == 0.0 or (len(history) > 1 and 1.0 > history[-1] / history[-2] > PAPER_RATIO):
+        if error_m2 < _EXACT_M2:
+            return _ended(shift_m, moved, partner, history, "pairs coincide")
+        if len(history) > 1 and 1.0 > history[-1] / history[-2] > PAPER_RATIO:
             return _ended(shift_m, moved, partner, history, "error ratio above 0.9999")
         if len(history) == MAX_ITERATIONS:
             return _ended(shift_m, moved, partner, history, None)
