@@ -69,24 +69,18 @@ class RigidResult:
 
 
 def register_rigid(
-    source: Surface,
-    target: Surface,
-    settings: RigidSettings = RigidSettings(),
-    T_target_source: Float64 | None = None,
+    source: Surface, target: Surface, settings: RigidSettings = RigidSettings()
 ) -> RigidResult:
-    """Register `source` to `target`.
+    """Register `source` to `target`, from where their means lie on one another.
 
     Parameters
     ----------
     source, target : Surface
         From `describe_surface`.
     settings : RigidSettings
-    T_target_source : (4, 4) float64, optional
-        Where to start; by default the means are laid on one another.
     """
-    if T_target_source is None:
-        offset_m = target.points_m.mean(axis=0) - source.points_m.mean(axis=0)
-        T_target_source = rigid(translation_m=offset_m)
+    offset_m = target.points_m.mean(axis=0) - source.points_m.mean(axis=0)
+    T_target_source = rigid(translation_m=offset_m)
     reach_m = np.sqrt(source.points_m.var(axis=0).sum())
     history: list[float] = []
     information = np.eye(6)
