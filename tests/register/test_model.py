@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.display import update_matrix
+from handcal.geometry import project, transform
+from handcal.register.model import design, drawn, fit_shift, predict
+
+SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3).map(np.array)
+DISTANCES = st.floats(1.0, 5.0)
+HAND_M = np.random.default_rng(0).uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.6], (30, 3))
+both_factors = pytest.mark.parametrize("exact", [False, True])
+
+
+@both_factors
+@given(shift_m=SHIFTS, distance_m=DISTANCES)
+def test_known_pairs_give_the_shift(exact: bool, shift_m: np.ndarray, distance_m: float) -> None:
+    cursor_m = predict(HAND_M, shift_m, distance_m, exact=exact)
+    found_m = fit_shift(cursor_m, HAND_M, distance_m, exact=exact)
+    np.testing.assert_allclose(found_m, shift_m, atol=1e-9)
+
+
+@both_factors
+@given(shift_m=SHIFTS, distance_m=DISTANCES)
+def test_rows_hold_for_what_is_predicted(
+    exact: bool, shift_m: np.ndarray, distance_m: float
+) -> None:
+    cursor_m = predict(HAND_M, shift_m, distance_m, exact=exact)
+    rows = design(cursor_m, HAND_M, distance_m, exact=exact)
+    np.testing.assert_allclose(rows @ shift_m, cursor_m - HAND_M, atol=1e-12)
+
+
+@given(shift_m=SHIFTS, distance_m=DISTANCES)
+def test_cursor_and_hand_fall_on_one_pixel(shift_m: np.ndarray, distance_m: float) -> None:
+    # The offline model draws the cursor; the eye at φ sees the hand. Either factor, one pixel.
+    offline, moved = np.eye(3, 4), update_matrix(shift_m, distance_m)[:3]
+    seen = project(moved, HAND_M)
+    for exact in (False, True):
+        cursor_m = predict(HAND_M, shift_m, distance_m, exact=exact)
+        np.testing.assert_allclose(project(offline, cursor_m), seen, atol=1e-12)
+
+
+@given(shift_m=SHIFTS, distance_m=DISTANCES)
+def test_the_exact_factor_keeps_the_hands_size(shift_m: np.ndarray, distance_m: float) -> None:
+    facing_m = HAND_M * [1, 1, 0] + [0, 0, 0.5]
+    cursor_m = predict(facing_m, shift_m, distance_m, exact=True)
+    np.testing.assert_allclose(
+        cursor_m - cursor_m.mean(axis=0), facing_m - facing_m.mean(axis=0), atol=1e-12
+    )
+
+
+@given(drawn_m=SHIFTS)
+def test_a_cursor_drawn_with_another_shift_looks_like_one_drawn_offline(
+    drawn_m: np.ndarray,
+) -> None:
+    cursor_m = HAND_M
+    pixels = project(update_matrix(drawn_m, 2.0)[:3], cursor_m)
+    as_offline_m = transform(drawn(drawn_m, 2.0), cursor_m)
+    np.testing.assert_allclose(project(np.eye(3, 4), as_offline_m), pixels, atol=1e-12)
+    # A hand where the cursor is needs the very shift that the cursor is drawn with.
+    found_m = fit_shift(as_offline_m, cursor_m, 2.0, exact=True)
+    np.testing.assert_allclose(found_m, drawn_m, atol=1e-12)
+
+
+def test_fit_is_the_least_squares_one() -> None:
+    rng = np.random.default_rng(1)
+    shift_m = np.array([0.004, -0.002, 0.006])
+    cursor_m = predict(HAND_M, shift_m, 2.0, exact=True) + rng.normal(0.0, 0.002, HAND_M.shape)
+    found_m = fit_shift(cursor_m, HAND_M, 2.0, exact=True)
+    A = design(cursor_m, HAND_M, 2.0, exact=True).reshape(-1, 3)
+    expected = np.linalg.lstsq(A, (cursor_m - HAND_M).ravel())[0]
+    np.testing.assert_allclose(found_m, expected, atol=1e-12)

@@ -1,0 +1,125 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handcal.bench.trials import trial_alignment
+from handcal.geometry import invert, rigid, transform
+from handcal.register.rcicp import best_rigid
+from handcal.register.rigid import RigidSettings, register_rigid
+from handcal.register.surface import Surface, describe_surface
+from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
+from handcal.types import Float64
+
+COUNT = 1500
+# Between clouds of the same points; a hand turned and moved as hands are.
+T_TARGET_SOURCE = rigid([0.1, -0.15, 0.2], [0.02, -0.03, 0.04])
+
+
+@pytest.fixture(scope="module")
+def made() -> SimulatedAlignment:
+    making = AlignmentSettings(
+        count=COUNT,
+        resample=True,
+        depth_sigma_m=0.001,
+        cursor_forearm_m=0.02,
+        hand_forearm_m=0.06,
+    )
+    return trial_alignment(1, 7.0, making)
+
+
+@pytest.fixture(scope="module")
+def hand(made: SimulatedAlignment) -> Surface:
+    return describe_surface(made.hand_m, made.hand_cut, COUNT)
+
+
+@pytest.fixture(scope="module")
+def cursor(made: SimulatedAlignment) -> Surface:
+    return describe_surface(made.cursor_m, made.cursor_cut, COUNT)
+
+
+def _miss(T: Float64, T_true: Float64, centre_m: Float64) -> tuple[float, float]:
+    """Return by how far a point and the rotation are missed, in mm and degrees."""
+    away_m = transform(T, centre_m[None]) - transform(T_true, centre_m[None])
+    turned = Rotation.from_matrix(T[:3, :3] @ T_true[:3, :3].T)
+    return 1e3 * float(np.linalg.norm(away_m)), float(np.degrees(turned.magnitude()))
+
+
+def test_the_same_points_are_found_again(made: SimulatedAlignment, hand: Surface) -> None:
+    order = np.random.default_rng(0).permutation(COUNT)
+    target_m = transform(T_TARGET_SOURCE, made.hand_m[order])
+    target = describe_surface(target_m, made.hand_cut[order], COUNT)
+    result = register_rigid(hand, target)
+    miss_mm, miss_deg = _miss(result.T_target_source, T_TARGET_SOURCE, made.hand_m.mean(axis=0))
+    assert miss_mm < 0.1
+    assert miss_deg < 0.05
+    assert result.converged
+    assert result.stop_reason == "step below 30 µm"
+    assert result.history_m2[-1] < 1e-4 * result.history_m2[0]
+
+
+def test_other_samples_cuts_and_noise(
+    made: SimulatedAlignment, hand: Surface, cursor: Surface
+) -> None:
+    T_W_E = invert(made.T_E_W)
+    T_true = best_rigid(transform(T_W_E, made.known_hand_m), transform(T_W_E, made.known_cursor_m))
+    result = register_rigid(hand, cursor)
+    miss_mm, miss_deg = _miss(result.T_target_source, T_true, made.hand_m.mean(axis=0))
+    assert miss_mm < 1.0
+    assert miss_deg < 1.0
+    # The noise, and what sampling adds.
+    assert 0.001 < np.sqrt(result.history_m2[-1]) < 0.002
+
+
+def test_there_and_back_is_nowhere(
+    made: SimulatedAlignment, hand: Surface, cursor: Surface
+) -> None:
+    there = register_rigid(hand, cursor).T_target_source
+    back = register_rigid(cursor, hand).T_target_source
+    miss_mm, miss_deg = _miss(back @ there, np.eye(4), made.hand_m.mean(axis=0))
+    assert miss_mm < 0.3
+    assert miss_deg < 0.3
+
+
+def test_the_axes_of_the_world_do_not_matter(
+    made: SimulatedAlignment, hand: Surface, cursor: Surface
+) -> None:
+    T = rigid([0.4, -2.0, 1.0], [3.0, -1.0, 2.0])
+    again = register_rigid(
+        describe_surface(transform(T, made.hand_m), made.hand_cut, COUNT),
+        describe_surface(transform(T, made.cursor_m), made.cursor_cut, COUNT),
+    )
+    once = register_rigid(hand, cursor)
+    np.testing.assert_allclose(
+        again.T_target_source, T @ once.T_target_source @ invert(T), atol=1e-9
+    )
+    np.testing.assert_allclose(again.history_m2, once.history_m2, rtol=1e-6)
+
+
+def test_information_is_that_of_a_rigid_motion(hand: Surface, cursor: Surface) -> None:
+    information = register_rigid(hand, cursor).information
+    np.testing.assert_allclose(information, information.T)
+    # Each pair weighs at most 1, and moves by as much as the hand does.
+    pairs = 2 * RigidSettings().max_interior + len(hand.outline) + len(cursor.outline)
+    assert np.linalg.eigvalsh(information)[0] > 0.0
+    assert 0.2 * pairs < np.trace(information[3:, 3:]) <= pairs
+
+
+def test_too_few_iterations_are_told(hand: Surface, cursor: Surface) -> None:
+    result = register_rigid(hand, cursor, replace(RigidSettings(), max_iterations=2))
+    assert not result.converged
+    assert result.stop_reason == "limit of 2 iterations"
+    assert len(result.history_m2) == 2
+
+
+def test_an_outline_wholly_cut_leaves_the_inside(made: SimulatedAlignment, hand: Surface) -> None:
+    cut = np.zeros(COUNT, dtype=np.bool_)
+    cut[np.isin(made.hand_m, hand.points_m[hand.outline]).all(axis=1)] = True
+    inside = describe_surface(made.hand_m, cut | made.hand_cut, COUNT)
+    assert len(inside.outline) < 0.1 * len(hand.outline)
+    without = replace(inside, outline=inside.outline[:0], outline_weight=inside.outline_weight[:0])
+    for pair in ((without, hand), (hand, without)):
+        result = register_rigid(*pair)
+        miss_mm, _ = _miss(result.T_target_source, np.eye(4), made.hand_m.mean(axis=0))
+        assert miss_mm < 1.0
