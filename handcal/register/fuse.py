@@ -3,9 +3,10 @@
 An alignment gives one hand displacement: three numbers. With one eye open they are that eye's φ.
 With both open the wearer puts the hand where the errors of both eyes balance: by least squares in
 the image, at ``φ_seen = W_left φ_left + W_right φ_right`` with ``W_e = (N_left + N_right)^-1 N_e``
-and N_e the normal matrix of eye e's pixels for a moved hand. So six unknowns meet three numbers,
-and only a prior on how far two eyes can differ closes the gap. Everything is Gaussian, so this
-is one linear system; several alignments add up in it, weighed by their covariances.
+and N_e the normal matrix, in common axes, of the cursor's pixels in eye e for a moved hand. So six
+unknowns meet three numbers, and only a prior on how far two eyes can differ closes the gap.
+Everything is Gaussian, so this is one linear system; several alignments add up in it, weighed by
+their covariances.
 """
 
 from __future__ import annotations
@@ -16,8 +17,15 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.geometry import transform
-from handcal.types import EYES, Alignment, Eye, EyeShift, Float64, Rig
+from handcal.display import eye_projection
+from handcal.geometry import project, transform
+from handcal.register.surface import describe_surface
+from handcal.types import EYES, Alignment, Bool, Eye, EyeDisplay, EyeShift, Float64, Rig
+
+# The cursor's outline is sought in this many of its points.
+_OUTLINE_FROM_POINTS = 1500
+# Far less than one point's, so that a cursor beside the display leaves the weights defined.
+_NORMAL_FLOOR = 1e-3
 
 # H (3, 6), what was seen (3,), and its covariance (3, 3).
 Observed: TypeAlias = tuple[Float64, Float64, Float64]
@@ -73,6 +81,8 @@ def fuse_alignments(
     ------
     ValueError
         If there is nothing to fuse.
+    HandError
+        If a cursor lies wholly beside cut edges.
     """
     if not solved:
         raise ValueError("at least one alignment is needed")
@@ -111,33 +121,48 @@ def _combine(
 def _observe(
     alignment: Alignment, shifts: Mapping[Eye, EyeShift], rig: Rig, settings: FuseSettings
 ) -> Observed:
-    """Return H (3, 6), what was seen (3,) and its covariance: seen = H [φ_left; φ_right]."""
+    """Return H (3, 6), what was seen (3,) in W's axes, its covariance: seen = H [φ_left; φ_right].
+
+    The wearer sees the cursor's outline, as far as the display shows it.
+    """
+    surface = describe_surface(alignment.cursor_m, alignment.cursor_is_cut, _OUTLINE_FROM_POINTS)
+    outline_m = surface.points_m[surface.outline]
     normals: dict[Eye, Float64] = {}
     noises: dict[Eye, Float64] = {}
-    for eye in shifts:
-        hand_E = transform(alignment.T_E_W[eye], alignment.hand_m)
-        normals[eye] = _pixel_normal(hand_E)
-        noises[eye] = shifts[eye].covariance_m2 + _wearer_covariance(
-            float(hand_E[:, 2].mean()), rig.eyes[eye].z_C0_S_m, settings
-        )
+    for eye, shift in shifts.items():
+        display, T_E_W = rig.eyes[eye], alignment.T_E_W[eye]
+        R_W_E = T_E_W[:3, :3].T
+        cursor_E = transform(T_E_W, outline_m)
+        shown = _is_shown(cursor_E, display, alignment.drawn_shift_m[eye])
+        normals[eye] = R_W_E @ _pixel_normal(cursor_E[shown]) @ R_W_E.T
+        depth_m = float(transform(T_E_W, alignment.cursor_m)[:, 2].mean())
+        wearer = _wearer_covariance(depth_m, display.z_C0_S_m, settings)
+        noises[eye] = R_W_E @ (shift.covariance_m2 + wearer) @ R_W_E.T
     total = np.sum(list(normals.values()), axis=0)
     H = np.zeros((3, 6))
     seen_m = np.zeros(3)
-    for eye in shifts:
-        weight = np.linalg.solve(total, normals[eye])
+    for eye, shift in shifts.items():
+        weight = np.linalg.solve(total, normals[eye]) @ alignment.T_E_W[eye][:3, :3].T
         H[:, 3 * EYES.index(eye) :][:, :3] = weight
-        seen_m += weight @ shifts[eye].shift_m
+        seen_m += weight @ shift.shift_m
     return H, seen_m, np.mean(list(noises.values()), axis=0)
 
 
-def _pixel_normal(hand_E_m: Float64) -> Float64:
-    """Return Σ JᵀJ (3, 3) of the hand's pixels for its displacement, up to the focal length."""
-    depth = hand_E_m[:, 2]
-    J = np.zeros((len(hand_E_m), 2, 3))
+def _is_shown(points_E_m: Float64, display: EyeDisplay, drawn_shift_m: Float64) -> Bool:
+    """Tell which of (N, 3) points the headset draws within the display."""
+    pixels = project(eye_projection(display, drawn_shift_m), points_E_m)
+    last_px = display.width_px - 0.5, display.height_px - 0.5
+    return np.asarray(((pixels >= -0.5) & (pixels <= last_px)).all(axis=1))
+
+
+def _pixel_normal(points_E_m: Float64) -> Float64:
+    """Return Σ JᵀJ (3, 3) of points' pixels for their displacement, up to the focal length."""
+    depth = points_E_m[:, 2]
+    J = np.zeros((len(points_E_m), 2, 3))
     J[:, 0, 0] = J[:, 1, 1] = 1.0 / depth
-    J[:, :, 2] = -hand_E_m[:, :2] / depth[:, None] ** 2
+    J[:, :, 2] = -points_E_m[:, :2] / depth[:, None] ** 2
     rows = J.reshape(-1, 3)
-    return np.asarray(rows.T @ rows)
+    return np.asarray(rows.T @ rows + _NORMAL_FLOOR * np.eye(3))
 
 
 def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings) -> Float64:
