@@ -1,0 +1,223 @@
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from handcal.bench.trials import trial_hand
+from handcal.display import projection_matrix, view_of_eye
+from handcal.geometry import invert, rigid, transform
+from handcal.register.fuse import FuseSettings, fuse_alignments, with_eye_box
+from handcal.register.solve import solve_alignment
+from handcal.register.surface import describe_surface
+from handcal.rig.example import example_rig
+from handcal.sim.placement import overlay_hand, view_through
+from handcal.sim.raster import visible_points
+from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
+
+RIG = example_rig()
+SETTINGS = FuseSettings()
+# Of the registration, mixed axes.
+_AXES = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+REGISTRATION_M2 = _AXES @ np.diag([0.0003, 0.0005, 0.0010]) ** 2 @ _AXES.T
+DEPTH_M = 0.5
+
+
+def _shift(shift_m: Float64, covariance_m2: Float64 = REGISTRATION_M2) -> EyeShift:
+    return EyeShift(
+        shift_m, covariance_m2, 0.001, np.zeros(5), 0.9, 8, True, "done", np.ones(8), "consistent"
+    )
+
+
+def _flat_hand(eyes: tuple[Eye, ...], T_E_W: Float64) -> Alignment:
+    """A square in the middle of the view of both eyes, as if both were at one place."""
+    x, y = np.meshgrid(np.linspace(-0.05, 0.05, 30), np.linspace(-0.05, 0.05, 30))
+    square_m = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, DEPTH_M)])
+    hand_m = transform(invert(T_E_W), square_m)
+    cut = np.zeros(len(hand_m), dtype=np.bool_)
+    return Alignment(hand_m, hand_m, cut, cut, dict.fromkeys(EYES, T_E_W), eyes, np.zeros(3), 0, 1)
+
+
+BOTH = _flat_hand(EYES, rigid([0.3, -0.2, 1.0], [0.5, 0.1, -0.4]))
+ONE: dict[Eye, Alignment] = {eye: _flat_hand((eye,), np.eye(4)) for eye in EYES}
+
+
+def _prior_m2() -> Float64:
+    """Covariance of [φ_left; φ_right] by the settings: each in its box, both nearly the same."""
+    box = np.eye(6) / SETTINGS.eye_box_sigma_m**2
+    difference = np.hstack([-np.eye(3), np.eye(3)])
+    apart = np.diag(np.array(SETTINGS.eye_difference_sigma_m) ** -2.0)
+    return np.asarray(np.linalg.inv(box + difference.T @ apart @ difference))
+
+
+def _wearer_m2() -> Float64:
+    """How exactly a wearer aligns at half a metre: 3′ across, 0.3 % along, 4/3 of that in φ."""
+    across_m = 4 / 3 * DEPTH_M * np.tan(np.radians(3 / 60))
+    return np.diag([across_m, across_m, 4 / 3 * DEPTH_M * 0.003]) ** 2
+
+
+def _align(
+    rng: np.random.Generator, alignment: Alignment, true_m: Mapping[Eye, Float64]
+) -> tuple[Alignment, dict[Eye, EyeShift]]:
+    """Solve as a wearer would have it who, with both eyes open, balances them: their mean."""
+    seen_m = np.mean([true_m[eye] for eye in alignment.eyes], axis=0)
+    seen_m = seen_m + rng.multivariate_normal(np.zeros(3), REGISTRATION_M2 + _wearer_m2())
+    return alignment, {eye: _shift(seen_m) for eye in alignment.eyes}
+
+
+@pytest.mark.parametrize(
+    "alignments",
+    [[BOTH], [ONE["left"], ONE["right"]], [BOTH, ONE["left"], BOTH, ONE["right"]]],
+    ids=["both", "each", "mixed"],
+)
+def test_estimates_are_unbiased_and_their_covariance_honest(alignments: list[Alignment]) -> None:
+    rng = np.random.default_rng(0)
+    trials = 100
+    errors_m, squares = [], []
+    for _ in range(trials):
+        drawn_m = rng.multivariate_normal(np.zeros(6), _prior_m2())
+        true_m: dict[Eye, Float64] = {"left": drawn_m[:3], "right": drawn_m[3:]}
+        solved = [_align(rng, alignment, true_m) for alignment in alignments]
+        for eye, fused in fuse_alignments(solved, RIG, SETTINGS).items():
+            error_m = fused.shift_m - true_m[eye]
+            errors_m.append(error_m)
+            squares.append(error_m @ np.linalg.solve(fused.covariance_m2, error_m))
+    spread_m = np.std(errors_m, axis=0) / np.sqrt(trials)
+    assert (np.abs(np.mean(errors_m, axis=0)) < 4 * spread_m).all()
+    # Disagreement by chance widens the covariance of several a little.
+    assert 2.0 < np.mean(squares) < 3.6
+
+
+def test_one_alignment_with_one_eye_is_the_estimate_with_the_prior() -> None:
+    seen_m = np.array([0.003, -0.002, 0.004])
+    fused = fuse_alignments([(ONE["left"], {"left": _shift(seen_m)})], RIG, SETTINGS)
+    assert set(fused) == {"left"}
+    prior, noise = _prior_m2()[:3, :3], REGISTRATION_M2 + _wearer_m2()
+    gain = prior @ np.linalg.inv(prior + noise)
+    np.testing.assert_allclose(fused["left"].shift_m, gain @ seen_m, atol=1e-7)
+    covariance_m2 = prior - gain @ prior
+    np.testing.assert_allclose(fused["left"].covariance_m2, covariance_m2, rtol=1e-4, atol=1e-12)
+
+
+def _sigma_x_m(solved: list[tuple[Alignment, dict[Eye, EyeShift]]], eye: Eye = "left") -> float:
+    fused = fuse_alignments(solved, RIG, SETTINGS)[eye]
+    return float(np.sqrt(fused.covariance_m2[0, 0]))
+
+
+def test_only_one_eye_at_a_time_shows_the_eye_distance() -> None:
+    true_m: dict[Eye, Float64] = {
+        "left": np.array([-0.001, 0.0, 0.0]),
+        "right": np.array([0.003, 0.0, 0.0]),
+    }
+    both: tuple[Alignment, dict[Eye, EyeShift]] = (
+        BOTH,
+        {eye: _shift(np.array([0.001, 0.0, 0.0])) for eye in EYES},
+    )
+    each: list[tuple[Alignment, dict[Eye, EyeShift]]] = [
+        (ONE[eye], {eye: _shift(true_m[eye])}) for eye in EYES
+    ]
+    at_once, apart = (fuse_alignments(s, RIG, SETTINGS) for s in ([both] * 4, each * 4))
+    for eye, shift_m in true_m.items():
+        np.testing.assert_allclose(at_once[eye].shift_m, [0.001, 0, 0], atol=5e-5)
+        np.testing.assert_allclose(apart[eye].shift_m, shift_m, atol=2e-4)
+    # Half the prior on the difference is what no number of alignments with both eyes takes away.
+    floor_m = 0.5 * SETTINGS.eye_difference_sigma_m[0]
+    assert floor_m * 0.98 < _sigma_x_m([both] * 20) < _sigma_x_m([both]) < 1.3 * floor_m
+    assert _sigma_x_m(each * 4) < 0.5 * floor_m
+
+
+def test_more_alignments_know_more() -> None:
+    once: tuple[Alignment, dict[Eye, EyeShift]] = (ONE["left"], {"left": _shift(np.zeros(3))})
+    sigmas_m = np.array([_sigma_x_m([once] * count) for count in (1, 4, 16)])
+    np.testing.assert_allclose(sigmas_m[:-1] / sigmas_m[1:], 2.0, rtol=0.05)
+
+
+def test_disagreement_widens_the_covariance() -> None:
+    aside_m = np.array([0.004, 0.0, 0.0])
+
+    def fused(offset_m: Float64) -> EyeShift:
+        pair = [(ONE["left"], {"left": _shift(sign * offset_m)}) for sign in (-1, 1)]
+        return fuse_alignments(pair, RIG, SETTINGS)["left"]
+
+    agreeing, disagreeing = fused(0.1 * aside_m), fused(aside_m)
+    noise = REGISTRATION_M2 + _wearer_m2()
+    birge = 2 * aside_m @ np.linalg.solve(noise, aside_m) / 3
+    assert birge > 10
+    ratio = np.trace(disagreeing.covariance_m2) / np.trace(agreeing.covariance_m2)
+    assert 0.5 * birge < ratio <= birge
+    np.testing.assert_allclose(disagreeing.shift_m, 0.0, atol=1e-12)
+
+
+def test_the_fit_of_all_alignments_is_summed_up() -> None:
+    good = _shift(np.zeros(3))
+    bad = EyeShift(
+        np.zeros(3), REGISTRATION_M2, 0.003, np.zeros(7), 0.5, 40, False, "limit", np.ones(40), "x"
+    )
+    fused = fuse_alignments(
+        [(ONE["left"], {"left": good}), (ONE["left"], {"left": bad})], RIG, SETTINGS
+    )["left"]
+    assert fused.method == "fused"
+    assert fused.rms_m == pytest.approx(np.sqrt((1e-6 + 9e-6) / 2))
+    assert fused.inlier_ratio == pytest.approx(0.7)
+    assert fused.iterations == 48
+    assert not fused.converged
+    assert fused.stop_reason == "done; limit"
+    assert len(fused.residuals_m) == 12
+
+
+def test_nothing_to_fuse() -> None:
+    with pytest.raises(ValueError, match="at least one alignment"):
+        fuse_alignments([], RIG, SETTINGS)
+
+
+def test_eye_box_weighs_as_a_prior_should() -> None:
+    covariance_m2 = np.diag([0.001, 0.010, 0.100]) ** 2
+    boxed = with_eye_box(_shift(np.full(3, 0.008), covariance_m2))
+    # Weights 1/σ² against 1/(10 mm)²: 100:1, 1:1 and 1:100.
+    np.testing.assert_allclose(boxed.shift_m, 0.008 * np.array([100 / 101, 1 / 2, 1 / 101]))
+    expected = 1e-4 * np.array([1 / 101, 1 / 2, 100 / 101])
+    np.testing.assert_allclose(boxed.covariance_m2, np.diag(expected), atol=1e-15)
+
+
+@pytest.mark.parametrize("apart_m", [-0.004, 0.004])
+def test_both_eyes_see_what_the_weights_say(apart_m: float) -> None:
+    """An eye distance off by 4 mm misplaces the hand by a centimetre in depth, as predicted."""
+    rng = np.random.default_rng(3)
+    hand = trial_hand(0)
+    half_m = np.array([0.5 * apart_m, 0.0, 0.0])
+    true_m: dict[Eye, Float64] = {"left": -half_m, "right": half_m}
+    T_H_hand = rigid([0.05, -0.1, 0.02], [0.0, 0.088, 0.51])
+    T_D_H = invert(RIG.T_H_D)
+    cursor_D_m, cut = visible_points(hand, T_D_H @ T_H_hand, 3000, rng, forearm_m=0.04)
+    cursor_m = transform(RIG.T_H_D, cursor_D_m)
+    surface = describe_surface(cursor_m, cut, len(cursor_m))
+    outline_m = surface.points_m[surface.outline]
+    views = [
+        view_through(
+            RIG.eyes[eye],
+            shift_m,
+            np.eye(4),
+            projection_matrix(RIG.eyes[eye]) @ RIG.eyes[eye].T_V_H,
+            outline_m,
+        )
+        for eye, shift_m in true_m.items()
+    ]
+    placed = overlay_hand(transform(invert(T_H_hand), outline_m), T_H_hand, views)
+    assert placed is not None
+    alignment = Alignment(
+        cursor_m=cursor_m,
+        hand_m=transform(placed[0] @ invert(T_H_hand), cursor_m),
+        cursor_is_cut=cut,
+        hand_is_cut=cut,
+        T_E_W={eye: view_of_eye(RIG.eyes[eye], np.eye(4)) for eye in EYES},
+        eyes=EYES,
+        rotation_rad=np.zeros(3),
+        t_a_ns=0,
+        t_b_ns=1,
+    )
+    solved = solve_alignment(alignment, RIG)
+    assert np.sign(apart_m) * solved["left"].shift_m[2] > 0.007
+    # Whoever holds the eyes for well placed, but knows no eye distance, must find it from this.
+    unknowing = FuseSettings(eye_difference_sigma_m=(0.1, 1e-6, 1e-6), eye_box_sigma_m=0.003)
+    fused = fuse_alignments([(alignment, solved)], RIG, unknowing)
+    for eye, shift_m in true_m.items():
+        np.testing.assert_allclose(fused[eye].shift_m, shift_m, atol=5e-4)
