@@ -8,8 +8,9 @@
          alignments/1.npz  the clouds and poses of each alignment
          results.json      the newest results, if there are any
 
-An alignment exists once the journal names it with its checksum, so the folder is consistent at
-every moment and a killed program costs at most the line that it was writing.
+An alignment exists from when the journal names it with its checksum until the journal says that it
+was dropped, so the folder is consistent at every moment and a killed program costs at most the line
+that it was writing.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ MAX_ALIGNMENTS = 100
 
 _CREATED = "created"
 _ALIGNMENT = "alignment_saved"
+_DROPPED = "alignment_dropped"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +73,9 @@ class SessionRecord:
     settings : dict
     events : tuple of Event
     alignments : tuple of Alignment
+        Those not dropped.
     results : dict or None
-        None if none were saved.
+        None if none were saved since the last drop.
     journal_bytes : int
         Length of the journal's complete lines.
     torn_bytes : int
@@ -166,7 +169,12 @@ class Session(Closable):
         events, journal_bytes, torn_bytes = _read_journal(path / "journal.jsonl")
         if events[0].data.get("rig_sha256") != _sha256(_rig_bytes(path)):
             raise FileError(f"{path / 'rig.yaml'} is damaged: its checksum is not the journal's")
-        saved = [event for event in events if event.name == _ALIGNMENT]
+        saved: list[Event] = []
+        for event in events:
+            if event.name == _ALIGNMENT:
+                saved.append(event)
+            elif event.name == _DROPPED:
+                del saved[-1:]
         if len(saved) > MAX_ALIGNMENTS:
             raise FileError(f"{path} holds more than {MAX_ALIGNMENTS} alignments")
         results = path / "results.json"
@@ -194,7 +202,7 @@ class Session(Closable):
         ValueError
             If the data hold NaN, or the event's name is one that the session itself writes.
         """
-        if event in (_CREATED, _ALIGNMENT):
+        if event in (_CREATED, _ALIGNMENT, _DROPPED):
             raise ValueError(f"the event {event} is written by the session itself")
         self._append(event, data)
 
@@ -216,6 +224,26 @@ class Session(Closable):
         self._append(_ALIGNMENT, {"number": number, "sha256": _sha256(data)})
         self._alignments = number
         return number
+
+    def drop_alignment(self) -> None:
+        """Leave out the last alignment, and the results with it; the next takes its number.
+
+        Raises
+        ------
+        FileError
+            If the folder cannot be written.
+        ValueError
+            If there is none.
+        """
+        if not self._alignments:
+            raise ValueError("there is no alignment to drop")
+        results = self.path / "results.json"
+        try:
+            results.unlink(missing_ok=True)
+        except OSError as error:
+            raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
+        self._append(_DROPPED, {"number": self._alignments})
+        self._alignments -= 1
 
     def save_results(self, results: Mapping[str, Any]) -> None:
         """Replace the results, which must be JSON-able; FileError if they cannot be written."""

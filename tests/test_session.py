@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -284,3 +285,27 @@ def test_a_journal_without_its_beginning_is_refused(
     (path / "journal.jsonl").write_text("")
     with pytest.raises(FileError, match="does not begin as the journal of a session"):
         Session.open(path)
+
+
+def test_a_dropped_alignment_is_left_out_with_its_results(
+    session: Session, alignment: Alignment
+) -> None:
+    second = replace(alignment, t_b_ns=2)
+    session.save_alignment(alignment)
+    session.save_alignment(second)
+    session.save_results(RESULTS)
+    session.drop_alignment()
+    record = Session.open(session.path)
+    assert [kept.t_b_ns for kept in record.alignments] == [alignment.t_b_ns]
+    assert record.results is None
+
+    session.close()
+    with Session(session.path) as again:
+        assert again.save_alignment(replace(alignment, t_b_ns=3)) == 2
+        again.drop_alignment()
+        again.drop_alignment()
+        with pytest.raises(ValueError, match="no alignment to drop"):
+            again.drop_alignment()
+        with pytest.raises(ValueError, match="alignment_dropped"):
+            again.record("alignment_dropped")
+    assert Session.open(session.path).alignments == ()
