@@ -98,15 +98,17 @@ class PlacedHand:
     t_host_ns : int
         Of its exposure, host's monotonic clock.
     T_W_D : (4, 4) float64
+    points_W_m : (N, 3) float64
+        The cloud's surface.
+    middle_W_m : (3,) float64
+        Its median.
     """
 
     cloud: HandCloud
     t_host_ns: int
     T_W_D: Float64
-
-    def points_W_m(self) -> Float64:
-        """Return the surface, (N, 3), in W."""
-        return transform(self.T_W_D, self.cloud.points_m)
+    points_W_m: Float64
+    middle_W_m: Float64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +120,7 @@ class Observation:
     state : State
         After the step.
     hand : PlacedHand or None
-        None if there is no hand, or its place is not known.
+        The newest whose place has become known, maybe from an earlier frame; None if none has.
     problem : str
         Why there is no hand; empty if there is one.
     is_steady : bool
@@ -210,8 +212,8 @@ class Calibration:
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
-        problem = self._place_hands() or problem
-        hand = self._hands[-1] if self._hands and not problem else None
+        hand, not_placed = self._place_hands()
+        problem = "" if hand else problem or not_placed
         observation = Observation(
             self.state, hand, problem, self._is_steady(), segment_ms=segment_ms
         )
@@ -235,7 +237,7 @@ class Calibration:
         self._cursor_id += 1
         self.eyes = tuple(eyes)
         self._confirmation = None
-        self._guard = RotationGuard(self._cursor.points_W_m(), self._cursor.cloud.is_cut)
+        self._guard = RotationGuard(self._cursor.points_W_m, self._cursor.cloud.is_cut)
         contour_W = transform(self._cursor.T_W_D, self._cursor.cloud.contour_m)
         self._link.send_cursor(contour_W, self._cursor_id)
         self._link.send_prompt(_align_prompt(self.eyes), self.eyes)
@@ -334,22 +336,24 @@ class Calibration:
         self._record("applied", eyes=list(self.results.shifts))
         self.state = State.APPLIED
 
-    def _place_hands(self) -> str:
-        """Place the clouds whose pose has come by now; say why the newest has none, if so."""
+    def _place_hands(self) -> tuple[PlacedHand | None, str]:
+        """Place the clouds whose pose has come by now; return the newest, or why there is none."""
+        hand, problem = None, ""
         while self._unplaced:
             cloud, t_ns = self._unplaced[0]
             try:
-                T_W_H = self._link.pose_at_host_ns(t_ns)
+                T_W_D = self._link.pose_at_host_ns(t_ns) @ self.rig.T_H_D
             except PosePendingError as error:
-                return str(error)
+                problem = str(error)
+                break
             except PoseError as error:
-                self._unplaced.popleft()
-                if not self._unplaced:
-                    return str(error)
-                continue
+                problem = str(error)
+            else:
+                points_W_m = transform(T_W_D, cloud.points_m)
+                hand = PlacedHand(cloud, t_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0))
+                self._hands.append(hand)
             self._unplaced.popleft()
-            self._hands.append(PlacedHand(cloud, t_ns, T_W_H @ self.rig.T_H_D))
-        return ""
+        return hand, problem
 
     def _is_steady(self) -> bool:
         """Tell whether a hand is in view, placed, and has hardly moved for a while."""
@@ -359,11 +363,7 @@ class Calibration:
         since_ns = self._seen_ns - round(1e9 * settings.steady_s)
         if self._hands[0].t_host_ns > since_ns:
             return False
-        places = [
-            np.median(hand.points_W_m(), axis=0)
-            for hand in self._hands
-            if hand.t_host_ns >= since_ns
-        ]
+        places = [hand.middle_W_m for hand in self._hands if hand.t_host_ns >= since_ns]
         return len(places) > 2 and float(np.ptp(places, axis=0).max()) < settings.steady_m
 
     def _guide(self, observation: Observation) -> Observation:
@@ -379,7 +379,7 @@ class Calibration:
                 is_red=is_red,
                 guard_ms=1e3 * (time.perf_counter() - started_s),
             )
-            self._link.send_live_hand(hand.points_W_m(), is_red)
+            self._link.send_live_hand(hand.points_W_m, is_red)
         for confirmation in self._link.confirmations():
             if confirmation.cursor_id == self._cursor_id:
                 self._confirmation = confirmation
@@ -414,8 +414,8 @@ class Calibration:
             )
             return
         alignment = Alignment(
-            cursor_m=self._cursor.points_W_m(),
-            hand_m=nearest.points_W_m(),
+            cursor_m=self._cursor.points_W_m,
+            hand_m=nearest.points_W_m,
             cursor_is_cut=self._cursor.cloud.is_cut,
             hand_is_cut=nearest.cloud.is_cut,
             T_E_W=confirmation.T_E_W,
@@ -436,7 +436,7 @@ class Calibration:
 
     def _rotation(self, hand: PlacedHand) -> Float64:
         assert self._guard is not None
-        return self._guard.rotation(hand.points_W_m(), hand.cloud.is_cut)
+        return self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
 
     def _is_over(self, rotation: Float64) -> bool:
         return float(np.linalg.norm(rotation)) > self._settings.guard.limit_rad
