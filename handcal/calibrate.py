@@ -355,6 +355,12 @@ class Calibration:
             self._unplaced.popleft()
         return hand, problem
 
+    def _placed_until_ns(self) -> int:
+        """Return the time of the newest frame whose hand, as those of all before, has its place."""
+        if not self._unplaced:
+            return self._seen_ns
+        return self._hands[-1].t_host_ns if self._hands else 0
+
     def _is_steady(self) -> bool:
         """Tell whether a hand is in view, placed, and has hardly moved for a while."""
         settings = self._settings
@@ -383,9 +389,9 @@ class Calibration:
         for confirmation in self._link.confirmations():
             if confirmation.cursor_id == self._cursor_id:
                 self._confirmation = confirmation
-        # A frame from after t_b must have come before the nearest one is known.
-        if self._confirmation is not None and self._seen_ns >= self._confirmation.t_host_ns:
-            confirmation, self._confirmation = self._confirmation, None
+        confirmation = self._confirmation
+        if confirmation is not None and self._placed_until_ns() >= confirmation.t_host_ns:
+            self._confirmation = None
             self._take(confirmation)
         return observation
 
