@@ -26,7 +26,7 @@ import numpy as np
 from handcal.camera.clock import FrameClock
 from handcal.display import projection_matrix, view_of_eye
 from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
-from handcal.geometry import transform
+from handcal.geometry import invert, transform
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.link.reliable import Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
@@ -245,19 +245,20 @@ class Calibration:
         self.state = State.ALIGN
 
     def confirm(self) -> None:
-        """Confirm the alignment from the PC, as of the newest frame.
+        """Confirm the alignment from the PC, as of the newest frame; the next step takes it.
 
         Raises
         ------
         ProcedureError
-            If there is nothing to confirm.
+            If there is no cursor, or no hand in view.
         """
         if self.state is not State.ALIGN:
             raise ProcedureError(f"there is no cursor to confirm ({self.state})")
-        if not self._hands:
-            raise ProcedureError("no hand has been seen since the cursor was made")
+        tolerance_ns = 1e9 * self._settings.match_tolerance_s
+        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > tolerance_ns:
+            raise ProcedureError("hold the hand under the cursor, in view of the camera")
         t_ns = self._hands[-1].t_host_ns
-        T_W_H = self._link.pose_at_host_ns(t_ns)
+        T_W_H = self._hands[-1].T_W_D @ invert(self.rig.T_H_D)
         T_E_W = {eye: view_of_eye(self.rig.eyes[eye], T_W_H) for eye in EYES}
         self._confirmation = Confirmation(t_ns, t_ns, T_E_W, self._cursor_id)
 
