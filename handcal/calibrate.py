@@ -44,7 +44,8 @@ from handcal.types import (
     Rig,
 )
 
-_KEPT_CLOUDS = 30
+_LATEST_CONFIRMATION_S = 1.0
+"""Hands are kept for so long, lest a confirmation sent again finds its frame gone."""
 
 
 class State(StrEnum):
@@ -183,8 +184,8 @@ class Calibration:
         self._session = session
         self._settings = settings or CalibrationSettings()
         self._clock = FrameClock(self._settings.camera_latency_s)
-        self._hands: deque[PlacedHand] = deque(maxlen=_KEPT_CLOUDS)
-        self._unplaced: deque[tuple[HandCloud, int]] = deque(maxlen=_KEPT_CLOUDS)
+        self._hands: deque[PlacedHand] = deque()
+        self._unplaced: deque[tuple[HandCloud, int]] = deque()
         self._seen_ns = 0
         self._cursor: PlacedHand | None = None
         self._cursor_id = 0
@@ -212,6 +213,7 @@ class Calibration:
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
+        self._forget_hands()
         hand, not_placed = self._place_hands()
         problem = "" if hand else problem or not_placed
         observation = Observation(
@@ -336,6 +338,15 @@ class Calibration:
             self._drawn_shift_m[eye] = shift.shift_m
         self._record("applied", eyes=list(self.results.shifts))
         self.state = State.APPLIED
+
+    def _forget_hands(self) -> None:
+        """Let go of what is too old for a confirmation, and for telling whether it is steady."""
+        kept_s = self._settings.steady_s + _LATEST_CONFIRMATION_S
+        oldest_ns = self._seen_ns - round(1e9 * kept_s)
+        while self._hands and self._hands[0].t_host_ns < oldest_ns:
+            self._hands.popleft()
+        while self._unplaced and self._unplaced[0][1] < oldest_ns:
+            self._unplaced.popleft()
 
     def _place_hands(self) -> tuple[PlacedHand | None, str]:
         """Place the clouds whose pose has come by now; return the newest, or why there is none."""
