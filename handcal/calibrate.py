@@ -193,6 +193,7 @@ class Calibration:
         self._confirmation: Confirmation | None = None
         self._drawn_shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
         self._sent: list[Outgoing] = []
+        self._stored: list[Alignment] = []
 
     def step(self, frame: Frame) -> Observation:
         """Take a frame: find the hand, guide the alignment, take a confirmation.
@@ -265,15 +266,23 @@ class Calibration:
         self._confirmation = Confirmation(t_ns, t_ns, T_E_W, self._cursor_id)
 
     def redo(self) -> None:
-        """Give up the present cursor, or the last alignment if it is not applied yet."""
-        if self.state in (State.ALIGNED, State.SOLVED) and self.alignments:
+        """Give up the present cursor, or the last alignment and the results with it.
+
+        Raises
+        ------
+        ProcedureError
+            If there is neither.
+        FileError
+            If the session cannot be written; the alignment is given up all the same.
+        """
+        if self.state in (State.ALIGNED, State.SOLVED):
             self.alignments.pop()
-            self._record("alignment_dropped", number=len(self.alignments) + 1)
+            self.results = None
         elif self.state is not State.ALIGN:
             raise ProcedureError(f"there is nothing to redo ({self.state})")
-        self.results = None
         self._clear_cursor()
         self.state = State.SHOW_HAND
+        self._store_alignments()
 
     def solve(self) -> Results:
         """Solve all alignments so far.
@@ -281,15 +290,20 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no alignment.
+            If there is no alignment, or something sent to the headset waits for its answer.
+        FileError
+            If the session cannot be written; the results are kept in memory.
         """
-        if not self.alignments:
+        if self.state is State.APPLYING:
+            raise ProcedureError("wait until the projections are applied")
+        if not self.alignments or self.state is State.ALIGN:
             raise ProcedureError("align the hand with the cursor first")
         self.results = solve_session(self.alignments, self.rig, self._settings.solve)
-        self._record("solved", **results_json(self.results))
+        self.state = State.SOLVED
+        self._store_alignments()
         if self._session is not None:
             self._session.save_results(results_json(self.results))
-        self.state = State.SOLVED
+        self._record("solved", **results_json(self.results))
         return self.results
 
     def apply(self) -> None:
@@ -325,19 +339,22 @@ class Calibration:
             If nothing was sent.
         LinkError
             If it does not in time; `apply` may be called again.
+        FileError
+            If the session cannot be written; the projections are applied all the same.
         """
         if self.state is not State.APPLYING or self.results is None:
             raise ProcedureError("apply first")
+        deadline_s = time.monotonic() + timeout_s
         try:
             for handle in self._sent:
-                self._link.wait_acked(handle, timeout_s)
+                self._link.wait_acked(handle, max(0.0, deadline_s - time.monotonic()))
         except HandcalError:
             self.state = State.SOLVED
             raise
         for eye, shift in self.results.shifts.items():
             self._drawn_shift_m[eye] = shift.shift_m
-        self._record("applied", eyes=list(self.results.shifts))
         self.state = State.APPLIED
+        self._record("applied", eyes=list(self.results.shifts))
 
     def _forget_hands(self) -> None:
         """Let go of what is too old for a confirmation, and for telling whether it is steady."""
@@ -401,10 +418,10 @@ class Calibration:
         for confirmation in self._link.confirmations():
             if confirmation.cursor_id == self._cursor_id:
                 self._confirmation = confirmation
-        confirmation = self._confirmation
-        if confirmation is not None and self._placed_until_ns() >= confirmation.t_host_ns:
+        waiting = self._confirmation
+        if waiting is not None and self._placed_until_ns() >= waiting.t_host_ns:
             self._confirmation = None
-            self._take(confirmation)
+            self._take(waiting)
         return observation
 
     def _take(self, confirmation: Confirmation) -> None:
@@ -445,8 +462,18 @@ class Calibration:
         )
         self.alignments.append(alignment)
         self.state = State.ALIGNED
-        if self._session is not None:
+        self._store_alignments()
+
+    def _store_alignments(self) -> None:
+        """Bring the session up to date, with what could not be written before."""
+        if self._session is None:
+            return
+        while self._stored != self.alignments[: len(self._stored)]:
+            self._session.drop_alignment()
+            self._stored.pop()
+        for alignment in self.alignments[len(self._stored) :]:
             self._session.save_alignment(alignment)
+            self._stored.append(alignment)
 
     def _refuse(self, prompt: str, reason: str, angle_deg: float | None = None) -> None:
         self._link.send_prompt(prompt, self.eyes)
