@@ -230,22 +230,26 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no steady hand, or projections still wait for their acknowledgement.
+            If there is no steady hand, or an alignment has not been applied yet.
+        HandError
+            If hardly a point lies off the cut edges.
+        FileError
+            If the session cannot be written; the cursor is shown all the same.
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED, State.ALIGN):
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
         if not self._is_steady():
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
-        self._cursor = self._hands[-1]
+        hand = self._hands[-1]
+        self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
+        self._cursor = hand
         self._cursor_id += 1
-        self.eyes = tuple(eyes)
         self._confirmation = None
-        self._guard = RotationGuard(self._cursor.points_W_m, self._cursor.cloud.is_cut)
-        contour_W = transform(self._cursor.T_W_D, self._cursor.cloud.contour_m)
-        self._link.send_cursor(contour_W, self._cursor_id)
+        self.eyes = tuple(eyes)
+        self.state = State.ALIGN
+        self._link.send_cursor(transform(hand.T_W_D, hand.cloud.contour_m), self._cursor_id)
         self._link.send_prompt(_align_prompt(self.eyes), self.eyes)
         self._record("cursor_made", cursor_id=self._cursor_id, eyes=list(self.eyes))
-        self.state = State.ALIGN
 
     def confirm(self) -> None:
         """Confirm the alignment from the PC, as of the newest frame; the next step takes it.
@@ -403,18 +407,8 @@ class Calibration:
 
     def _guide(self, observation: Observation) -> Observation:
         """Show the live hand in its colour and take a confirmation."""
-        hand = observation.hand
-        if hand is not None:
-            started_s = time.perf_counter()
-            rotation_W = self._rotation(hand)
-            is_red = self._is_over(rotation_W)
-            observation = replace(
-                observation,
-                rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
-                is_red=is_red,
-                guard_ms=1e3 * (time.perf_counter() - started_s),
-            )
-            self._link.send_live_hand(hand.points_W_m, is_red)
+        if observation.hand is not None:
+            observation = self._show_live(observation, observation.hand)
         for confirmation in self._link.confirmations():
             if confirmation.cursor_id == self._cursor_id:
                 self._confirmation = confirmation
@@ -424,25 +418,36 @@ class Calibration:
             self._take(waiting)
         return observation
 
+    def _show_live(self, observation: Observation, hand: PlacedHand) -> Observation:
+        started_s = time.perf_counter()
+        try:
+            rotation_W = self._rotation(hand)
+        except HandError as error:
+            return replace(observation, hand=None, problem=str(error))
+        is_red = self._is_over(rotation_W)
+        self._link.send_live_hand(hand.points_W_m, is_red)
+        return replace(
+            observation,
+            rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
+            is_red=is_red,
+            guard_ms=1e3 * (time.perf_counter() - started_s),
+        )
+
     def _take(self, confirmation: Confirmation) -> None:
         """Accept or refuse a confirmation."""
         assert self._cursor is not None
-        nearest = min(
-            self._hands,
-            key=lambda hand: abs(hand.t_host_ns - confirmation.t_host_ns),
-            default=None,
-        )
-        tolerance_ns = 1e9 * self._settings.match_tolerance_s
-        if nearest is None or abs(nearest.t_host_ns - confirmation.t_host_ns) > tolerance_ns:
-            self._refuse("The camera did not see your hand. Align and confirm again.", "no hand")
+        try:
+            hand = self._hand_at(confirmation.t_host_ns)
+            rotation_W = self._rotation(hand)
+        except HandError as error:
+            self._refuse(f"{error}. Align and confirm again.", "no hand")
             return
-        rotation_W = self._rotation(nearest)
         angle_deg = float(np.degrees(np.linalg.norm(rotation_W)))
         if self._is_over(rotation_W):
             self.refused += 1
             limit_deg = np.degrees(self._settings.guard.limit_rad)
             self._refuse(
-                f"Your hand is turned by {angle_deg:.0f}°, more than {limit_deg:.0f}°. "
+                f"Your hand is turned by {angle_deg:.1f}°, more than {limit_deg:g}°. "
                 "Turn it as the cursor is and confirm again.",
                 "turned",
                 angle_deg,
@@ -450,19 +455,27 @@ class Calibration:
             return
         alignment = Alignment(
             cursor_m=self._cursor.points_W_m,
-            hand_m=nearest.points_W_m,
+            hand_m=hand.points_W_m,
             cursor_is_cut=self._cursor.cloud.is_cut,
-            hand_is_cut=nearest.cloud.is_cut,
+            hand_is_cut=hand.cloud.is_cut,
             T_E_W=confirmation.T_E_W,
             eyes=self.eyes,
-            rotation_rad=nearest.T_W_D[:3, :3].T @ rotation_W,
+            rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
             t_a_ns=self._cursor.cloud.t_camera_ns,
-            t_b_ns=nearest.cloud.t_camera_ns,
+            t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._drawn_shift_m),
         )
         self.alignments.append(alignment)
         self.state = State.ALIGNED
         self._store_alignments()
+
+    def _hand_at(self, t_host_ns: int) -> PlacedHand:
+        """Return the hand nearest in time."""
+        tolerance_ns = 1e9 * self._settings.match_tolerance_s
+        near = [hand for hand in self._hands if abs(hand.t_host_ns - t_host_ns) <= tolerance_ns]
+        if not near:
+            raise HandError("The camera did not see your hand")
+        return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
     def _store_alignments(self) -> None:
         """Bring the session up to date, with what could not be written before."""
