@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 import types
 from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass
@@ -67,7 +67,7 @@ def _convert(kind: Any, value: object, where: str) -> Any:
     if is_dataclass(kind) and isinstance(kind, type):
         return read_settings(kind, value, where)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if kind is float and is_number and math.isfinite(value):  # type: ignore[arg-type]
+    if kind is float and is_number and abs(value) <= sys.float_info.max:  # type: ignore[arg-type]
         return float(value)  # type: ignore[arg-type]
     if kind in (int, str, bool) and type(value) is kind:
         return value
