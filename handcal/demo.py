@@ -126,7 +126,7 @@ def run_demo(
             },
             "link": {
                 "sent": statistics.sent,
-                "lost": statistics.lost + statistics.lost_inbound,
+                "lost": statistics.lost,
                 "acked": statistics.acked,
             },
             "timing_ms": _timing(calibration, rig, observations),
