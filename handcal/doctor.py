@@ -103,9 +103,9 @@ def _network() -> Finding:
 def _pairing() -> Finding:
     try:
         read_pairing_key()
-    except HandcalError:
+    except HandcalError as error:
         advice = f"for a real headset, set {KEY_VARIABLE} to the key that it shows"
-        return Finding("Pairing key", Health.LIMITED, "not set", advice)
+        return Finding("Pairing key", Health.LIMITED, str(error), advice)
     return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
 
 

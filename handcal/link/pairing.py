@@ -8,6 +8,7 @@ from pathlib import Path
 
 from handcal.errors import LinkError
 from handcal.files import read_limited
+from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 
 KEY_VARIABLE = "HANDCAL_PAIRING_KEY"
 _MAX_KEY_BYTES = 1024
@@ -24,7 +25,7 @@ def read_pairing_key(path: Path | None = None) -> bytes:
     Raises
     ------
     LinkError
-        If there is none.
+        If there is none, or it is too short.
     FileError
         If the file cannot be read.
     """
@@ -34,4 +35,8 @@ def read_pairing_key(path: Path | None = None) -> bytes:
         key = os.environ.get(KEY_VARIABLE, "").strip().encode()
     if not key:
         raise LinkError(f"no pairing key: set {KEY_VARIABLE} or give a file that holds it")
+    if len(key) < MIN_PAIRING_KEY_BYTES:
+        raise LinkError(
+            f"the pairing key has {len(key)} bytes; take one of at least {MIN_PAIRING_KEY_BYTES}"
+        )
     return key

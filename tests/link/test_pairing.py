@@ -28,3 +28,6 @@ def test_no_key_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         read_pairing_key(tmp_path / "key")
     with pytest.raises(FileError):
         read_pairing_key(tmp_path / "absent")
+    monkeypatch.setenv(KEY_VARIABLE, "short")
+    with pytest.raises(LinkError, match="5 bytes; take one of at least 16"):
+        read_pairing_key()
