@@ -28,7 +28,7 @@ _INDEPENDENT_PAIRS = 100.0
 _OUTLIER_MEDIANS = 3.0
 # Pairs are sought anew while that lowers their mean square by more than this; on measured clouds
 # once, on exact ones until every point has found its own.
-_GAIN = 0.1
+_GAIN = 0.01
 # The registration's residuals are not independent; found over 200 simulated alignments.
 _REGISTRATION_FACTOR = 4.0
 # No registration is better than this, whatever its residuals say, and of what a turn moves the
