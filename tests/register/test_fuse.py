@@ -71,7 +71,7 @@ def _align(
 )
 def test_estimates_are_unbiased_and_their_covariance_honest(alignments: list[Alignment]) -> None:
     rng = np.random.default_rng(0)
-    trials = 100
+    trials = 80
     errors_m, squares = [], []
     for _ in range(trials):
         drawn_m = rng.multivariate_normal(np.zeros(6), _prior_m2())
@@ -135,7 +135,9 @@ def test_disagreement_widens_the_covariance() -> None:
     aside_m = np.array([0.004, 0.0, 0.0])
 
     def fused(offset_m: Float64) -> EyeShift:
-        pair = [(ONE["left"], {"left": _shift(sign * offset_m)}) for sign in (-1, 1)]
+        pair: list[tuple[Alignment, dict[Eye, EyeShift]]] = [
+            (ONE["left"], {"left": _shift(sign * offset_m)}) for sign in (-1, 1)
+        ]
         return fuse_alignments(pair, RIG, SETTINGS)["left"]
 
     agreeing, disagreeing = fused(0.1 * aside_m), fused(aside_m)

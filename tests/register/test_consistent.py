@@ -1,0 +1,165 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.bench.trials import (
+    floor_error_m,
+    mean_length_mm,
+    solve_trial,
+    trial_alignment,
+    trial_hand,
+)
+from handcal.bench.wearer import overlay_by_eye
+from handcal.register.solve import solve_alignment
+from handcal.rig.example import example_rig
+from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
+from handcal.types import Float64, Method
+
+# Few hands are made: trial n has hand n % 10.
+HANDS = 3
+
+
+def _trial(number: int) -> int:
+    return 10 * number + number % HANDS
+
+
+def _measured(number: int, angle_deg: float, sigma_m: float = 0.0015) -> SimulatedAlignment:
+    """Make an alignment as a sensor gives it: noisy, resampled, cut at different places."""
+    rng = np.random.default_rng([number, 1])
+    cursor_forearm_m, hand_forearm_m = rng.uniform(0.02, 0.06, 2)
+    making = AlignmentSettings(
+        count=2000,
+        resample=True,
+        depth_sigma_m=sigma_m,
+        cursor_forearm_m=cursor_forearm_m,
+        hand_forearm_m=hand_forearm_m,
+    )
+    return trial_alignment(_trial(number), angle_deg, making)
+
+
+def _uncut(made: SimulatedAlignment) -> SimulatedAlignment:
+    """Forget which points lie beside a cut edge."""
+    return replace(
+        made,
+        cursor_cut=np.zeros(len(made.cursor_cut), dtype=np.bool_),
+        hand_cut=np.zeros(len(made.hand_cut), dtype=np.bool_),
+    )
+
+
+def _errors_m(alignments: list[SimulatedAlignment], method: Method = "consistent") -> Float64:
+    return np.array([solve_trial(made, method).shift_m - made.shift_m for made in alignments])
+
+
+def _floors_mm(alignments: list[SimulatedAlignment]) -> float:
+    return mean_length_mm(np.array([floor_error_m(made, exact=True) for made in alignments]))
+
+
+@pytest.mark.parametrize("exact", [True, False], ids=["honest data", "the paper's data"])
+def test_clean_pairs_give_the_shift_exactly(exact: bool) -> None:
+    for number in range(4):
+        made = trial_alignment(_trial(number), 0.0, AlignmentSettings(count=2000, exact=exact))
+        np.testing.assert_allclose(solve_trial(made, "consistent").shift_m, made.shift_m, atol=1e-5)
+
+
+def test_the_paper_factor_falls_short_by_depth_over_distance() -> None:
+    shares = []
+    for number in range(3):
+        made = trial_alignment(_trial(number), 0.0, AlignmentSettings(count=800))
+        solved = solve_trial(made, "paper")
+        shares.append(1.0 - solved.shift_m[2] / made.shift_m[2])
+        np.testing.assert_allclose(solved.shift_m[:2], made.shift_m[:2], atol=0.001)
+    # A hand at 0.42 to 0.58 m, a display at 2 m.
+    assert 0.15 < np.mean(shares) < 0.35
+
+
+@pytest.mark.parametrize("along_m", [-0.010, 0.010])
+def test_a_wearer_who_errs_nowhere_is_solved_without_bias(along_m: float) -> None:
+    """Data made by rays through a display, in which no solver's equation takes part."""
+    rig = example_rig()
+    errors_m, shares = [], []
+    for number in range(8):
+        rng = np.random.default_rng(number)
+        true_m = np.array([*rng.uniform(-0.005, 0.005, 2), along_m])
+        eye = ("left", "right")[number % 2]
+        hand = trial_hand(number % HANDS)
+        alignment = overlay_by_eye(rng, hand, rig, {eye: true_m}, 2000)  # type: ignore[dict-item]
+        (solved,) = solve_alignment(alignment, rig).values()
+        errors_m.append(solved.shift_m - true_m)
+        if number < 4:
+            (solved,) = solve_alignment(alignment, rig, "linear").values()
+            shares.append(1.0 - solved.shift_m[2] / along_m)
+    assert (np.abs(np.mean(errors_m, axis=0)) < 0.3e-3).all()
+    assert 0.15 < np.mean(shares) < 0.35
+
+
+def test_cuts_noise_and_samples_cost_little_when_the_hand_is_not_turned() -> None:
+    alignments = [_measured(number, 0.0) for number in range(12)]
+    known_mm = mean_length_mm(_errors_m(alignments))
+    unknown_mm = mean_length_mm(_errors_m([_uncut(made) for made in alignments]))
+    assert known_mm < 1.0
+    assert known_mm < unknown_mm < 2.0
+
+
+@pytest.mark.parametrize("angle_deg", [3.0, 6.0, 9.0])
+def test_cuts_noise_and_samples_cost_little_beside_the_turn(angle_deg: float) -> None:
+    alignments = [_measured(number, angle_deg) for number in range(10)]
+    floor_mm = _floors_mm(alignments)
+    assert mean_length_mm(_errors_m(alignments)) < floor_mm + 0.5
+    assert mean_length_mm(_errors_m([_uncut(made) for made in alignments])) < floor_mm + 1.0
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 2.0, 5.0, 9.0, 14.0, 20.0])
+def test_clean_clouds_keep_to_the_floor(angle_deg: float) -> None:
+    making = AlignmentSettings(count=1500)
+    alignments = [trial_alignment(_trial(number), angle_deg, making) for number in range(10)]
+    assert mean_length_mm(_errors_m(alignments)) < 1.1 * _floors_mm(alignments) + 0.05
+
+
+@pytest.mark.parametrize("exact", [True, False], ids=["honest data", "the paper's data"])
+@pytest.mark.parametrize("angle_deg", [0.0, 3.0, 9.0])
+def test_no_worse_than_the_paper(angle_deg: float, exact: bool) -> None:
+    making = AlignmentSettings(count=800, exact=exact)
+    alignments = [trial_alignment(_trial(number), angle_deg, making) for number in range(3)]
+    paper_mm = mean_length_mm(_errors_m(alignments, "paper"))
+    assert mean_length_mm(_errors_m(alignments)) < paper_mm + 0.05
+
+
+def test_the_covariance_is_honest() -> None:
+    """Normalised squared errors follow chi-square with 3 degrees of freedom, mean 3."""
+    count = 50
+    rng = np.random.default_rng(0)
+    squares = []
+    for number in range(count):
+        made = _measured(number, rng.uniform(0.0, 9.0), rng.uniform(0.0005, 0.002))
+        solved = solve_trial(made, "consistent")
+        np.testing.assert_allclose(solved.covariance_m2, solved.covariance_m2.T)
+        assert np.linalg.eigvalsh(solved.covariance_m2)[0] > 0.0
+        error_m = solved.shift_m - made.shift_m
+        squares.append(error_m @ np.linalg.solve(solved.covariance_m2, error_m))
+    sigma = np.sqrt(6.0 / count)
+    assert abs(np.mean(squares) - 3.0) < 3.0 * sigma
+    # 95 % of them lie below 7.8.
+    assert np.mean(np.array(squares) < 7.8) > 0.85
+
+
+def test_the_covariance_grows_with_turn_and_noise() -> None:
+    def sigma_m(angle_deg: float, noise_m: float) -> float:
+        solved = solve_trial(_measured(1, angle_deg, noise_m), "consistent")
+        return float(np.sqrt(np.trace(solved.covariance_m2)))
+
+    assert sigma_m(0.0, 0.0005) < sigma_m(0.0, 0.003) < sigma_m(5.0, 0.003) < sigma_m(9.0, 0.003)
+
+
+def test_what_is_cut_is_no_inlier() -> None:
+    """A hand that shows more arm than its cursor has no partners there."""
+    making = AlignmentSettings(
+        count=2000, resample=True, cursor_forearm_m=0.02, hand_forearm_m=0.06
+    )
+    made = trial_alignment(0, 0.0, making)
+    solved = solve_trial(made, "consistent")
+    in_common = len(made.known_hand_m) / len(made.hand_m)
+    assert in_common < 0.9
+    assert solved.inlier_ratio == pytest.approx(in_common, abs=0.05)
+    # Pairs of clouds that are sampled apart lie within a point spacing of one another.
+    assert solved.rms_m < 0.003
