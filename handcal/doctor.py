@@ -87,7 +87,10 @@ def _packages() -> list[Finding]:
 
 
 def _examples() -> Finding:
-    return _try("Example rig", lambda: read_rig(resource_path("example_rig.yaml")).name)
+    def read() -> str:
+        return read_rig(resource_path("example_rig.yaml")).name
+
+    return _try("Example rig", read, "install handcal again")
 
 
 def _network() -> Finding:
@@ -97,7 +100,7 @@ def _network() -> Finding:
         transport.close()
         return f"UDP works on the loopback interface (port {port})"
 
-    return _try("Network", bind)
+    return _try("Network", bind, "let the firewall pass UDP on the loopback interface")
 
 
 def _pairing() -> Finding:
@@ -136,15 +139,18 @@ def _screen() -> Finding:
 
 
 def _disk() -> Finding:
-    free_bytes = shutil.disk_usage(Path.cwd()).free
+    try:
+        free_bytes = shutil.disk_usage(Path.cwd()).free
+    except OSError as error:
+        return Finding("Disk", Health.BROKEN, str(error), "run handcal in a folder that exists")
     found = f"{free_bytes / 2**30:.1f} GiB free here"
     if free_bytes < _LEAST_FREE_BYTES:
         return Finding("Disk", Health.BROKEN, found, "make room: a session takes some megabytes")
     return Finding("Disk", Health.GOOD, found)
 
 
-def _try(what: str, look: Callable[[], str]) -> Finding:
+def _try(what: str, look: Callable[[], str], advice: str) -> Finding:
     try:
         return Finding(what, Health.GOOD, look())
     except HandcalError as error:
-        return Finding(what, Health.BROKEN, str(error), "install handcal again, or free the port")
+        return Finding(what, Health.BROKEN, str(error), advice)
