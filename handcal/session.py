@@ -285,8 +285,6 @@ def _journal_line(number: int, event: str, data: dict[str, Any]) -> bytes:
 
 def _read_journal(path: Path) -> tuple[list[Event], int, int]:
     """Return the events, and the length of the complete lines and of the unfinished last one."""
-    if not path.exists():
-        raise FileError(f"{path.parent} is no session's folder: it has no {path.name}")
     content = read_limited(path, MAX_JOURNAL_BYTES)
     *lines, torn = content.split(b"\n")
     try:
