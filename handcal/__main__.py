@@ -195,6 +195,14 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
+    except OSError as error:
+        _fail(f"cannot write the output: {error.strerror or error}", 1)
+
+
+class _Help(argparse.ArgumentDefaultsHelpFormatter):
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        has_default = action.default is not None and action.default is not False
+        return super()._get_help_string(action) if has_default else action.help
 
 
 class _Parser(argparse.ArgumentParser):
@@ -220,7 +228,7 @@ def _parser() -> argparse.ArgumentParser:
             command.__name__,
             help=text,
             description=text,
-            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+            formatter_class=_Help,
         )
         added.set_defaults(command=command)
         if json:
@@ -295,7 +303,7 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
             value = math.nan
         if not low <= value <= high:
             what = "whole number" if kind is int else "number"
-            raise argparse.ArgumentTypeError(f"{text!r} is no {what} from {low:g} to {high:g}")
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what} from {low} to {high}")
         return value
 
     return convert
