@@ -30,7 +30,7 @@ _OUTLIER_MEDIANS = 3.0
 # once, on exact ones until every point has found its own.
 _GAIN = 0.01
 # The registration's residuals are not independent; found over 200 simulated alignments.
-_REGISTRATION_FACTOR = 4.0
+_REGISTRATION_FACTOR = 4.5
 # No registration is better than this, whatever its residuals say, and of what a turn moves the
 # hand, this share goes astray in every direction.
 _LEAST_SIGMA_M = 5e-5
