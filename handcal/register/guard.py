@@ -13,9 +13,9 @@ from handcal.register.solve import check_cloud
 from handcal.register.surface import describe_surface
 from handcal.types import Bool, Float64
 
-# Half a degree in a few milliseconds, and a quarter of one in thrice the time.
+# Mean error with 1.5 mm of noise 0.7° in a few milliseconds, and 0.4° in twice the time.
 _LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
-_ONCE = RigidSettings(max_points=1000, max_interior=300, tolerance_m=1e-4)
+_ONCE = RigidSettings(max_points=800, max_interior=400, tolerance_m=3e-4)
 
 
 @dataclass(frozen=True, slots=True)
