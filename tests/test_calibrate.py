@@ -1,0 +1,647 @@
+"""The procedure, driven by rendered frames and by a headset over real datagrams."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.calibrate import (
+    Calibration,
+    CalibrationSettings,
+    Observation,
+    ProcedureError,
+    State,
+)
+from handcal.display import projection_matrix, update_matrix, view_of_eye
+from handcal.errors import FileError, HandError, LinkError, PoseError
+from handcal.geometry import invert, rigid, transform
+from handcal.link.client import HeadsetClient, HeadsetState
+from handcal.link.server import HeadsetServer
+from handcal.link.settings import LinkSettings
+from handcal.register.guard import RotationGuard
+from handcal.results import SolveSettings, results_json, solve_session
+from handcal.rig.example import example_rig
+from handcal.session import Session
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World, render
+from handcal.sim.room import make_room
+from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.types import EYES, Eye, Float64, Frame, Intrinsics, UInt16
+
+KEY = b"a pairing key of the tests"
+RIG = example_rig()
+CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
+SENSOR = SensorSettings()
+LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
+SETTINGS = CalibrationSettings(camera_latency_s=0.0)
+PERIOD_NS = 80_000_000
+HEADSET_AHEAD_NS = 5_000_000_000
+CAMERA_AHEAD_NS = 7_000_000_000
+
+T_W_H = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])
+T_D_HAND = rigid([-0.2, 0.0, 0.0], [0.0, 0.0, 0.5])
+T_D_NEAR = rigid([-0.2, 0.0, 0.0], [0.006, -0.004, 0.5])
+T_D_TURNED = rigid([-0.2, 0.0, 0.0], [0.006, -0.004, 0.5]) @ rigid([0.0, 0.0, np.radians(15.0)])
+
+# Opens a session with the alignment of another, and dies with it open.
+KILLED = """
+import os, sys
+from pathlib import Path
+from handcal.session import Session
+record = Session.open(Path(sys.argv[1]))
+session = Session.create(Path(sys.argv[2]), record.rig, record.settings, name="killed")
+session.save_alignment(record.alignments[0])
+os._exit(9)
+"""
+
+
+@cache
+def world() -> World:
+    return World(make_hand(1), make_room(1))
+
+
+@cache
+def depth_of(pose: bytes | None) -> UInt16:
+    T_D_hand = None if pose is None else np.frombuffer(pose).reshape(4, 4)
+    depth_m, _ = render(world(), np.eye(4), T_D_hand, CAMERA)
+    # The focal length of the full-resolution image, whose noise the smaller one inherits.
+    return sense_depth(depth_m, 2 * CAMERA.fx, np.random.default_rng(0), SENSOR)
+
+
+class Stage:
+    """A calibration with its wearer and headset, on a timeline of its own that needs no waiting."""
+
+    def __init__(self, server: HeadsetServer, client: HeadsetClient, session: Session | None):
+        self.server, self.client = server, client
+        self.calibration = Calibration(RIG, server, session, SETTINGS)
+        self.t_ns = time.monotonic_ns()
+        self._frames = 0
+
+    def send_poses(self, T: Float64 = T_W_H, t_ns: int | None = None) -> None:
+        """Tell the pose around a time, and wait until it is known."""
+        t_ns = t_ns or self.t_ns
+        for part_ns in (-20_000_000, 20_000_000):
+            self.client.send_pose(T, t_ns + part_ns + HEADSET_AHEAD_NS)
+        eventually(lambda: self._knows_pose(t_ns))
+
+    def see(
+        self, T_D_hand: Float64 | None = T_D_HAND, T: Float64 = T_W_H, *, pose: bool = True
+    ) -> Observation:
+        """Step with the next frame, of a hand or none."""
+        self.t_ns += PERIOD_NS
+        self._frames += 1
+        if pose:
+            self.send_poses(T)
+        t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
+        depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes())
+        return self.calibration.step(
+            Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
+        )
+
+    def hold(self, T_D_hand: Float64 = T_D_HAND, frames: int = 7) -> Observation:
+        """Hold the hand still for a while."""
+        return [self.see(T_D_hand) for _ in range(frames)][-1]
+
+    def press(self, t_ns: int | None = None, cursor_id: int | None = None) -> None:
+        """Press the headset's button, at a time and for a cursor, as of now by default."""
+        cursor_id = self.shown().cursor_id if cursor_id is None else cursor_id
+        T_E_W = {eye: view_of_eye(RIG.eyes[eye], T_W_H) for eye in EYES}
+        t_headset_ns = (t_ns or self.t_ns) + HEADSET_AHEAD_NS
+        self.client.wait_acked(self.client.confirm(T_E_W, t_headset_ns, cursor_id), 5.0)
+
+    def make_cursor(self, T_D_hand: Float64 = T_D_HAND, eyes: Sequence[Eye] = EYES) -> None:
+        """Hold the hand, make the cursor of it, and wait until the headset shows it."""
+        before = self.shown().cursor_id
+        self.hold(T_D_hand)
+        self.calibration.make_cursor(eyes)
+        eventually(lambda: self.shown().cursor_id > before and self.shown().prompt)
+
+    def align(
+        self,
+        T_D_cursor: Float64 = T_D_HAND,
+        T_D_hand: Float64 = T_D_NEAR,
+        eyes: Sequence[Eye] = EYES,
+    ) -> None:
+        """Make a cursor and align the hand with it."""
+        self.make_cursor(T_D_cursor, eyes)
+        self.see(T_D_hand)
+        self.press()
+        self.see(T_D_hand)
+
+    def calibrate(
+        self,
+        T_D_cursor: Float64 = T_D_HAND,
+        T_D_hand: Float64 = T_D_NEAR,
+        eyes: Sequence[Eye] = EYES,
+    ) -> None:
+        """Go round once."""
+        self.align(T_D_cursor, T_D_hand, eyes)
+        self.calibration.solve()
+        self.calibration.apply()
+        self.calibration.wait_applied()
+
+    def state(self) -> State:
+        return self.calibration.state
+
+    def shown(self) -> HeadsetState:
+        return self.client.state()
+
+    def _knows_pose(self, t_ns: int) -> bool:
+        try:
+            self.server.pose_at_host_ns(t_ns)
+        except PoseError:
+            return False
+        return True
+
+
+def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
+    end_s = time.monotonic() + timeout_s
+    while not is_true():
+        assert time.monotonic() < end_s, "the condition never held"
+        time.sleep(0.001)
+
+
+@pytest.fixture
+def server() -> Iterator[HeadsetServer]:
+    with HeadsetServer(KEY, settings=LINK) as server:
+        yield server
+
+
+def connect(server: HeadsetServer) -> HeadsetClient:
+    client = HeadsetClient(
+        server.address, KEY, lambda: time.monotonic_ns() + HEADSET_AHEAD_NS, LINK
+    )
+    client.wait_connected(5.0)
+    return client
+
+
+@pytest.fixture
+def client(server: HeadsetServer) -> Iterator[HeadsetClient]:
+    with connect(server) as client:
+        yield client
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[Session]:
+    with Session.create(tmp_path, RIG, {}, name="session") as session:
+        yield session
+
+
+@pytest.fixture
+def stage(server: HeadsetServer, client: HeadsetClient, session: Session) -> Stage:
+    return Stage(server, client, session)
+
+
+def events(session: Session) -> list[tuple[str, dict[str, Any]]]:
+    return [(event.name, event.data) for event in Session.open(session.path).events]
+
+
+def cursor_for(
+    eye: Eye, true_m: Float64, drawn_m: Float64, T_D_hand: Float64 = T_D_HAND
+) -> Float64:
+    """Return the pose of the hand as cursor that, drawn with a shift, `T_D_hand` overlays.
+
+    Of one eye, in the middle of the hand: UQ(true) s and UQ(drawn) d lie on one pixel, at the same
+    size.
+    """
+    display = RIG.eyes[eye]
+    T_E_D = view_of_eye(display, np.eye(4)) @ RIG.T_H_D
+    hand_E = transform(T_E_D, T_D_hand[:3, 3][None])[0]
+    seen = update_matrix(true_m, display.z_C0_S_m) @ [*hand_E, 1.0]
+    seen *= _factor(drawn_m, display.z_C0_S_m) / _factor(true_m, display.z_C0_S_m)
+    seen[3] = 1.0
+    cursor_E = (np.linalg.inv(update_matrix(drawn_m, display.z_C0_S_m)) @ seen)[:3]
+    moved = T_D_hand.copy()
+    moved[:3, 3] = transform(invert(T_E_D), cursor_E[None])[0]
+    return moved
+
+
+def _factor(shift_m: Float64, distance_m: float) -> float:
+    return float(1.0 - shift_m[2] / distance_m)
+
+
+def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session) -> None:
+    calibration = stage.calibration
+    assert not stage.hold(frames=3).is_steady
+    seen = stage.hold()
+    assert seen.is_steady
+    assert seen.state is State.SHOW_HAND
+    assert seen.hand is not None
+    stage.make_cursor()
+    shown = stage.shown()
+    assert shown.cursor_W_m is not None
+    contour_W_m = transform(T_W_H @ RIG.T_H_D, seen.hand.cloud.contour_m)
+    np.testing.assert_allclose(shown.cursor_W_m, contour_W_m, atol=1e-3)
+    assert shown.eyes == EYES
+    assert "both eyes" in shown.prompt
+
+    seen = stage.see(T_D_NEAR)
+    assert seen.state is State.ALIGN
+    assert not seen.is_red
+    assert seen.rotation_rad is not None
+    assert np.linalg.norm(seen.rotation_rad) < np.radians(1.0)
+    eventually(lambda: stage.shown().live_W_m is not None)
+    assert not stage.shown().live_red
+    stage.press()
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+    results = calibration.solve()
+    assert stage.state() is State.SOLVED
+    calibration.apply()
+    assert stage.state() is State.APPLYING
+    calibration.wait_applied()
+    assert stage.state() is State.APPLIED
+
+    for eye in EYES:
+        projection = stage.shown().projections[eye]
+        expected = projection_matrix(RIG.eyes[eye], results.shifts[eye].shift_m)
+        np.testing.assert_array_equal(projection.P, expected)
+        assert (projection.width_px, projection.height_px) == (1268, 720)
+    eventually(lambda: stage.shown().cursor_W_m is None and not stage.shown().prompt)
+    (alignment,) = calibration.alignments
+    np.testing.assert_allclose(
+        np.mean(alignment.hand_m, 0) - np.mean(alignment.cursor_m, 0),
+        (T_W_H @ RIG.T_H_D)[:3, :3] @ (T_D_NEAR - T_D_HAND)[:3, 3],
+        atol=1.5e-3,
+    )
+    record = Session.open(session.path)
+    assert record.results == results_json(results)
+    assert record.alignments[0].hand_m.tobytes() == alignment.hand_m.tobytes()
+    assert [name for name, _ in events(session)] == [
+        "created", "cursor_made", "alignment_saved", "solved", "applied",
+    ]  # fmt: skip
+
+
+def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
+    stage: Stage, session: Session
+) -> None:
+    stage.make_cursor()
+    seen = stage.see(T_D_TURNED)
+    assert seen.is_red
+    assert seen.rotation_rad is not None
+    # About the camera's z axis, as the hand was turned about its own, which nearly is that.
+    np.testing.assert_allclose(np.degrees(seen.rotation_rad), [0.0, 3.0, 14.7], atol=1.0)
+    eventually(lambda: stage.shown().live_red)
+    stage.press()
+    assert stage.see(T_D_TURNED).state is State.ALIGN
+    assert stage.calibration.refused == 1
+    assert stage.calibration.alignments == []
+    eventually(lambda: "turned by" in stage.shown().prompt)
+    assert "more than 9°" in stage.shown().prompt
+    name, data = events(session)[-1]
+    assert (name, data["reason"]) == ("refused", "turned")
+    assert data["angle_deg"] == pytest.approx(15.0, abs=1.0)
+
+    stage.see(T_D_NEAR)
+    stage.press()
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+    assert stage.calibration.refused == 1
+    assert len(stage.calibration.alignments) == 1
+
+
+def test_a_confirmation_of_an_older_cursor_is_ignored(stage: Stage) -> None:
+    stage.make_cursor()
+    older = stage.shown().cursor_id
+    stage.make_cursor()
+    stage.see()
+    stage.press(cursor_id=older)
+    assert stage.see().state is State.ALIGN
+    stage.press()
+    assert stage.see().state is State.ALIGNED
+
+
+def test_a_confirmation_without_a_hand_is_refused(stage: Stage, session: Session) -> None:
+    stage.make_cursor()
+    for _ in range(3):
+        seen = stage.see(None)
+    assert seen.hand is None
+    assert seen.problem
+    stage.press()
+    assert stage.see(None).state is State.ALIGN
+    eventually(lambda: "did not see your hand" in stage.shown().prompt)
+    assert stage.calibration.refused == 0  # those count turned hands
+    assert events(session)[-1][1]["reason"] == "no hand"
+
+
+def test_the_frame_nearest_the_confirmation_is_taken_at_its_own_pose(stage: Stage) -> None:
+    """Hand and head both move; neither the newest frame nor the newest pose will do."""
+    stage.make_cursor()
+    moving = [rigid([-0.2, 0.0, 0.0], [0.004 * i, 0.0, 0.5]) for i in range(5)]
+    turning = [T_W_H @ rigid([0.0, 0.01 * i, 0.0], [0.0, 0.002 * i, 0.0]) for i in range(5)]
+    times_ns = []
+    for T_D_hand, T in zip(moving, turning, strict=True):
+        stage.see(T_D_hand, T)
+        times_ns.append(stage.t_ns)
+    stage.press(times_ns[2] + PERIOD_NS // 3)
+    stage.see(moving[-1], turning[-1])
+    (alignment,) = stage.calibration.alignments
+    assert alignment.t_b_ns == times_ns[2] + CAMERA_AHEAD_NS
+    T_W_D = turning[2] @ RIG.T_H_D
+    expected_W_m = np.mean(visible_m(T_W_D @ moving[2]), 0)
+    still_W_m = np.mean(visible_m(T_W_H @ RIG.T_H_D @ T_D_HAND), 0)
+    np.testing.assert_allclose(
+        np.mean(alignment.hand_m, 0) - np.mean(alignment.cursor_m, 0),
+        expected_W_m - still_W_m,
+        atol=1e-3,
+    )
+
+
+def visible_m(T_W_hand: Float64) -> Float64:
+    return transform(T_W_hand, world().hand.vertices_m)
+
+
+def test_a_confirmation_waits_for_the_pose_of_the_frame_nearest_it(stage: Stage) -> None:
+    stage.make_cursor()
+    stage.see(T_D_HAND)
+    stage.see(T_D_NEAR, pose=False)
+    nearest_ns = stage.t_ns
+    stage.press()
+    seen = stage.see(T_D_NEAR, pose=False)
+    assert seen.state is State.ALIGN
+    assert seen.hand is None
+    assert "has not arrived yet" in seen.problem
+    stage.send_poses(t_ns=nearest_ns)
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+    assert stage.calibration.alignments[0].t_b_ns == nearest_ns + CAMERA_AHEAD_NS
+
+
+def test_over_a_slow_link_the_newest_hand_with_a_pose_is_shown(stage: Stage) -> None:
+    """Every frame's pose comes one frame late."""
+    stage.hold()
+    for _ in range(3):
+        before_ns = stage.t_ns
+        seen = stage.see(pose=False)
+        if seen.hand is not None:
+            assert seen.hand.t_host_ns == before_ns
+        stage.send_poses()
+    assert seen.hand is not None
+    assert not seen.problem
+    assert seen.is_steady
+
+
+def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:
+    true_m = {"left": np.array([0.004, -0.003, 0.002]), "right": np.array([0.002, -0.002, 0.001])}
+    zero_m = np.zeros(3)
+    stage.align(cursor_for("left", true_m["left"], zero_m), T_D_HAND, ("left",))
+    stage.calibration.solve()
+    stage.calibration.apply()
+    stage.calibration.wait_applied()
+    assert set(stage.shown().projections) == {"left"}
+    stage.make_cursor(cursor_for("right", true_m["right"], zero_m), ("right",))
+    assert stage.shown().eyes == ("right",)
+    assert "Close your left eye" in stage.shown().prompt
+    stage.see(T_D_HAND)
+    stage.press()
+    stage.see(T_D_HAND)
+    results = stage.calibration.solve()
+    for number, eye in enumerate(EYES):
+        assert set(results.alignments[number]) == {eye}
+        np.testing.assert_allclose(
+            results.alignments[number][eye].shift_m, true_m[eye], atol=1.5e-3
+        )
+        assert np.linalg.norm(results.shifts[eye].shift_m - true_m[eye]) < 2e-3
+    assert results.eye_distance_m is not None
+
+
+def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(stage: Stage) -> None:
+    true_m = np.array([0.004, -0.003, 0.002])
+    slip = rigid(translation_m=[0.0004, 0.0, 0.0])
+    stage.calibrate(slip @ cursor_for("left", true_m, np.zeros(3)), T_D_HAND, ("left",))
+    assert stage.calibration.results is not None
+    first = stage.calibration.results.shifts["left"]
+    stage.align(invert(slip) @ cursor_for("left", true_m, first.shift_m), T_D_HAND, ("left",))
+    drawn_m = stage.calibration.alignments[1].drawn_shift_m
+    np.testing.assert_array_equal(drawn_m["left"], first.shift_m)
+    np.testing.assert_array_equal(drawn_m["right"], np.zeros(3))
+    results = stage.calibration.solve()
+    fused = results.shifts["left"]
+    assert np.linalg.norm(fused.shift_m - true_m) < np.linalg.norm(first.shift_m - true_m)
+    assert np.trace(fused.covariance_m2) < np.trace(first.covariance_m2)
+
+
+def test_the_pc_may_confirm_but_only_with_a_hand_in_view(stage: Stage) -> None:
+    stage.make_cursor()
+    stage.see(T_D_NEAR)
+    for _ in range(3):
+        stage.see(None)
+    with pytest.raises(ProcedureError, match="in view of the camera"):
+        stage.calibration.confirm()
+    stage.see(T_D_NEAR)
+    t_b_ns = stage.t_ns + CAMERA_AHEAD_NS
+    stage.calibration.confirm()
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+    alignment = stage.calibration.alignments[0]
+    assert alignment.t_b_ns == t_b_ns
+    for eye in EYES:
+        np.testing.assert_allclose(
+            alignment.T_E_W[eye], view_of_eye(RIG.eyes[eye], T_W_H), atol=1e-9
+        )
+
+
+def test_a_moving_or_absent_hand_is_not_steady(stage: Stage) -> None:
+    for i in range(8):
+        seen = stage.see(rigid([-0.2, 0.0, 0.0], [0.004 * (i % 2), 0.003 * (i % 4), 0.5]))
+    assert seen.hand is not None
+    assert not seen.is_steady
+    with pytest.raises(ProcedureError, match="hold the hand still"):
+        stage.calibration.make_cursor()
+    assert stage.hold().is_steady
+    for _ in range(6):
+        seen = stage.see(None)
+    assert not seen.is_steady
+
+
+def test_redo_gives_up_the_cursor_or_the_last_alignment(stage: Stage, session: Session) -> None:
+    calibration = stage.calibration
+    stage.calibrate()
+    applied = calibration.results
+    with pytest.raises(ProcedureError, match="nothing to redo"):
+        calibration.redo()
+
+    stage.make_cursor()
+    calibration.redo()
+    assert stage.state() is State.SHOW_HAND
+    assert calibration.results is applied
+    eventually(lambda: stage.shown().cursor_W_m is None)
+    with pytest.raises(ProcedureError, match="nothing to redo"):
+        calibration.redo()
+
+    stage.align()
+    calibration.redo()
+    assert len(calibration.alignments) == 1
+
+    stage.align()
+    calibration.solve()
+    calibration.redo()
+    assert stage.state() is State.SHOW_HAND
+    assert calibration.results is None
+    record = Session.open(session.path)
+    assert len(record.alignments) == 1
+    assert record.results is None
+
+    again = results_json(calibration.solve())
+    assert again == results_json(solve_session(record.alignments, RIG, SolveSettings()))
+
+
+CALLS: dict[str, Callable[[Calibration], object]] = {
+    "make_cursor": lambda calibration: calibration.make_cursor(),
+    "confirm": lambda calibration: calibration.confirm(),
+    "solve": lambda calibration: calibration.solve(),
+    "apply": lambda calibration: calibration.apply(),
+    "wait_applied": lambda calibration: calibration.wait_applied(),
+    "redo": lambda calibration: calibration.redo(),
+}
+OUT_OF_TURN = {
+    State.SHOW_HAND: {
+        "make_cursor": "hold the hand still",
+        "confirm": "no cursor to confirm",
+        "solve": "align the hand with the cursor first",
+        "apply": "solve first",
+        "wait_applied": "apply first",
+        "redo": "nothing to redo",
+    },
+    State.ALIGN: {
+        "solve": "align the hand with the cursor first",
+        "apply": "solve first",
+        "wait_applied": "apply first",
+    },
+    State.ALIGNED: {
+        "make_cursor": "solve and apply",
+        "confirm": "no cursor to confirm",
+        "apply": "solve first",
+        "wait_applied": "apply first",
+    },
+    State.SOLVED: {
+        "make_cursor": "solve and apply",
+        "confirm": "no cursor to confirm",
+        "wait_applied": "apply first",
+    },
+    State.APPLYING: {
+        "make_cursor": "cannot be made now",
+        "confirm": "no cursor to confirm",
+        "solve": "wait until the projections are applied",
+        "apply": "solve first",
+        "redo": "nothing to redo",
+    },
+    State.APPLIED: {
+        "confirm": "no cursor to confirm",
+        "apply": "solve first",
+        "wait_applied": "apply first",
+        "redo": "nothing to redo",
+    },
+}
+
+
+def test_out_of_turn_every_call_says_what_must_come_first(stage: Stage) -> None:
+    calibration = stage.calibration
+
+    def align() -> None:
+        stage.press()
+        stage.see()
+
+    steps: dict[State, Callable[[], object]] = {
+        State.SHOW_HAND: lambda: None,
+        State.ALIGN: stage.make_cursor,
+        State.ALIGNED: align,
+        State.SOLVED: calibration.solve,
+        State.APPLYING: calibration.apply,
+        State.APPLIED: calibration.wait_applied,
+    }
+    for state, step in steps.items():
+        step()
+        for name, text in OUT_OF_TURN[state].items():
+            with pytest.raises(ProcedureError, match=text):
+                CALLS[name](calibration)
+            assert stage.state() is state
+
+
+def test_a_silent_headset_can_be_applied_to_again_when_it_is_back(
+    stage: Stage, server: HeadsetServer, client: HeadsetClient
+) -> None:
+    stage.align()
+    results = stage.calibration.solve()
+    client.close()
+    eventually(lambda: not server.connected)
+    stage.calibration.apply()
+    with pytest.raises(LinkError, match="not acknowledged"):
+        stage.calibration.wait_applied(0.1)
+    assert stage.state() is State.SOLVED
+    with connect(server) as back:
+        stage.calibration.apply()
+        stage.calibration.wait_applied()
+        for eye in EYES:
+            expected = projection_matrix(RIG.eyes[eye], results.shifts[eye].shift_m)
+            np.testing.assert_array_equal(back.state().projections[eye].P, expected)
+
+
+def test_what_the_disk_did_not_take_is_kept_and_stored_later(
+    stage: Stage, session: Session, tmp_path: Path
+) -> None:
+    calibration, away = stage.calibration, tmp_path / "away"
+    stage.make_cursor()
+    stage.see(T_D_NEAR)
+    stage.press()
+    session.path.rename(away)
+    with pytest.raises(FileError, match="cannot write"):
+        stage.see(T_D_NEAR)
+    assert stage.state() is State.ALIGNED
+    with pytest.raises(FileError, match="cannot write"):
+        calibration.solve()
+    assert stage.state() is State.SOLVED
+    assert calibration.results is not None
+    calibration.apply()
+    with pytest.raises(FileError, match="cannot write"):
+        calibration.wait_applied()
+    assert stage.state() is State.APPLIED
+    assert set(stage.shown().projections) == set(EYES)
+
+    away.rename(session.path)
+    stage.align()
+    assert len(Session.open(session.path).alignments) == 2
+
+
+def test_a_session_whose_program_was_killed_is_solved_alike(
+    stage: Stage, session: Session, tmp_path: Path
+) -> None:
+    stage.align()
+    results = stage.calibration.solve()
+    killed = subprocess.run(
+        [sys.executable, "-c", KILLED, session.path, tmp_path],
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )
+    assert killed.returncode == 9
+    record = Session.open(tmp_path / "killed")
+    assert results_json(solve_session(record.alignments, record.rig, SolveSettings())) == (
+        results_json(results)
+    )
+
+
+def test_a_hand_beside_cut_edges_counts_as_none(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage.make_cursor()
+
+    def all_cut(*_: object) -> Float64:
+        raise HandError("all of the hand lies beside cut edges")
+
+    monkeypatch.setattr(RotationGuard, "rotation", all_cut)
+    seen = stage.see()
+    assert seen.hand is None
+    assert "beside cut edges" in seen.problem
+    stage.press()
+    assert stage.see().state is State.ALIGN
+    eventually(lambda: "beside cut edges. Align and confirm again" in stage.shown().prompt)
+
+
+def test_it_runs_without_a_session(server: HeadsetServer, client: HeadsetClient) -> None:
+    stage = Stage(server, client, None)
+    stage.calibrate()
+    assert stage.state() is State.APPLIED
