@@ -411,9 +411,13 @@ def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:
     assert results.eye_distance_m is not None
 
 
-def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(stage: Stage) -> None:
+@pytest.mark.parametrize("slip_m", [0.0, 0.002])
+def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(
+    stage: Stage, slip_m: float
+) -> None:
+    """The wearer misses the first cursor by `slip_m` to one side, the second to the other."""
     true_m = np.array([0.004, -0.003, 0.002])
-    slip = rigid(translation_m=[0.0004, 0.0, 0.0])
+    slip = rigid(translation_m=[slip_m, 0.0, 0.0])
     stage.calibrate(slip @ cursor_for("left", true_m, np.zeros(3)), T_D_HAND, ("left",))
     assert stage.calibration.results is not None
     first = stage.calibration.results.shifts["left"]
@@ -421,10 +425,11 @@ def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(stage: St
     drawn_m = stage.calibration.alignments[1].drawn_shift_m
     np.testing.assert_array_equal(drawn_m["left"], first.shift_m)
     np.testing.assert_array_equal(drawn_m["right"], np.zeros(3))
-    results = stage.calibration.solve()
-    fused = results.shifts["left"]
-    assert np.linalg.norm(fused.shift_m - true_m) < np.linalg.norm(first.shift_m - true_m)
-    assert np.trace(fused.covariance_m2) < np.trace(first.covariance_m2)
+    fused = stage.calibration.solve().shifts["left"]
+    before_m, after_m = (np.linalg.norm(s.shift_m - true_m) for s in (first, fused))
+    assert after_m < max(0.6 * before_m, 5e-4)
+    if slip_m == 0.0:
+        assert np.trace(fused.covariance_m2) < np.trace(first.covariance_m2)
 
 
 def test_the_pc_may_confirm_but_only_with_a_hand_in_view(stage: Stage) -> None:
