@@ -1,0 +1,54 @@
+"""The camera's clock on the host's."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.camera.clock import FrameClock
+from handcal.types import Frame, Intrinsics
+
+TINY = Intrinsics(2, 2, 1.0, 1.0, 0.5, 0.5)
+PERIOD_NS = 33_333_333
+LATENCY_NS = 30_000_000
+
+
+def frame(t_camera_ns: int, t_host_ns: int) -> Frame:
+    return Frame(0, t_camera_ns, t_host_ns, np.zeros((2, 2), np.uint16), 1e-4, TINY)
+
+
+@given(
+    st.integers(-(10**17), 10**17),
+    st.lists(st.integers(0, 20_000_000), min_size=2, max_size=40),
+)
+def test_late_arrivals_do_not_move_the_exposure(offset_ns: int, late_ns: list[int]) -> None:
+    """Whatever the load, a frame is dated by the quickest; the first counts as one of them."""
+    clock = FrameClock(0.03)
+    base_ns = 10**18
+    for i, late in enumerate([0, *late_ns]):
+        exposed_ns = base_ns + i * PERIOD_NS
+        arrived = frame(exposed_ns + offset_ns, exposed_ns + LATENCY_NS + late)
+        assert clock.exposure_ns(arrived) == exposed_ns
+
+
+def test_a_quicker_frame_corrects_the_estimate() -> None:
+    clock = FrameClock(0.0)
+    assert clock.exposure_ns(frame(1_000, 9_000)) == 9_000
+    assert clock.exposure_ns(frame(2_000, 5_000)) == 5_000
+    assert clock.exposure_ns(frame(3_000, 9_000)) == 6_000
+
+
+def test_drift_is_followed() -> None:
+    """A camera that runs 50 ppm slow; over ten seconds that is half a millisecond."""
+    clock = FrameClock(0.03)
+    for i in range(1500):
+        exposed_ns = i * PERIOD_NS
+        arrived = frame(round(exposed_ns * (1 - 50e-6)), exposed_ns + LATENCY_NS)
+        assert abs(clock.exposure_ns(arrived) - exposed_ns) < 600_000
+
+
+def test_a_camera_that_starts_anew_is_followed_at_once() -> None:
+    clock = FrameClock(0.0)
+    clock.exposure_ns(frame(50_000_000_000, 51_000_000_000))
+    assert clock.exposure_ns(frame(1_000, 52_000_000_000)) == 52_000_000_000

@@ -1,0 +1,146 @@
+"""Settings to JSON and back, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, Literal, get_type_hints
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.calibrate import CalibrationSettings
+from handcal.config import read_settings, settings_json
+from handcal.demo import DemoSettings
+from handcal.errors import FileError
+from handcal.types import METHODS
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@dataclass(frozen=True)
+class Inner:
+    ratio: float = 0.5
+    place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.ratio < 0.0:
+            raise ValueError("ratio is negative; take a positive one")
+
+
+@dataclass(frozen=True)
+class Outer:
+    count: int = 1
+    name: str = "x"
+    is_on: bool = False
+    kind: Literal["a", "b"] = "a"
+    limit_s: float | None = None
+    inner: Inner = field(default_factory=Inner)
+
+
+def any_settings(kind: type) -> st.SearchStrategy[Any]:
+    """Return any JSON-able values of the fields of a settings class, as that class reads them."""
+    return st.fixed_dictionaries(
+        {}, optional={f.name: any_value(get_type_hints(kind)[f.name]) for f in fields(kind)}
+    )
+
+
+def any_value(kind: Any) -> st.SearchStrategy[Any]:
+    if is_dataclass(kind) and isinstance(kind, type):
+        return any_settings(kind)
+    known: dict[Any, st.SearchStrategy[Any]] = {
+        float: FINITE,
+        int: st.integers(1, 10**6),
+        bool: st.booleans(),
+        str: st.text(),
+        tuple[float, float, float]: st.lists(FINITE, min_size=3, max_size=3),
+        Literal["a", "b"]: st.sampled_from(["a", "b"]),
+        Literal[METHODS]: st.sampled_from(METHODS),
+        float | None: st.none() | FINITE,
+    }
+    return known[kind]
+
+
+def holds(stored: Any, given: Any) -> bool:
+    """Tell whether all that was given is stored."""
+    if isinstance(given, dict):
+        return all(holds(stored[name], value) for name, value in given.items())
+    return bool(stored == given)
+
+
+@given(any_settings(CalibrationSettings))
+def test_calibration_settings_come_back(data: dict[str, Any]) -> None:
+    data.get("segment", {}).update(depth_min_m=0.2, depth_max_m=0.9)  # an order it insists on
+    settings = read_settings(CalibrationSettings, data)
+    stored = json.loads(json.dumps(settings_json(settings), allow_nan=False))
+    assert read_settings(CalibrationSettings, stored) == settings
+    assert holds(stored, data)
+
+
+@given(FINITE, st.lists(FINITE, min_size=3, max_size=3), st.none() | FINITE)
+def test_every_kind_of_value_comes_back(ratio: float, place: list[float], limit: float) -> None:
+    data = {
+        "count": 3,
+        "name": "y",
+        "is_on": True,
+        "kind": "b",
+        "limit_s": limit,
+        "inner": {"ratio": abs(ratio), "place_m": place},
+    }
+    settings = read_settings(Outer, data)
+    assert settings == Outer(3, "y", True, "b", limit, Inner(abs(ratio), tuple(place)))  # type: ignore[arg-type]
+    assert json.loads(json.dumps(settings_json(settings))) == data
+
+
+def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> None:
+    assert read_settings(CalibrationSettings, {}) == CalibrationSettings()
+    settings = read_settings(Outer, {"inner": {"ratio": 2}})
+    assert settings == Outer(inner=Inner(ratio=2.0))
+    assert type(settings.inner.ratio) is float
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        ([], "settings must be an object"),
+        (None, "settings must be an object"),
+        ({"speed": 1}, "settings has no speed; it has count, inner, "),
+        ({"inner": {"b": 1, "a": 2}}, "settings.inner has no a, b; it has place_m, ratio"),
+        ({"inner": 3}, "settings.inner must be an object"),
+        ({"inner": {"ratio": "1"}}, "settings.inner.ratio must be a finite number, not '1'"),
+        ({"inner": {"ratio": True}}, "settings.inner.ratio must be a finite number, not 'True'"),
+        ({"inner": {"ratio": math.nan}}, "settings.inner.ratio must be a finite number, not 'nan'"),
+        ({"inner": {"ratio": -math.inf}}, "settings.inner.ratio must be a finite number"),
+        ({"inner": {"ratio": 10**400}}, "settings.inner.ratio must be a finite number"),
+        ({"inner": {"ratio": None}}, "settings.inner.ratio must be a finite number"),
+        ({"inner": {"ratio": -1}}, "settings.inner: ratio is negative; take a positive one"),
+        ({"inner": {"place_m": [1, 2]}}, "settings.inner.place_m must be a list of 3 values"),
+        ({"inner": {"place_m": 1}}, "settings.inner.place_m must be a list of 3 values"),
+        ({"inner": {"place_m": [1, 2, "3"]}}, "settings.inner.place_m must be a finite number"),
+        ({"count": 1.0}, "settings.count must be a whole number, not '1.0'"),
+        ({"count": True}, "settings.count must be a whole number, not 'True'"),
+        ({"name": 1}, "settings.name must be a text, not '1'"),
+        ({"is_on": 1}, "settings.is_on must be true or false, not '1'"),
+        ({"kind": "c"}, "settings.kind must be one of a, b"),
+        ({"kind": ["a"]}, "settings.kind must be one of a, b"),
+        ({"limit_s": "no"}, "settings.limit_s must be a finite number, not 'no'"),
+    ],
+)
+def test_bad_settings_are_named(data: object, problem: str) -> None:
+    with pytest.raises(FileError) as error:
+        read_settings(Outer, data)
+    assert str(error.value).startswith(problem)
+
+
+def test_the_stages_own_complaint_carries_its_place() -> None:
+    data = {"segment": {"depth_min_m": 0.9}}
+    with pytest.raises(FileError, match=r"^mine\.segment: the depth gate 0\.9 to 0\.7 m is empty"):
+        read_settings(CalibrationSettings, data, "mine")
+
+
+@pytest.mark.parametrize("settings", [DemoSettings(seed=3), CalibrationSettings()])
+def test_shipped_settings_are_plain_values(settings: Any) -> None:
+    stored = json.loads(json.dumps(settings_json(settings)))
+    assert read_settings(type(settings), stored) == settings

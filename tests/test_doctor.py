@@ -1,0 +1,125 @@
+"""The doctor: whatever is broken is named, with what to do."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import shutil
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from handcal import doctor
+from handcal.camera.realsense import Device
+from handcal.doctor import Finding, Health, examine
+from handcal.errors import CameraError, FileError, LinkError
+from handcal.link.pairing import KEY_VARIABLE
+
+
+def fail_with(error: Exception) -> object:
+    def fail(*_: object) -> object:
+        raise error
+
+    return fail
+
+
+def of(what: str) -> Finding:
+    findings = [finding for finding in examine() if finding.what == what]
+    assert len(findings) == 1
+    assert bool(findings[0].advice) is (findings[0].health is not Health.GOOD)
+    return findings[0]
+
+
+def test_on_this_machine_nothing_is_broken_and_every_note_has_advice() -> None:
+    findings = examine()
+    assert {finding.health for finding in findings} <= {Health.GOOD, Health.LIMITED}
+    for finding in findings:
+        assert finding.found
+        assert bool(finding.advice) is (finding.health is not Health.GOOD)
+    assert {"Python", "numpy", "Example rig", "Network", "Disk"} <= {f.what for f in findings}
+
+
+def test_an_unfit_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "sys", SimpleNamespace(version_info=(3, 10), platform="linux"))
+    assert of("Python").health is Health.BROKEN
+    assert "3.11" in of("Python").advice
+
+
+def test_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    error = importlib.metadata.PackageNotFoundError("scipy")
+    monkeypatch.setattr(importlib.metadata, "version", fail_with(error))
+    assert of("scipy") == Finding(
+        "scipy", Health.BROKEN, "not installed", "run bash installer/run.sh, or pip install handcal"
+    )
+
+
+def test_a_damaged_rig_and_a_blocked_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "read_rig", fail_with(FileError("rig.yaml is damaged")))
+    monkeypatch.setattr(doctor, "UdpTransport", fail_with(LinkError("no socket may be bound")))
+    assert of("Example rig").found == "rig.yaml is damaged"
+    assert of("Example rig").health is of("Network").health is Health.BROKEN
+    assert of("Network").found == "no socket may be bound"
+    assert "firewall" in of("Network").advice
+
+
+@pytest.mark.parametrize(
+    ("key", "found", "health"),
+    [
+        (None, "no pairing key", Health.LIMITED),
+        ("short", "5 bytes", Health.LIMITED),
+        ("a key that is long enough", "set in HANDCAL_PAIRING_KEY", Health.GOOD),
+    ],
+)
+def test_the_pairing_key(
+    monkeypatch: pytest.MonkeyPatch, key: str | None, found: str, health: Health
+) -> None:
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    if key is not None:
+        monkeypatch.setenv(KEY_VARIABLE, key)
+    assert found in of("Pairing key").found
+    assert of("Pairing key").health is health
+    assert key is None or key not in of("Pairing key").found  # which others may read
+
+
+@pytest.mark.parametrize(
+    ("devices", "found", "health"),
+    [
+        ([], "none connected", Health.LIMITED),
+        ([Device("D415", "123", "5.16", "3.2")], "D415, serial 123", Health.GOOD),
+        ([Device("D415", "123", "5.16", "2.1")], "USB 2.1", Health.LIMITED),
+    ],
+)
+def test_the_camera(
+    monkeypatch: pytest.MonkeyPatch, devices: list[Device], found: str, health: Health
+) -> None:
+    monkeypatch.setattr(doctor, "connected_devices", lambda: devices)
+    assert found in of("Camera").found
+    assert of("Camera").health is health
+
+
+def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "connected_devices", fail_with(CameraError("no SDK")))
+    assert of("RealSense SDK").found == "no SDK"
+    assert of("RealSense SDK").health is Health.LIMITED
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have always a screen")
+def test_the_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    assert of("Screen").health is Health.LIMITED
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert of("Screen").health is Health.GOOD
+
+
+def test_the_disk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    full = shutil.disk_usage(tmp_path)._replace(free=100 * 2**20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    assert of("Disk").found == "0.1 GiB free here"
+    assert of("Disk").health is Health.BROKEN
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    tmp_path.rmdir()
+    assert of("Disk").health is Health.BROKEN
+    assert "folder that exists" in of("Disk").advice

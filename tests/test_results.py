@@ -1,0 +1,119 @@
+"""What a session reports, and that solving it again is solving the same."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.calibrate import CalibrationSettings
+from handcal.config import read_settings, settings_json
+from handcal.files import write_json
+from handcal.register.verdict import VerdictSettings
+from handcal.results import SolveSettings, results_json, solve_session
+from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.session import Session
+from handcal.sim.alignments import AlignmentSettings, simulate_alignment
+from handcal.sim.hand import make_hand
+from handcal.types import EYES, METHODS, Alignment, Eye, Method
+
+RIG = example_rig()
+SIMULATED = AlignmentSettings(
+    count=600, display_distance_m=Z_E_S_M, shift_max_m=0.003, resample=True, depth_sigma_m=0.001
+)
+
+
+def alignment(seed: int, eyes: Sequence[Eye] = EYES) -> Alignment:
+    """Return an alignment of one hand displacement; both eyes see it from one viewpoint."""
+    one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, SIMULATED)
+    return Alignment(
+        cursor_m=one.cursor_m,
+        hand_m=one.hand_m,
+        cursor_is_cut=one.cursor_cut,
+        hand_is_cut=one.hand_cut,
+        T_E_W=dict.fromkeys(EYES, one.T_E_W),
+        eyes=tuple(eyes),
+        rotation_rad=one.rotation_rad,
+        t_a_ns=1,
+        t_b_ns=2,
+    )
+
+
+@pytest.fixture(scope="module")
+def both() -> Alignment:
+    return alignment(1)
+
+
+@pytest.fixture(scope="module")
+def left() -> Alignment:
+    return alignment(2, ("left",))
+
+
+def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None:
+    results = solve_session([left, both], RIG, SolveSettings())
+    data = json.loads(json.dumps(results_json(results), allow_nan=False))
+    assert set(data) == {"version", "method", "eyes", "eye_distance_m", "alignments"}
+    assert (data["version"], data["method"]) == (1, "consistent")
+    assert list(data["eyes"]) == list(EYES)
+    solved = {
+        "shift_m", "covariance_m2", "rms_m", "inlier_ratio", "iterations", "converged",
+        "stop_reason",
+    }  # fmt: skip
+    for eye in EYES:
+        assert set(data["eyes"][eye]) == solved | {"verdict", "reason"}
+        assert data["eyes"][eye]["shift_m"] == results.shifts[eye].shift_m.tolist()
+        assert np.shape(data["eyes"][eye]["covariance_m2"]) == (3, 3)
+        assert data["eyes"][eye]["verdict"] == results.verdicts[eye].name
+        assert data["eyes"][eye]["reason"] == results.verdicts[eye].reason
+    assert [list(alone) for alone in data["alignments"]] == [["left"], ["left", "right"]]
+    assert set(data["alignments"][1]["right"]) == solved
+    assert data["eye_distance_m"] == pytest.approx(0.063, abs=0.010)
+
+
+def test_an_eye_that_took_no_part_has_no_result(left: Alignment) -> None:
+    results = solve_session([left], RIG, SolveSettings())
+    assert set(results.shifts) == set(results.verdicts) == {"left"}
+    assert results.eye_distance_m is None
+
+
+def test_the_settings_reach_the_verdict(left: Alignment) -> None:
+    strict = SolveSettings(verdict=VerdictSettings(error_max_arcmin=0.1))
+    assert solve_session([left], RIG, SolveSettings()).verdicts["left"].name == "accept"
+    assert solve_session([left], RIG, strict).verdicts["left"].name == "repeat"
+
+
+def test_nothing_to_solve_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one alignment"):
+        solve_session([], RIG, SolveSettings())
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_stored_session_is_solved_alike_to_the_last_bit(
+    tmp_path: Path, both: Alignment, left: Alignment, method: Method
+) -> None:
+    settings = CalibrationSettings(solve=SolveSettings(method))
+    alignments = [left] if method == "paper" else [left, both]
+    results = results_json(solve_session(alignments, RIG, settings.solve))
+    stored = {"calibration": settings_json(settings)}
+    with Session.create(tmp_path, RIG, stored, name="one") as session:
+        for each in alignments:
+            session.save_alignment(each)
+        session.save_results(results)
+    record = Session.open(session.path)
+    solve = read_settings(CalibrationSettings, record.settings["calibration"]).solve
+    write_json(
+        tmp_path / "again.json", results_json(solve_session(record.alignments, record.rig, solve))
+    )
+    assert (tmp_path / "again.json").read_bytes() == (session.path / "results.json").read_bytes()
+
+
+def test_another_method_gives_another_result(left: Alignment) -> None:
+    shifts_m = [
+        solve_session([left], RIG, replace(SolveSettings(), method=method)).shifts["left"].shift_m
+        for method in ("consistent", "linear", "icp")
+    ]
+    assert len({tuple(shift_m) for shift_m in shifts_m}) == 3
