@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.camera.realsense import librealsense
 from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.geometry import rigid
@@ -46,7 +47,7 @@ class RecordingCamera(Closable):
     """
 
     def __init__(self, path: Path, real_time: bool = False) -> None:
-        rs = _librealsense()
+        rs = librealsense()
         if not path.is_file():
             raise CameraError(f"there is no recording {path}")
         self.name = f"Recording {path.name}"
@@ -211,7 +212,7 @@ def record_db3(path: Path, frames: Iterable[Frame]) -> int:
 
 
 def _record(path: Path, frames: Iterable[Frame]) -> int:
-    rs = _librealsense()
+    rs = librealsense()
     remaining = iter(frames)
     first = next(remaining, None)
     if first is None:
@@ -293,17 +294,6 @@ def _wait_for_disk(path: Path, written: int) -> None:
         if time.monotonic() > deadline_s:
             raise CameraError(f"{path.parent} takes no more data; is the disk full?")
         time.sleep(0.001)
-
-
-def _librealsense() -> Any:
-    try:
-        import pyrealsense2  # imported late: absent on macOS
-    except ImportError as error:
-        raise CameraError(
-            "RealSense recordings need librealsense: pip install pyrealsense2 "
-            "(no package exists for macOS)"
-        ) from error
-    return pyrealsense2
 
 
 def _intrinsics(profile: Any) -> Intrinsics:
