@@ -324,7 +324,13 @@ def _save(path: Path | None, result: dict[str, Any]) -> None:
 def _table(*columns: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for number, column in enumerate(columns):
-        table.add_column(column, justify="right" if number else "left", no_wrap=True)
+        # The first column gives way where the terminal is narrow.
+        table.add_column(
+            column,
+            justify="right" if number else "left",
+            no_wrap=number > 0,
+            overflow="ellipsis" if number else "fold",
+        )
     return table
 
 
@@ -351,7 +357,15 @@ def _replay_row(step: ReplayStep) -> dict[str, Any]:
 def _progress() -> Iterator[Callable[[str, float], None]]:
     """Yield a function that shows what is going on: a bar on a terminal, else plain lines."""
     if not console.is_terminal:
-        yield lambda what, share: console.print(f"{100 * share:3.0f} % {what}")
+        last = ("", 0)
+
+        def say(what: str, share: float) -> None:
+            nonlocal last
+            if last != (what, int(10 * share)):
+                last = what, int(10 * share)
+                console.print(f"{100 * share:3.0f} % {what}")
+
+        yield say
         return
     columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as bar:
