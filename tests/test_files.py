@@ -24,6 +24,12 @@ def test_write_replaces_the_whole_content_and_leaves_nothing_else(tmp_path: Path
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_others_may_read_what_they_may_read_of_any_file(tmp_path: Path) -> None:
+    write_atomic(tmp_path / "a.bin", b"a")
+    (tmp_path / "b.bin").write_bytes(b"b")
+    assert (tmp_path / "a.bin").stat().st_mode == (tmp_path / "b.bin").stat().st_mode
+
+
 def test_a_failed_write_keeps_the_old_content(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -43,6 +49,8 @@ def test_a_failed_write_keeps_the_old_content(
 def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"cannot write .*: No such file"):
         write_atomic(tmp_path / "gone" / "a.bin", b"")
+    with pytest.raises(FileError, match="cannot write"):
+        write_atomic(Path("/"), b"")
 
 
 def test_reading_is_limited(tmp_path: Path) -> None:
