@@ -22,7 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.geometry import rigid
-from handcal.types import Float64, Projection, readonly
+from handcal.types import Float64, Projection, freeze
 
 # Each is its own inverse.
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -44,8 +44,8 @@ class Pose:
     quaternion_xyzw: Float64
 
     def __post_init__(self) -> None:
-        for name, length in (("position_m", 3), ("quaternion_xyzw", 4)):
-            object.__setattr__(self, name, readonly(getattr(self, name), np.float64, (length,)))
+        freeze(self, "position_m", np.float64, 3)
+        freeze(self, "quaternion_xyzw", np.float64, 4)
 
 
 @dataclass(frozen=True, slots=True)

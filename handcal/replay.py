@@ -15,7 +15,7 @@ from handcal.geometry import transform
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.register.rigid import RigidSettings, register_rigid
 from handcal.register.surface import Surface, describe_surface
-from handcal.types import Float64, Frame, HandCloud, _freeze
+from handcal.types import Float64, Frame, HandCloud, freeze
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,8 +34,8 @@ class HandMotion:
     shift_m: Float64
 
     def __post_init__(self) -> None:
-        _freeze(self, "rotation_rad", np.float64, 3)
-        _freeze(self, "shift_m", np.float64, 3)
+        freeze(self, "rotation_rad", np.float64, 3)
+        freeze(self, "shift_m", np.float64, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -56,7 +56,11 @@ def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...])
     return array
 
 
-def _freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) -> None:
+def freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) -> None:
+    """Make an array field of a frozen dataclass `readonly`, from its ``__post_init__``.
+
+    None stays None. ValueError names the field whose shape does not match.
+    """
     value = getattr(instance, name)
     if value is not None:
         try:
@@ -112,13 +116,13 @@ class Frame:
 
     def __post_init__(self) -> None:
         intrinsics = self.depth_intrinsics
-        _freeze(self, "depth", np.uint16, intrinsics.height, intrinsics.width)
-        _freeze(self, "T_C_D", np.float64, 4, 4)
+        freeze(self, "depth", np.uint16, intrinsics.height, intrinsics.width)
+        freeze(self, "T_C_D", np.float64, 4, 4)
         if (self.color is None) != (self.color_intrinsics is None):
             raise ValueError("Frame: color and color_intrinsics go together")
         if self.color_intrinsics is not None:
             size = self.color_intrinsics.height, self.color_intrinsics.width
-            _freeze(self, "color", np.uint8, *size, 3)
+            freeze(self, "color", np.uint8, *size, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,12 +163,12 @@ class HandCloud:
     median_depth_m: float
 
     def __post_init__(self) -> None:
-        _freeze(self, "points_m", np.float32, None, 3)
-        _freeze(self, "is_cut", np.bool_, len(self.points_m))
-        _freeze(self, "colors", np.uint8, len(self.points_m), 3)
-        _freeze(self, "contour_m", np.float32, None, 3)
-        _freeze(self, "contour_is_cut", np.bool_, len(self.contour_m))
-        _freeze(self, "mask", np.uint8, None, None)
+        freeze(self, "points_m", np.float32, None, 3)
+        freeze(self, "is_cut", np.bool_, len(self.points_m))
+        freeze(self, "colors", np.uint8, len(self.points_m), 3)
+        freeze(self, "contour_m", np.float32, None, 3)
+        freeze(self, "contour_is_cut", np.bool_, len(self.contour_m))
+        freeze(self, "mask", np.uint8, None, None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,11 +207,11 @@ class Alignment:
     )
 
     def __post_init__(self) -> None:
-        _freeze(self, "cursor_m", np.float64, None, 3)
-        _freeze(self, "hand_m", np.float64, None, 3)
-        _freeze(self, "cursor_is_cut", np.bool_, len(self.cursor_m))
-        _freeze(self, "hand_is_cut", np.bool_, len(self.hand_m))
-        _freeze(self, "rotation_rad", np.float64, 3)
+        freeze(self, "cursor_m", np.float64, None, 3)
+        freeze(self, "hand_m", np.float64, None, 3)
+        freeze(self, "cursor_is_cut", np.bool_, len(self.cursor_m))
+        freeze(self, "hand_is_cut", np.bool_, len(self.hand_m))
+        freeze(self, "rotation_rad", np.float64, 3)
         poses = {eye: readonly(T, np.float64, (4, 4)) for eye, T in self.T_E_W.items()}
         object.__setattr__(self, "T_E_W", MappingProxyType(poses))
         shifts = {eye: readonly(m, np.float64, (3,)) for eye, m in self.drawn_shift_m.items()}
@@ -250,10 +254,10 @@ class EyeShift:
     method: str
 
     def __post_init__(self) -> None:
-        _freeze(self, "shift_m", np.float64, 3)
-        _freeze(self, "covariance_m2", np.float64, 3, 3)
-        _freeze(self, "residuals_m", np.float64, None)
-        _freeze(self, "history_m2", np.float64, None)
+        freeze(self, "shift_m", np.float64, 3)
+        freeze(self, "covariance_m2", np.float64, 3, 3)
+        freeze(self, "residuals_m", np.float64, None)
+        freeze(self, "history_m2", np.float64, None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,7 +287,7 @@ class Projection:
     height_px: int
 
     def __post_init__(self) -> None:
-        _freeze(self, "P", np.float64, 3, 4)
+        freeze(self, "P", np.float64, 3, 4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -314,10 +318,10 @@ class EyeDisplay:
     T_V_H: Float64
 
     def __post_init__(self) -> None:
-        _freeze(self, "K", np.float64, 3, 3)
-        _freeze(self, "H0", np.float64, 3, 3)
-        _freeze(self, "t_C0_V_m", np.float64, 3)
-        _freeze(self, "T_V_H", np.float64, 4, 4)
+        freeze(self, "K", np.float64, 3, 3)
+        freeze(self, "H0", np.float64, 3, 3)
+        freeze(self, "t_C0_V_m", np.float64, 3)
+        freeze(self, "T_V_H", np.float64, 4, 4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -339,7 +343,7 @@ class Rig:
     depth_intrinsics: Intrinsics
 
     def __post_init__(self) -> None:
-        _freeze(self, "T_H_D", np.float64, 4, 4)
+        freeze(self, "T_H_D", np.float64, 4, 4)
         if set(self.eyes) != set(EYES):
             raise ValueError("Rig.eyes: both left and right are needed")
         object.__setattr__(self, "eyes", MappingProxyType(dict(self.eyes)))

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from skimage.measure import marching_cubes
 
-from handcal.types import Float32, Float64, UInt8, _freeze
+from handcal.types import Float32, Float64, UInt8, freeze
 
 Side: TypeAlias = Literal["left", "right"]
 
@@ -100,12 +100,12 @@ class HandModel:
     side: Side
 
     def __post_init__(self) -> None:
-        _freeze(self, "vertices_m", np.float32, None, 3)
-        _freeze(self, "normals", np.float32, None, 3)
-        _freeze(self, "colors", np.uint8, None, 3)
-        _freeze(self, "triangles", np.int32, None, 3)
-        _freeze(self, "wrist_m", np.float64, 3)
-        _freeze(self, "arm_axis", np.float64, 3)
+        freeze(self, "vertices_m", np.float32, None, 3)
+        freeze(self, "normals", np.float32, None, 3)
+        freeze(self, "colors", np.uint8, None, 3)
+        freeze(self, "triangles", np.int32, None, 3)
+        freeze(self, "wrist_m", np.float64, 3)
+        freeze(self, "arm_axis", np.float64, 3)
 
 
 @dataclass(frozen=True, slots=True)

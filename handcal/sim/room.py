@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.types import Float32, Float64, Intrinsics, UInt8, _freeze
+from handcal.types import Float32, Float64, Intrinsics, UInt8, freeze
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class Room:
     light: Float64
 
     def __post_init__(self) -> None:
-        _freeze(self, "low_m", np.float64, 3)
-        _freeze(self, "high_m", np.float64, 3)
-        _freeze(self, "light", np.float64, 3)
+        freeze(self, "low_m", np.float64, 3)
+        freeze(self, "high_m", np.float64, 3)
+        freeze(self, "light", np.float64, 3)
 
 
 def make_room(seed: int, settings: RoomSettings | None = None) -> Room:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.closable import Closable
-from handcal.types import Float64, _freeze
+from handcal.types import Float64, freeze
 
 _MAGIC = b"hcS1"
 # Magic, host time in ns, whether there is a hand, and the upper 3x4 of both poses by rows.
@@ -44,8 +44,8 @@ class SceneState:
     T_W_hand: Float64 | None
 
     def __post_init__(self) -> None:
-        _freeze(self, "T_W_D", np.float64, 4, 4)
-        _freeze(self, "T_W_hand", np.float64, 4, 4)
+        freeze(self, "T_W_D", np.float64, 4, 4)
+        freeze(self, "T_W_hand", np.float64, 4, 4)
 
 
 def pack(state: SceneState) -> bytes:
