@@ -501,6 +501,9 @@ class Calibration:
 
     def _clear_cursor(self) -> None:
         self._cursor = self._guard = self._confirmation = None
+        # The wearer lowers the hand now: only what is seen from here on may become a cursor.
+        self._hands.clear()
+        self._unplaced.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
 
