@@ -8,6 +8,7 @@ import threading
 import time
 from abc import abstractmethod
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from handcal.closable import Closable
@@ -90,8 +91,7 @@ class Endpoint(Closable):
             If it has not come within `timeout_s`.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._failure or self.connected, timeout_s)
-            self._require_running()
+            self._wait_for(lambda: self.connected, timeout_s)
             if not self.connected:
                 raise LinkError(
                     f"nobody with this pairing key answered within {timeout_s:g} s; "
@@ -107,10 +107,7 @@ class Endpoint(Closable):
             If it has not within `timeout_s`, was given up, or a newer message replaced it.
         """
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._failure or message.state is not Delivery.PENDING, timeout_s
-            )
-            self._require_running()
+            self._wait_for(lambda: message.state is not Delivery.PENDING, timeout_s)
             name = message.slot.name.lower().replace("_", " ")
             if message.state is Delivery.SUPERSEDED:
                 raise LinkError(f"the {name} was replaced by a newer one before it arrived")
@@ -125,6 +122,7 @@ class Endpoint(Closable):
             self._closing.set()
             for _ in range(_BYES):
                 self._send(pb.Envelope(bye=pb.Bye()))
+            self._changed.notify_all()
         self._thread.join()
         self._transport.close()
 
@@ -157,6 +155,12 @@ class Endpoint(Closable):
                 self._failure = error
                 self._changed.notify_all()
 
+    def _wait_for(self, condition: Callable[[], bool], timeout_s: float) -> None:
+        """Wait until a condition holds; LinkError at once if the link ends first."""
+        has_ended = self._closing.is_set
+        self._changed.wait_for(lambda: self._failure or has_ended() or condition(), timeout_s)
+        self._require_running()
+
     def _require_running(self) -> None:
         if self._failure is not None:
             raise LinkError(f"the link has stopped: {self._failure}") from self._failure
@@ -165,7 +169,7 @@ class Endpoint(Closable):
 
     def _wait_s(self) -> float:
         with self._changed:
-            is_busy = self._stream or self._outbox.has_queued
+            is_busy = self._channel and (self._stream or self._outbox.has_queued)
         return self._settings.burst_pause_s if is_busy else self._settings.idle_wait_s
 
     def _take(self, datagram: bytes, address: Address) -> None:

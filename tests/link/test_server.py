@@ -4,6 +4,7 @@ import random
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -233,6 +234,15 @@ def test_a_closed_link_refuses_and_leaves_no_thread(pairing_key: bytes) -> None:
     ):
         with pytest.raises(LinkError, match="closed"):
             use()
+
+
+def test_who_waits_is_told_when_the_link_is_closed(server: HeadsetServer) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(server.wait_connected, 60.0)
+        time.sleep(0.05)
+        server.close()
+        with pytest.raises(LinkError, match="closed"):
+            waiting.result(5.0)
 
 
 def test_an_error_in_the_thread_reaches_the_caller(
