@@ -32,7 +32,7 @@ def read_pairing_key(path: Path | None = None) -> bytes:
     if path is not None:
         key = read_limited(path, _MAX_KEY_BYTES).strip()
     else:
-        key = os.environ.get(KEY_VARIABLE, "").strip().encode()
+        key = os.fsencode(os.environ.get(KEY_VARIABLE, "")).strip()
     if not key:
         raise LinkError(f"no pairing key: set {KEY_VARIABLE} or give a file that holds it")
     if len(key) < MIN_PAIRING_KEY_BYTES:

@@ -105,5 +105,5 @@ def resolve(host: str, port: int) -> Address:
     """
     try:
         return socket.gethostbyname(host), port
-    except OSError as error:
-        raise LinkError(f"unknown host {host}: {error.strerror}") from error
+    except (OSError, UnicodeError) as error:  # UnicodeError: not even a name
+        raise LinkError(f"unknown host {host!r}; check its name, or give its address") from error

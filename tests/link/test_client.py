@@ -207,6 +207,7 @@ def test_the_pc_says_good_bye(pairing_key: bytes, eventually: Eventually) -> Non
     assert threading.active_count() == before
 
 
-def test_an_unknown_host_is_a_clear_error(pairing_key: bytes) -> None:
+@pytest.mark.parametrize("host", ["no-such-host.invalid", "no..name", "n" * 80])
+def test_an_unknown_host_is_a_clear_error(pairing_key: bytes, host: str) -> None:
     with pytest.raises(LinkError, match="unknown host"):
-        HeadsetClient(("no-such-host.invalid", 1), pairing_key)
+        HeadsetClient((host, 1), pairing_key)

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -31,3 +32,9 @@ def test_no_key_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setenv(KEY_VARIABLE, "short")
     with pytest.raises(LinkError, match="5 bytes; take one of at least 16"):
         read_pairing_key()
+
+
+def test_any_bytes_are_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    key = b"\xff\xfe" * 8
+    monkeypatch.setenv(KEY_VARIABLE, os.fsdecode(key))
+    assert read_pairing_key() == key
