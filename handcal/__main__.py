@@ -92,7 +92,10 @@ def solve(arguments: argparse.Namespace) -> None:
     settings = calibration.solve
     if arguments.method:
         settings = replace(settings, method=arguments.method)
-    results = solve_session(record.alignments, record.rig, settings)
+    try:
+        results = solve_session(record.alignments, record.rig, settings)
+    except ValueError as error:
+        raise FileError(f"{arguments.session} cannot be solved: {error}") from error
     _save(arguments.json, results_json(results))
     table = _table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.shifts.items():

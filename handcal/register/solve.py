@@ -17,6 +17,7 @@ from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Meth
 MIN_POINTS = 100
 MAX_POINTS = 2_000_000
 _LEAST_WIDTH_M = 1e-4
+_FARTHEST_M = 1e6
 
 
 def solve_eye_shift(
@@ -66,9 +67,7 @@ def solve_eye_shift(
         raise ValueError(f"display_distance_m must be positive, got {display_distance_m}")
     cursor = check_cloud("cursor_m", cursor_m)
     hand = check_cloud("hand_m", hand_m)
-    T_E = np.eye(4) if T_E_W is None else np.asarray(T_E_W, dtype=np.float64)
-    if T_E.shape != (4, 4) or not np.isfinite(T_E).all():
-        raise ValueError("T_E_W must be a finite 4×4 matrix")
+    T_E = _check_pose(np.eye(4) if T_E_W is None else T_E_W)
     if method == "consistent":
         cuts = _check_cut("cursor_cut", cursor_cut, cursor), _check_cut("hand_cut", hand_cut, hand)
         return with_eye_box(fit_match(match_hands(cursor, hand, *cuts), T_E, display_distance_m))
@@ -82,7 +81,19 @@ def solve_alignment(
 
     ``consistent`` registers the hand once for both eyes: its motion is the same for either. It
     adds no prior: that is `fuse_alignments`'.
+
+    Raises
+    ------
+    ValueError
+        For a cloud or pose that `solve_eye_shift` would refuse, or no eye.
+    HandError
+        If hardly a point lies off the cut edges.
     """
+    check_cloud("cursor_m", alignment.cursor_m)
+    check_cloud("hand_m", alignment.hand_m)
+    known = alignment.T_E_W.keys() & alignment.drawn_shift_m.keys()
+    if not alignment.eyes or not known.issuperset(alignment.eyes):
+        raise ValueError("the alignment names no eye, or one without pose or drawn shift")
     if method == "consistent":
         match = match_hands(
             alignment.cursor_m, alignment.hand_m, alignment.cursor_is_cut, alignment.hand_is_cut
@@ -90,7 +101,8 @@ def solve_alignment(
     shifts: dict[Eye, EyeShift] = {}
     for eye in alignment.eyes:
         distance_m = rig.eyes[eye].z_C0_S_m
-        T_E, T_drawn = alignment.T_E_W[eye], drawn(alignment.drawn_shift_m[eye], distance_m)
+        T_E = _check_pose(alignment.T_E_W[eye])
+        T_drawn = drawn(alignment.drawn_shift_m[eye], distance_m)
         if method == "consistent":
             shifts[eye] = fit_match(match, T_E, distance_m, T_drawn)
         else:
@@ -109,11 +121,18 @@ def check_cloud(name: str, points_m: ArrayLike) -> Float64:
         raise ValueError(
             f"{name} has {len(cloud)} points; between {MIN_POINTS} and {MAX_POINTS:,} are needed"
         )
-    if not np.isfinite(cloud).all():
-        raise ValueError(f"{name} contains NaN or infinity")
+    if not (np.abs(cloud) < _FARTHEST_M).all():
+        raise ValueError(f"{name} contains NaN or infinity, or points as far away")
     if np.linalg.eigvalsh(np.cov(cloud.T))[1] < _LEAST_WIDTH_M**2:
         raise ValueError(f"{name} has all its points on one line; a hand's surface is needed")
     return cloud
+
+
+def _check_pose(T_E_W: ArrayLike) -> Float64:
+    T_E = np.asarray(T_E_W, dtype=np.float64)
+    if T_E.shape != (4, 4) or not np.isfinite(T_E).all():
+        raise ValueError("T_E_W must be a finite 4×4 matrix")
+    return T_E
 
 
 def _check_cut(name: str, cut: ArrayLike | None, cloud: Float64) -> Bool | None:
