@@ -30,9 +30,11 @@ DISPLAYS = st.builds(
     height_px=SIDE,
     T_V_H=TRANSFORMS,
 )
+CHARACTERS = st.characters(categories=["L", "N", "P", "S"], include_characters=" ")
 RIGS = st.builds(
     Rig,
-    name=st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=200),
+    name=st.text(CHARACTERS, min_size=1, max_size=200)
+    | st.sampled_from(["true", "null", "12", '"quoted"', "'quoted'", "back\\slash", " end "]),
     eyes=st.fixed_dictionaries({"left": DISPLAYS, "right": DISPLAYS}),
     T_H_D=TRANSFORMS,
     depth_intrinsics=st.builds(
