@@ -22,9 +22,8 @@ import numpy as np
 from handcal.calibrate import Calibration, CalibrationSettings, Observation, State
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.config import settings_json
-from handcal.display import arcmin_from_px, reprojection_error_px, view_of_eye
+from handcal.display import arcmin_from_px, reprojection_error_px
 from handcal.errors import CameraTimeoutError, HandcalError, LinkError
-from handcal.geometry import transform
 from handcal.link.pairing import KEY_VARIABLE, new_pairing_key
 from handcal.link.server import HeadsetServer
 from handcal.register.solve import solve_alignment
@@ -138,19 +137,20 @@ def reprojection_arcmin(
 ) -> float:
     """Return the mean error seen by the true eyes, in arcmin.
 
-    At four corners of an 8 cm square straight ahead, at 0.4, 0.5 and 0.6 m, in both displays.
+    At four corners of an 8 cm square straight ahead of each eye, at 0.4, 0.5 and 0.6 m from it.
     """
-    corners = [
-        [x, y, depth_m]
-        for depth_m in _TARGET_DEPTHS_M
-        for x in (-_TARGET_HALF_M, _TARGET_HALF_M)
-        for y in (-_TARGET_HALF_M, _TARGET_HALF_M)
-    ]
+    corners_E_m = np.array(
+        [
+            [x, y, depth_m]
+            for depth_m in _TARGET_DEPTHS_M
+            for x in (-_TARGET_HALF_M, _TARGET_HALF_M)
+            for y in (-_TARGET_HALF_M, _TARGET_HALF_M)
+        ]
+    )
     errors = []
     for eye in EYES:
         display = rig.eyes[eye]
-        targets_E = transform(view_of_eye(display, np.eye(4)), corners)
-        error_px = reprojection_error_px(display, shifts_m[eye], true_shifts_m[eye], targets_E)
+        error_px = reprojection_error_px(display, shifts_m[eye], true_shifts_m[eye], corners_E_m)
         errors.append(arcmin_from_px(display, error_px))
     return float(np.mean(errors))
 
