@@ -1,0 +1,146 @@
+"""The demonstration: a real run over a bad link with the headset in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.__main__ import main
+from handcal.demo import reprojection_arcmin
+from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.session import Session
+from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.types import EYES, Eye
+
+SEED = 3
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("demo")
+
+
+@pytest.fixture(scope="module")
+def run(folder: Path) -> subprocess.CompletedProcess[str]:
+    options = f"--seed {SEED} --eyes each --loss 0.3 --reorder 0.2 --output runs --json new/it.json"
+    return subprocess.run(
+        [sys.executable, "-m", "handcal", "demo", *options.split()],
+        cwd=folder,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=150,
+    )
+
+
+@pytest.fixture(scope="module")
+def result(run: subprocess.CompletedProcess[str], folder: Path) -> dict[str, Any]:
+    assert run.returncode == 0, run.stderr
+    found: dict[str, Any] = json.loads((folder / "new" / "it.json").read_text())
+    return found
+
+
+@pytest.fixture(scope="module")
+def session(result: dict[str, Any], folder: Path) -> Path:
+    return folder / str(result["session"])
+
+
+def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
+    assert result["seed"] == SEED
+    assert set(result["eyes"]) == set(EYES)
+    for eye in result["eyes"].values():
+        for triple in ("shift_mm", "true_shift_mm", "sigma_mm"):
+            assert np.shape(eye[triple]) == (3,)
+        assert eye["verdict"] in ("accept", "repeat", "implausible")
+        assert eye["reason"]
+        off_mm = np.subtract(eye["shift_mm"], eye["true_shift_mm"])
+        assert eye["error_mm"] == pytest.approx(np.linalg.norm(off_mm))
+    assert set(result["reprojection_arcmin"]) == {"before", "after"}
+    assert set(result["guard"]) == {"rejected", "accepted_deg"}
+    assert set(result["link"]) == {"sent", "lost", "acked"}
+    assert set(result["timing_ms"]) == {"segment", "guard", "solve_both_eyes"}
+    assert all(value > 0.0 for value in result["timing_ms"].values())
+
+
+def test_the_result_is_as_good_as_it_says(result: dict[str, Any]) -> None:
+    truth_m = draw_eyes(np.random.default_rng(SEED), WearerSettings())
+    for name in EYES:
+        eye = result["eyes"][name]
+        np.testing.assert_allclose(eye["true_shift_mm"], 1e3 * truth_m[name])
+        off_mm = np.abs(np.subtract(eye["shift_mm"], eye["true_shift_mm"]))
+        assert (off_mm < 5.0 * np.array(eye["sigma_mm"])).all()
+    error = result["reprojection_arcmin"]
+    assert error["after"] < max(error["before"], 8.0)
+    assert 0.0 <= result["guard"]["accepted_deg"] <= 9.0
+
+
+def test_the_link_was_bad_and_everything_arrived(result: dict[str, Any], session: Path) -> None:
+    assert result["link"]["lost"] > 0.15 * result["link"]["sent"]
+    events = [(event.name, event.data) for event in Session.open(session).events]
+    assert [data["eyes"] for name, data in events if name == "applied"] == [
+        ["left"],
+        ["left", "right"],
+    ]
+    name, link = events[-1]
+    assert name == "link"
+    assert (link["unacked"], link["failed"]) == (0, 0)
+    # Cursor, prompt and projections of two alignments.
+    assert link["acked"] == result["link"]["acked"] >= 7
+
+
+def test_what_a_person_reads_tells_the_same(
+    run: subprocess.CompletedProcess[str], result: dict[str, Any]
+) -> None:
+    assert "100 % Alignment 2 of 2, the right eye: applied and acknowledged" in run.stdout
+    error = result["reprojection_arcmin"]
+    assert f"{error['before']:.1f}′ before, {error['after']:.1f}′ after" in run.stdout
+    assert f"Session: {result['session']}" in run.stdout
+    assert run.stderr == ""
+
+
+def test_the_session_is_solved_again_to_the_last_bit(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again = tmp_path / "again.json"
+    before = {path: path.read_bytes() for path in session.rglob("*") if path.is_file()}
+    monkeypatch.setattr(sys, "argv", ["handcal", "solve", str(session), "--json", str(again)])
+    main()
+    assert again.read_bytes() == (session / "results.json").read_bytes()
+    assert {path: path.read_bytes() for path in session.rglob("*") if path.is_file()} == before
+
+
+def test_a_torn_session_is_solved_with_another_method(
+    session: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    torn = tmp_path / "torn"
+    shutil.copytree(session, torn)
+    with (torn / "journal.jsonl").open("ab") as journal:
+        journal.write(b'{"version": 1, "numb')
+    again = tmp_path / "again.json"
+    arguments = ["solve", str(torn), "--method", "icp", "--json", str(again)]
+    monkeypatch.setattr(sys, "argv", ["handcal", *arguments])
+    main()
+    assert json.loads(again.read_text())["method"] == "icp"
+    assert "last line is unfinished" in capsys.readouterr().out
+
+
+def test_the_reprojection_error_is_that_of_the_true_eyes() -> None:
+    rig = example_rig()
+    still_m: dict[Eye, np.ndarray] = {eye: np.zeros(3) for eye in EYES}
+    aside_m: dict[Eye, np.ndarray] = {eye: np.array([0.004, 0.0, 0.0]) for eye in EYES}
+    assert reprojection_arcmin(rig, aside_m, aside_m) == 0.0
+    # An eye 4 mm aside sees a target at depth z off by 4 mm (1/z - 1/2 m), in radians.
+    expected = [np.arctan(0.004 * (1.0 / z - 1.0 / Z_E_S_M)) for z in (0.4, 0.5, 0.6)]
+    expected_arcmin = 60.0 * np.degrees(np.mean(expected))
+    assert reprojection_arcmin(rig, still_m, aside_m) == pytest.approx(expected_arcmin, rel=0.02)
