@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -147,6 +147,9 @@ class Observation:
 class Calibration:
     """One wearer's calibration.
 
+    It begins by sending the offline projections, lest the headset still render with what another
+    calibration sent.
+
     Parameters
     ----------
     rig : Rig
@@ -192,8 +195,8 @@ class Calibration:
         self._guard: RotationGuard | None = None
         self._confirmation: Confirmation | None = None
         self._drawn_shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
-        self._sent: list[Outgoing] = []
         self._stored: list[Alignment] = []
+        self._sent = self._send_projections(self._drawn_shift_m)
 
     def step(self, frame: Frame) -> Observation:
         """Take a frame: find the hand, guide the alignment, take a confirmation.
@@ -285,6 +288,7 @@ class Calibration:
         elif self.state is not State.ALIGN:
             raise ProcedureError(f"there is nothing to redo ({self.state})")
         self._clear_cursor()
+        self._send_projections(self._drawn_shift_m)  # `apply` may have failed for one eye only
         self.state = State.SHOW_HAND
         self._store_alignments()
 
@@ -321,17 +325,9 @@ class Calibration:
         if self.results is None or self.state is not State.SOLVED:
             raise ProcedureError("solve first")
         self._clear_cursor()
-        self._sent = [
-            self._link.send_projection(
-                Projection(
-                    eye,
-                    projection_matrix(self.rig.eyes[eye], shift.shift_m),
-                    self.rig.eyes[eye].width_px,
-                    self.rig.eyes[eye].height_px,
-                )
-            )
-            for eye, shift in self.results.shifts.items()
-        ]
+        self._sent = self._send_projections(
+            {eye: shift.shift_m for eye, shift in self.results.shifts.items()}
+        )
         self.state = State.APPLYING
 
     def wait_applied(self, timeout_s: float = 5.0) -> None:
@@ -359,6 +355,16 @@ class Calibration:
             self._drawn_shift_m[eye] = shift.shift_m
         self.state = State.APPLIED
         self._record("applied", eyes=list(self.results.shifts))
+
+    def _send_projections(self, shifts_m: Mapping[Eye, Float64]) -> list[Outgoing]:
+        sent = []
+        for eye, shift_m in shifts_m.items():
+            display = self.rig.eyes[eye]
+            P = projection_matrix(display, shift_m)
+            sent.append(
+                self._link.send_projection(Projection(eye, P, display.width_px, display.height_px))
+            )
+        return sent
 
     def _forget_hands(self) -> None:
         """Let go of what is too old for a confirmation, and for telling whether it is steady."""

@@ -35,7 +35,7 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import EYES, Eye, Float64, Frame, Intrinsics, UInt16
+from handcal.types import EYES, Eye, Float64, Frame, Intrinsics, Projection, UInt16
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -394,7 +394,8 @@ def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:
     stage.calibration.solve()
     stage.calibration.apply()
     stage.calibration.wait_applied()
-    assert set(stage.shown().projections) == {"left"}
+    right = stage.shown().projections["right"].P
+    np.testing.assert_array_equal(right, projection_matrix(RIG.eyes["right"]))
     stage.make_cursor(cursor_for("right", true_m["right"], zero_m), ("right",))
     assert stage.shown().eyes == ("right",)
     assert "Close your left eye" in stage.shown().prompt
@@ -494,6 +495,28 @@ def test_redo_gives_up_the_cursor_or_the_last_alignment(stage: Stage, session: S
 
     again = results_json(calibration.solve())
     assert again == results_json(solve_session(record.alignments, RIG, SolveSettings()))
+
+
+def test_the_offline_projections_come_first(stage: Stage, server: HeadsetServer) -> None:
+    stage.calibrate()
+    Calibration(RIG, server)
+    eventually(lambda: shows_offline_projections(stage.shown()))
+
+
+def test_redo_takes_back_a_projection_that_came_alone(stage: Stage, server: HeadsetServer) -> None:
+    stage.align()
+    shift_m = stage.calibration.solve().shifts["left"].shift_m
+    P = projection_matrix(RIG.eyes["left"], shift_m)
+    server.wait_acked(server.send_projection(Projection("left", P, 1268, 720)), 5.0)
+    assert not shows_offline_projections(stage.shown())
+    stage.calibration.redo()
+    eventually(lambda: shows_offline_projections(stage.shown()))
+
+
+def shows_offline_projections(shown: HeadsetState) -> bool:
+    return all(
+        np.array_equal(shown.projections[eye].P, projection_matrix(RIG.eyes[eye])) for eye in EYES
+    )
 
 
 CALLS: dict[str, Callable[[Calibration], object]] = {
