@@ -88,13 +88,13 @@ def replay(camera: Camera, settings: SegmentSettings) -> Iterator[ReplayStep]:
         start_s = time.perf_counter()
         try:
             hand = segment_hand(frame, settings)
+            segment_s = time.perf_counter() - start_s
+            surface = describe_surface(
+                hand.points_m.astype(np.float64), hand.is_cut, RigidSettings().max_points
+            )
         except HandError as error:
             yield ReplayStep(frame, None, str(error), time.perf_counter() - start_s, None)
             continue
-        segment_s = time.perf_counter() - start_s
-        surface = describe_surface(
-            hand.points_m.astype(np.float64), hand.is_cut, RigidSettings().max_points
-        )
         motion = None if previous is None else _motion(previous, surface)
         yield ReplayStep(frame, hand, "", segment_s, motion)
         previous = surface

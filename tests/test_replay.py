@@ -84,6 +84,13 @@ def test_motion_of_the_hand_is_told_across_frames_without_one(hand: HandModel) -
     np.testing.assert_allclose(motion.shift_m, SHIFT_M, atol=0.004)
 
 
+def test_a_hand_wholly_beside_cut_edges_does_not_end_the_replay(hand: HandModel) -> None:
+    frames = [look_at(hand, T_0, index) for index in (1, 2)]
+    steps = list(replay(FrameList(frames), SegmentSettings(cut_band_m=0.3)))
+    assert [step.hand for step in steps] == [None, None]
+    assert all("beside cut edges" in step.problem for step in steps)
+
+
 def test_failing_camera_is_not_taken_for_the_end() -> None:
     with pytest.raises(CameraTimeoutError):
         list(replay(DeadCamera([]), SegmentSettings()))
