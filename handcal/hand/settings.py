@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+# About: fewer cannot be registered, and more than 50,000 not be sent to the headset.
+_LEAST_POINTS, _MOST_POINTS = 200, 40_000
+
 
 @dataclass(frozen=True, slots=True)
 class SegmentSettings:
@@ -32,7 +35,7 @@ class SegmentSettings:
     Raises
     ------
     ValueError
-        If the gate is empty or `points` is not positive.
+        If the gate is empty, or `points` is too few to register or too many to send.
     """
 
     depth_min_m: float = 0.35
@@ -51,5 +54,7 @@ class SegmentSettings:
                 f"the depth gate {self.depth_min_m} to {self.depth_max_m} m is empty; "
                 "set 0 < depth_min_m < depth_max_m"
             )
-        if self.points < 1:
-            raise ValueError(f"points is {self.points}; at least one must be kept")
+        if not _LEAST_POINTS <= self.points <= _MOST_POINTS:
+            raise ValueError(
+                f"points is {self.points}; keep between {_LEAST_POINTS} and {_MOST_POINTS:,}"
+            )

@@ -252,8 +252,9 @@ def test_colors_are_those_that_the_color_camera_sees(shot: Shot) -> None:
 def test_settings_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ValueError, match="depth gate"):
         SegmentSettings(depth_min_m=0.7, depth_max_m=0.35)
-    with pytest.raises(ValueError, match="points"):
-        SegmentSettings(points=0)
+    for points in (0, 100_000):
+        with pytest.raises(ValueError, match="points"):
+            SegmentSettings(points=points)
 
 
 def test_real_hands_are_kept_and_cut_near_the_wrist(shared_data: Path) -> None:
