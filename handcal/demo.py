@@ -100,7 +100,9 @@ def run_demo(
         Session.create(output, rig, stored) as session,
         HeadsetServer(key.encode()) as server,
         SceneReceiver() as scene,
-        SyntheticCamera(world, scene.latest, seed=settings.seed) as camera,
+        SyntheticCamera(
+            world, scene.latest, depth_intrinsics=rig.depth_intrinsics, seed=settings.seed
+        ) as camera,
         _Headset(settings, rig_path, server.address[1], scene.port, key) as headset,
     ):
         report("Connecting to the virtual headset", 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,6 +55,7 @@ class SyntheticCamera(Closable):
     scene : callable
         Returns the moving part of the world as it is now, or None while there is none.
     depth_intrinsics : Intrinsics
+        Its distortion is left out.
     seed : int
         Of the sensor's noise.
     settings : SyntheticSettings
@@ -71,7 +72,7 @@ class SyntheticCamera(Closable):
         seed: int = 0,
         settings: SyntheticSettings | None = None,
     ) -> None:
-        self.depth_intrinsics = depth_intrinsics
+        self.depth_intrinsics = replace(depth_intrinsics, distortion=())
         self._world = world
         self._scene = scene
         self._settings = settings or SyntheticSettings()

@@ -119,3 +119,9 @@ def test_seed_decides_the_noise(world: World) -> None:
 
     assert depth(1) == depth(1)
     assert depth(1) != depth(2)
+
+
+def test_a_distortion_that_is_not_rendered_is_not_claimed(world: World) -> None:
+    distorted = replace(SMALL, distortion=(0.1, 0.0, 0.0, 0.0))
+    with SyntheticCamera(world, _now, depth_intrinsics=distorted) as camera:
+        assert camera.depth_intrinsics == camera.read().depth_intrinsics == SMALL
