@@ -126,7 +126,7 @@ def replay(arguments: argparse.Namespace) -> None:
         for step in play(camera, SegmentSettings()):
             rows.append(_replay_row(step))
             shown = list(rows[-1].values())[:-1]
-            table.add_row(*("–" if value is None else f"{value:.4g}" for value in shown))
+            table.add_row(*map(_cell, shown))
     console.print(table)
     _save(arguments.json, {"frames": rows})
     for row in rows:
@@ -339,6 +339,12 @@ def _table(*columns: str) -> Table:
 
 def _triple(values: Iterable[float]) -> str:
     return " ".join(f"{value:.1f}" for value in values)
+
+
+def _cell(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _replay_row(step: ReplayStep) -> dict[str, Any]:
