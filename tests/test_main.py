@@ -1,0 +1,353 @@
+"""The command line as its user meets it: results, exit codes and one line for every error."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal import bench, doctor
+from handcal.__main__ import main
+from handcal.doctor import Finding, Health
+from handcal.geometry import rigid
+from handcal.link.pairing import KEY_VARIABLE
+from handcal.rig.example import example_rig
+from handcal.session import Session
+from handcal.sim.hand import make_hand
+from handcal.sim.raster import draw_hand
+from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.types import Alignment, Frame, Intrinsics
+
+CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
+SENSOR = SensorSettings()
+WALL_M = 1.5
+# A shell that starts tests in the background has SIGINT ignored, and so would the program.
+INTERRUPTIBLE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from handcal.__main__ import main
+main()
+"""
+
+
+@pytest.fixture
+def handcal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Run a command in this process."""
+
+    def run(*arguments: object) -> None:
+        monkeypatch.setattr(sys, "argv", ["handcal", *map(str, arguments)])
+        main()
+
+    return run
+
+
+@pytest.fixture
+def fails(
+    handcal: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str]]:
+    """Run a command that fails; return its exit code and its one line."""
+
+    def run(*arguments: object) -> tuple[int, str]:
+        with pytest.raises(SystemExit) as ended:
+            handcal(*arguments)
+        error = capsys.readouterr().err
+        assert error.startswith("handcal: ")
+        assert error.count("\n") == 1
+        assert error.endswith("\n")
+        assert isinstance(ended.value.code, int)
+        return ended.value.code, error
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def frame() -> Frame:
+    image = draw_hand(make_hand(1), rigid([0.1, 0.1, 0.1], [0.0, 0.02, 0.5]), CAMERA)
+    depth_m = np.full((CAMERA.height, CAMERA.width), WALL_M, np.float32)
+    height, width = image.depth_m.shape
+    box = slice(image.y0, image.y0 + height), slice(image.x0, image.x0 + width)
+    depth_m[box] = np.minimum(image.depth_m, WALL_M)
+    depth = sense_depth(depth_m, 2 * CAMERA.fx, np.random.default_rng(0), SENSOR)
+    color = np.full((*depth.shape, 3), 90, np.uint8)
+    return Frame(0, 0, 0, depth, SENSOR.depth_scale_m, CAMERA, color, CAMERA)
+
+
+@pytest.fixture
+def pictures(frame: Frame, tmp_path: Path) -> Path:
+    """A folder with the frame as files."""
+    assert frame.color is not None
+    cv2.imwrite(str(tmp_path / "color.png"), frame.color)
+    cv2.imwrite(str(tmp_path / "depth.png"), frame.depth)
+    names = ("width", "height", "fx", "fy", "cx", "cy")
+    values = {name: getattr(CAMERA, name) for name in names}
+    (tmp_path / "camera.json").write_text(json.dumps(values | {"depth_scale": 1e-4}))
+    return tmp_path
+
+
+def segment_arguments(pictures: Path, output: object) -> list[object]:
+    return [
+        "segment", "--color", pictures / "color.png", "--depth", pictures / "depth.png",
+        "--intrinsics", pictures / "camera.json", "--output", output,
+    ]  # fmt: skip
+
+
+def test_segment_writes_the_hand(
+    handcal: Callable[..., None],
+    pictures: Path,
+    frame: Frame,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    output = pictures / "new" / "folder"
+    handcal(*segment_arguments(pictures, output))
+    names = {path.name for path in output.iterdir()}
+    assert names == {"hand.ply", "contour.ply", "mask.png", "overlay.png", "hand.json"}
+    mask = cv2.imread(str(output / "mask.png"), cv2.IMREAD_UNCHANGED)
+    assert mask is not None
+    assert mask.shape == frame.depth.shape
+    assert set(np.unique(mask)) == {0, 255}
+    near = (frame.depth > 0) & (frame.depth * SENSOR.depth_scale_m < 0.7)
+    assert np.mean(near[mask > 0]) > 0.95
+    told = json.loads((output / "hand.json").read_text())
+    x0, y0, x1, y1 = told["box"]
+    rows, columns = np.nonzero(mask)
+    assert (x0, y0, x1 - 1, y1 - 1) == (columns.min(), rows.min(), columns.max(), rows.max())
+    assert told["median_depth_m"] == pytest.approx(0.49, abs=0.02)
+    assert f"{told['points']} points at" in capsys.readouterr().out
+
+
+def test_segment_says_why_it_finds_nothing(
+    fails: Callable[..., tuple[int, str]], pictures: Path
+) -> None:
+    cv2.imwrite(str(pictures / "depth.png"), np.full((360, 640), 20_000, np.uint16))
+    code, error = fails(*segment_arguments(pictures, pictures / "out"))
+    assert code == 1
+    assert "0.35" in error  # the gate's near end
+
+
+def test_replay_tells_every_frame(
+    handcal: Callable[..., None],
+    frame: Frame,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("pyrealsense2")
+    from handcal.camera.recording import record_db3
+
+    frames = [
+        Frame(20_000 + i, 33_333_333 * i, 0, frame.depth, frame.depth_scale_m, CAMERA)
+        for i in range(2)
+    ]
+    record_db3(tmp_path / "two.db3", frames)
+    handcal("replay", tmp_path / "two.db3", "--json", tmp_path / "replay.json")
+    rows = json.loads((tmp_path / "replay.json").read_text())["frames"]
+    assert [row["frame"] for row in rows] == [20_000, 20_001]
+    assert rows[0]["turned_deg"] is None
+    assert rows[1]["turned_deg"] < 1.0
+    assert all(row["points"] > 3000 and not row["problem"] for row in rows)
+    shown = capsys.readouterr().out
+    assert "20001" in shown
+    assert "2 of 2 frames show a hand." in shown
+
+
+def test_bench_shows_and_saves_its_figures(
+    handcal: Callable[..., None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    figure = {
+        "what": "solve",
+        "value": 12.3,
+        "unit": "ms",
+        "target": "≤ 100",
+        "met": True,
+    }
+
+    def pretend(settings: object, report: Callable[[str, float], None]) -> dict[str, Any]:
+        report("speed", 0.5)
+        return {"figures": [figure], "quick": settings == bench.QUICK}
+
+    monkeypatch.setattr(bench, "run_bench", pretend)
+    handcal("bench", "--quick", "--json", tmp_path / "bench.json")
+    assert json.loads((tmp_path / "bench.json").read_text()) == {"figures": [figure], "quick": True}
+    shown = capsys.readouterr().out
+    assert "50 % speed" in shown
+    assert "12.3 ms" in shown
+
+
+def test_doctor_fails_only_for_what_must_be_mended(
+    handcal: Callable[..., None],
+    fails: Callable[..., tuple[int, str]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    note = Finding("Camera", Health.LIMITED, "none connected", "plug one in")
+    monkeypatch.setattr(doctor, "examine", lambda: [note])
+    handcal("doctor")
+    assert capsys.readouterr().out == "note     Camera: none connected\n         → plug one in\n"
+    problem = Finding("scipy", Health.BROKEN, "not installed", "install it")
+    monkeypatch.setattr(doctor, "examine", lambda: [note, problem])
+    assert fails("doctor") == (1, "handcal: something must be mended first; see above\n")
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("", "required: COMMAND; see handcal --help"),
+        ("frobnicate", "invalid choice: 'frobnicate'"),
+        ("demo --seed -1", "'-1' is no whole number from 0 to 4294967295; see handcal demo --help"),
+        ("demo --seed 1.5", "'1.5' is no whole number"),
+        ("demo --alignments 0", "'0' is no whole number from 1 to 20"),
+        ("demo --loss nan", "'nan' is no number from 0.0 to 1.0"),
+        ("demo --loss 1.1", "'1.1' is no number from 0.0 to 1.0"),
+        ("demo --eyes three", "invalid choice: 'three' (choose from 'both', 'each')"),
+        ("demo --seed 1 --nonsense", "unrecognized arguments: --nonsense"),
+        ("segment --color a.png", "required: --depth, --intrinsics, --output"),
+        ("solve", "required: session"),
+        ("solve somewhere --method fast", "invalid choice: 'fast'"),
+        ("headset --port 0 --scene-port 1", "'0' is no whole number from 1 to 65535"),
+        ("headset --port 5000", "required: --scene-port"),
+        ("bench --json", "expected one argument"),
+        ("doctor --json it", "unrecognized arguments"),
+    ],
+)
+def test_misuse_is_one_line_and_exit_code_2(
+    fails: Callable[..., tuple[int, str]], line: str, problem: str
+) -> None:
+    code, error = fails(*line.split())
+    assert code == 2
+    assert problem in error
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
+        ("solve nowhere", "nowhere/journal.jsonl: No such file"),
+        ("replay nowhere.db3", "there is no recording nowhere.db3"),
+        ("replay text.txt", "text.txt cannot be played as a RealSense recording"),
+        ("demo --rig nowhere.yaml --output out", "cannot read nowhere.yaml"),
+        ("demo --rig text.txt --output out", "text.txt"),
+        ("demo --output text.txt", "cannot create the folder text.txt: File exists"),
+        ("headset --port 5000 --scene-port 5001", "no pairing key: set HANDCAL_PAIRING_KEY"),
+        ("headset --port 5000 --scene-port 5001 --key-file none", "cannot read none"),
+        ("headset --port 5000 --scene-port 5001 --key-file text.txt", "has 6 bytes; take one of"),
+    ],
+)
+def test_failure_is_one_line_and_exit_code_1(
+    fails: Callable[..., tuple[int, str]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    line: str,
+    problem: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    (tmp_path / "text.txt").write_text("text\n!")
+    code, error = fails(*line.split())
+    assert code == 1
+    assert problem in error
+
+
+def test_a_session_that_cannot_be_solved_says_why(
+    fails: Callable[..., tuple[int, str]], tmp_path: Path, alignment: Alignment
+) -> None:
+    def stored(name: str, *alignments: Alignment, **settings: object) -> Path:
+        with Session.create(tmp_path, example_rig(), settings, name=name) as session:
+            for each in alignments:
+                session.save_alignment(each)
+        return session.path
+
+    assert "empty holds no alignment to solve" in fails("solve", stored("empty"))[1]
+    # The shared example has too few points.
+    assert (
+        "few cannot be solved: cursor_m has 40 points"
+        in fails("solve", stored("few", alignment))[1]
+    )
+    odd = stored("odd", alignment, calibration={"solve": {"method": "guess"}})
+    assert "settings.solve.method must be one of paper, linear" in fails("solve", odd)[1]
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(
+    fails: Callable[..., tuple[int, str]], pictures: Path
+) -> None:
+    code, error = fails(*segment_arguments(pictures, pictures / "color.png"))
+    assert code == 1
+    assert "cannot create the folder" in error
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="writes to /dev/full")
+def test_an_output_that_cannot_be_written_is_one_line() -> None:
+    with Path("/dev/full").open("wb", buffering=0) as full:
+        ended = subprocess.run(
+            [sys.executable, "-m", "handcal", "doctor"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert ended.returncode == 1
+    assert ended.stderr == "handcal: cannot write the output: No space left on device\n"
+
+
+def test_each_command_is_listed_with_its_purpose(
+    handcal: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        handcal("--help")
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    for command in ("demo", "segment", "solve", "replay", "headset", "bench", "doctor"):
+        assert f"    {command} " in shown
+        with pytest.raises(SystemExit):
+            handcal(command, "--help")
+        assert "None" not in capsys.readouterr().out
+
+
+def test_the_program_itself_ends_with_one_line(tmp_path: Path) -> None:
+    program = shutil.which("handcal", path=Path(sys.executable).parent)
+    assert program is not None, "install the project, which brings the command"
+    ended = subprocess.run([program, "solve", tmp_path], capture_output=True, text=True)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("handcal: cannot read ")
+    assert ended.stderr.count("\n") == 1
+    assert ended.stdout == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
+def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTIBLE, "demo", "--output", tmp_path],
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        try:
+            while "wearer aligns" not in process.stdout.readline():
+                assert process.poll() is None, process.stderr.read()
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            assert len(children) == 1
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20.0) == 130
+            assert process.stderr.read() == "handcal: interrupted\n"
+        finally:
+            process.kill()
+    assert not Path("/proc", children[0]).exists()
+    (path,) = tmp_path.iterdir()
+    record = Session.open(path)
+    assert [event.name for event in record.events] == ["created", "cursor_made"]
+    assert record.torn_bytes == 0
+    with Session(path) as session:
+        session.record("opened_again")
