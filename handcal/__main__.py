@@ -235,17 +235,25 @@ def _parser() -> argparse.ArgumentParser:
         )
         added.set_defaults(command=command)
         if json:
-            added.add_argument("--json", type=Path, metavar="FILE", help="also write it here")
+            added.add_argument(
+                "--json", type=Path, metavar="FILE", help="write the results here too"
+            )
         return added
 
     share, count, seed = _number(float, 0.0, 1.0), _number(int, 1, 20), _number(int, 0, 2**32 - 1)
     milliseconds = _number(float, 0.0, 10_000.0)
 
     one = add(demo)
-    one.add_argument("--output", type=Path, default=Path("results/demo"), help="session's folder")
+    one.add_argument(
+        "--output", type=Path, default=Path("results/demo"), help="where to put the session"
+    )
     one.add_argument("--seed", type=seed, default=1, help="of wearer, hand, room and noise")
-    one.add_argument("--alignments", type=count, default=1, metavar="K", help="how often to align")
-    one.add_argument("--eyes", choices=("both", "each"), default="both", help="open at a time")
+    one.add_argument(
+        "--alignments", type=count, default=1, metavar="K", help="how often, each eye if apart"
+    )
+    one.add_argument(
+        "--eyes", choices=("both", "each"), default="both", help="aligned at once, or apart"
+    )
     one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
     one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")
     one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
@@ -267,7 +275,9 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add(replay)
     one.add_argument("recording", type=Path, help=".db3 or .bag file")
-    one.add_argument("--real-time", action="store_true", help="at the recorded pace")
+    one.add_argument(
+        "--real-time", action="store_true", help="at the recorded pace, dropping frames"
+    )
 
     one = add(headset, json=False)
     port = _number(int, 1, 65535)
@@ -289,7 +299,7 @@ def _parser() -> argparse.ArgumentParser:
         default=12345.0,
         help="headset's clock less the PC's",
     )
-    one.add_argument("--duration-s", type=_number(float, 0.0, 1e6), help="when to end")
+    one.add_argument("--duration-s", type=_number(float, 0.0, 1e6), help="end after so long")
 
     add(bench).add_argument("--quick", action="store_true", help="few repetitions: only a look")
     add(doctor, json=False)
