@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.geometry import project, rigid
+from handcal.geometry import invert, project, rigid
 from handcal.types import EyeDisplay, Float64
 
 
@@ -58,7 +58,7 @@ def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:
 def view_of_eye(display: EyeDisplay, T_W_H: Float64) -> Float64:
     """Return ``T_E_W``, E0 at a moment, from the headset's pose: ``[I t(C0→V)] T_V_H T_H_W``."""
     T_E_H = rigid(translation_m=display.t_C0_V_m) @ display.T_V_H
-    T_E_W: Float64 = T_E_H @ np.linalg.inv(T_W_H)
+    T_E_W: Float64 = T_E_H @ invert(T_W_H)
     return T_E_W
 
 

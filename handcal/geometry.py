@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from handcal.types import Float64, Intrinsics
 
+_ROTATION_TOLERANCE = 1e-5
+
 
 def rigid(rotation: ArrayLike | None = None, translation_m: ArrayLike | None = None) -> Float64:
     """Build a transform from a rotation, (3, 3) matrix or (3,) vector in rad, and a translation."""
@@ -28,6 +30,22 @@ def invert(T_dst_src: Float64) -> Float64:
     """Return ``T_src_dst`` of a rigid ``T_dst_src``."""
     R = T_dst_src[:3, :3]
     return rigid(R.T, -R.T @ T_dst_src[:3, 3])
+
+
+def is_rigid(T: Float64, reach_m: float) -> bool:
+    """Tell whether a (4, 4) matrix from elsewhere, NaN allowed, is a rigid transform.
+
+    Its rotation must be right-handed and orthonormal to 1e-5, as that of a float32 is, and its
+    translation below `reach_m` in each component.
+    """
+    R = T[:3, :3]
+    return bool(
+        (np.abs(R) < 2.0).all()
+        and (np.abs(T[:3, 3]) < reach_m).all()
+        and (T[3] == [0.0, 0.0, 0.0, 1.0]).all()
+        and np.abs(R @ R.T - np.eye(3)).max() < _ROTATION_TOLERANCE
+        and np.linalg.det(R) > 0.0
+    )
 
 
 def transform(T_dst_src: Float64, points: ArrayLike) -> Float64:

@@ -8,6 +8,7 @@ from handcal.geometry import (
     camera_matrix,
     interpolate_pose,
     invert,
+    is_rigid,
     project,
     rigid,
     transform,
@@ -82,3 +83,20 @@ def test_interpolation_runs_evenly_from_one_pose_to_the_other(
 def test_poses_are_not_extrapolated(fraction: float) -> None:
     with pytest.raises(ValueError, match="not extrapolated"):
         interpolate_pose(np.eye(4), np.eye(4), fraction)
+
+
+@given(TRANSFORMS)
+def test_a_rigid_transform_is_known_even_through_float32(T: Float64) -> None:
+    assert is_rigid(T, 3.1)
+    assert is_rigid(T.astype(np.float32).astype(np.float64), 3.1)
+
+
+@pytest.mark.parametrize(
+    ("at", "value"),
+    [((0, 0), 1.001), ((0, 0), -1.0), ((1, 2), np.nan), ((1, 2), 1e300), ((3, 0), 1e-9)]
+    + [((0, 3), value) for value in (3.0, -3.0, np.nan, np.inf)],
+)
+def test_anything_else_is_not_rigid(at: tuple[int, int], value: float) -> None:
+    T = np.eye(4)
+    T[at] = value
+    assert not is_rigid(T, 3.0)

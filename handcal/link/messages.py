@@ -13,6 +13,7 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import ArrayLike, NDArray
 
+from handcal.geometry import is_rigid
 from handcal.link import handcal_pb2 as pb
 from handcal.link.reliable import Receipt
 from handcal.link.wire import MAX_FRAGMENTS, Slot
@@ -30,7 +31,7 @@ PROJECTION_SLOTS: Mapping[Eye, Slot] = {
 }
 _EYE_CODES: Mapping[Eye, pb.Eye] = {"left": pb.EYE_LEFT, "right": pb.EYE_RIGHT}
 _EYES: Mapping[int, Eye] = {code: eye for eye, code in _EYE_CODES.items()}
-_RIGID_TOLERANCE = 1e-6
+_REACH_M = 1e3
 
 
 class MalformedError(Exception):
@@ -222,8 +223,7 @@ def _numbers(values: Sequence[float], count: int) -> Float64:
 
 def _rigid(values: Sequence[float]) -> Float64:
     T = np.vstack([_numbers(values, 12).reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
-    R = T[:3, :3]
-    if np.abs(R @ R.T - np.eye(3)).max() > _RIGID_TOLERANCE or np.linalg.det(R) < 0:
+    if not is_rigid(T, _REACH_M):
         raise MalformedError("a pose that is not a rotation and a translation")
     T.flags.writeable = False
     return T

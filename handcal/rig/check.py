@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from handcal.geometry import is_rigid
 from handcal.types import EYES, EyeDisplay, Float64, Intrinsics, Rig
 
 MAX_SIDE_PX = 16384
-ROTATION_TOLERANCE = 1e-5
 
 
 def check_rig(rig: Rig) -> None:
@@ -79,12 +79,8 @@ def _check_size(name: str, width: int, height: int) -> None:
 
 
 def _check_rigid(name: str, T: Float64) -> None:
-    R = T[:3, :3]
     require(
-        bool((np.abs(R) < 2).all())
-        and np.array_equal(T[3], [0, 0, 0, 1])
-        and np.allclose(R @ R.T, np.eye(3), rtol=0, atol=ROTATION_TOLERANCE)
-        and np.linalg.det(R) > 0,
+        is_rigid(T, reach_m=np.inf),
         f"{name} must be a rigid transform: an orthonormal, right-handed rotation over 0 0 0 1",
     )
     require(bool((np.abs(T[:3, 3]) < 1).all()), f"{name}: the translation must be below 1 (metres)")

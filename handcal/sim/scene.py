@@ -16,13 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.closable import Closable
+from handcal.geometry import is_rigid
 from handcal.types import Float64, freeze
 
 _MAGIC = b"hcS1"
 # Magic, host time in ns, whether there is a hand, and the upper 3x4 of both poses by rows.
 _DATAGRAM = struct.Struct("<4sq?12d12d")
 _STALE_NS = 1_000_000_000
-_RIGID_TOLERANCE = 1e-6
+_REACH_M = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,16 +63,9 @@ def unpack(datagram: bytes) -> SceneState | None:
     magic, t_ns, has_hand, *numbers = _DATAGRAM.unpack(datagram)
     poses = np.tile(np.eye(4), (2, 1, 1))
     poses[:, :3] = np.reshape(numbers, (2, 3, 4))
-    if magic != _MAGIC or not all(map(_is_rigid, poses)):
+    if magic != _MAGIC or not all(is_rigid(T, _REACH_M) for T in poses):
         return None
     return SceneState(t_ns, poses[0], poses[1] if has_hand else None)
-
-
-def _is_rigid(T: Float64) -> bool:
-    R = T[:3, :3]
-    if not (np.isfinite(T).all() and np.abs(T).max() < 1e3):
-        return False
-    return bool(np.allclose(R @ R.T, np.eye(3), atol=_RIGID_TOLERANCE) and np.linalg.det(R) > 0)
 
 
 class ScenePublisher(Closable):
