@@ -234,6 +234,8 @@ class Calibration:
         ------
         ProcedureError
             If there is no steady hand, or an alignment has not been applied yet.
+        ValueError
+            If no eye is given.
         HandError
             If hardly a point lies off the cut edges.
         FileError
@@ -243,6 +245,8 @@ class Calibration:
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
         if not self._is_steady():
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
+        if not eyes:
+            raise ValueError("at least one eye must be open")
         hand = self._hands[-1]
         self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
         self._cursor = hand

@@ -78,6 +78,8 @@ def camera_matrix(intrinsics: Intrinsics) -> Float64:
 
 def image_points(points_m: ArrayLike, intrinsics: Intrinsics) -> Float64:
     """Project (N, 3) points in front of a camera, in its frame, to (N, 2) pixels, lens included."""
+    if not any(intrinsics.distortion):  # several times as fast as OpenCV's way
+        return project(np.hstack([camera_matrix(intrinsics), np.zeros((3, 1))]), points_m)
     pixels, _ = cv2.projectPoints(
         np.asarray(points_m, dtype=np.float64),
         np.zeros(3),

@@ -10,7 +10,7 @@ from handcal.hand.locate import locate_hand
 from handcal.hand.mask import HandMask, mask_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.surface import behind_nearest
-from handcal.hand.view import Box, deproject, pixels_of, view_depth
+from handcal.hand.view import Box, Pixels, deproject, pixels_of, view_depth
 from handcal.types import Bool, Float32, Frame, HandCloud, Intrinsics, UInt8
 
 __all__ = ["SegmentSettings", "segment_hand"]
@@ -84,7 +84,7 @@ def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud
         t_host_ns=frame.t_host_ns,
         points_m=points_m,
         is_cut=_widened(hand.cut, round(settings.cut_band_m / hand.pitch_m))[chosen],
-        colors=_colors(frame, points_m),
+        colors=_colors(frame, points_m, (chosen[0] + y0, chosen[1] + x0)),
         contour_m=deproject(view, *outline).T,
         contour_is_cut=hand.cut[outline],
         mask=mask,
@@ -111,13 +111,16 @@ def _widened(mask: Bool, by_px: int) -> Bool:
     return cv2.dilate(mask.astype(np.uint8), square).astype(bool)
 
 
-def _colors(frame: Frame, points_m: Float32) -> UInt8 | None:
-    """Look up the points' colours; black outside the colour image."""
+def _colors(frame: Frame, points_m: Float32, pixels: Pixels) -> UInt8 | None:
+    """Look up the colours of points measured at pixels; black outside the colour image."""
     camera = frame.color_intrinsics
     if frame.color is None or camera is None:
         return None
-    pixels = image_points(transform(frame.T_C_D, points_m), camera)
-    columns, rows = np.rint(pixels).astype(int).T
+    if camera == frame.depth_intrinsics and (np.eye(4) == frame.T_C_D).all():
+        rows, columns = pixels
+        return frame.color[rows, columns]
+    seen_at = image_points(transform(frame.T_C_D, points_m), camera)
+    columns, rows = np.rint(seen_at).astype(int).T
     seen = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     colors = np.zeros((len(points_m), 3), np.uint8)
     colors[seen] = frame.color[rows[seen], columns[seen]]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.geometry import transform
+from handcal.geometry import is_rigid, transform
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.fuse import with_eye_box
 from handcal.register.model import design, drawn
@@ -130,8 +130,8 @@ def check_cloud(name: str, points_m: ArrayLike) -> Float64:
 
 def _check_pose(T_E_W: ArrayLike) -> Float64:
     T_E = np.asarray(T_E_W, dtype=np.float64)
-    if T_E.shape != (4, 4) or not np.isfinite(T_E).all():
-        raise ValueError("T_E_W must be a finite 4×4 matrix")
+    if T_E.shape != (4, 4) or not is_rigid(T_E, _FARTHEST_M):
+        raise ValueError("T_E_W must be a rigid transform, a 4×4 matrix in metres")
     return T_E
 
 
