@@ -1,0 +1,118 @@
+"""What a station knows at one frame, for whoever watches: frozen, and complete in itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from handcal.calibrate import Observation, PlacedHand, State
+from handcal.link.server import LinkStatistics
+from handcal.results import Results
+from handcal.session import SessionRecord
+from handcal.types import Eye, Float64, Frame
+from handcal.wearer_view import EyeView
+
+
+@dataclass(frozen=True, slots=True)
+class CameraStatus:
+    """How the camera does.
+
+    Attributes
+    ----------
+    name : str
+    problem : str
+        Why no frames come, and what to do; empty while they come.
+    rate_hz : float
+        Frames over the last second.
+    dropped : int
+        Frames missing in the camera's own count since it was opened.
+    """
+
+    name: str
+    problem: str = ""
+    rate_hz: float = 0.0
+    dropped: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Procedure:
+    """Where the calibration stands.
+
+    Attributes
+    ----------
+    state : State
+    eyes : tuple of eye
+        Those that the present cursor is for.
+    cursor : PlacedHand or None
+        The frozen hand while one is shown.
+    refusal : str
+        Why the last confirmation of the present cursor was refused; empty if none was.
+    refused : int
+        Confirmations refused so far.
+    guard_limit_rad : float
+    results : Results or None
+        Of all alignments; None while there are none, or alignments have changed since.
+    expected_after_another_arcmin : mapping of eye to float
+        The error to expect in the display if one more alignment were added; empty without results.
+    applied_shift_m : mapping of eye to (3,) float64
+        What the headset renders with.
+    is_applied : bool
+        Whether it has acknowledged that.
+    """
+
+    state: State
+    eyes: tuple[Eye, ...]
+    cursor: PlacedHand | None
+    refusal: str
+    refused: int
+    guard_limit_rad: float
+    results: Results | None
+    expected_after_another_arcmin: Mapping[Eye, float]
+    applied_shift_m: Mapping[Eye, Float64]
+    is_applied: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """Everything at one frame.
+
+    Attributes
+    ----------
+    number : int
+        Running number, from 1.
+    t_host_ns : int
+        Host's monotonic time when it was taken.
+    frame : Frame or None
+        The newest; None before the first.
+    observation : Observation or None
+        What the procedure saw in it; None if no frame came since the last snapshot.
+    camera : CameraStatus
+    link : LinkStatistics
+    link_problem : str
+        What is wrong with the headset, and what to do; empty if nothing is.
+    problem : str
+        What went wrong in the procedure itself, such as a full disk; empty if nothing did.
+    procedure : Procedure
+    views : mapping of eye to EyeView
+        What the wearer sees, if asked for (`Station.watch_views`).
+    record : SessionRecord
+        The session as it is on the disk; the same object until it changes.
+    """
+
+    number: int
+    t_host_ns: int
+    frame: Frame | None
+    observation: Observation | None
+    camera: CameraStatus
+    link: LinkStatistics
+    link_problem: str
+    problem: str
+    procedure: Procedure
+    record: SessionRecord
+    views: Mapping[Eye, EyeView] = field(default_factory=dict)
+
+    @property
+    def session_path(self) -> Path:
+        """Folder of the session."""
+        return self.record.path

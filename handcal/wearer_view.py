@@ -1,0 +1,99 @@
+"""What each eye sees through the display: the hand itself, and what the headset draws over it.
+
+With the simulator the true eye is known to the simulator, which renders what it sees. With a real
+headset it is predicted: the eye is taken to be where the calibration says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handcal.display import eye_projection
+from handcal.geometry import project
+from handcal.types import Eye, EyeDisplay, Float64, UInt8, freeze
+
+_NEAREST_M = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeView:
+    """One eye's view, in pixels of its display.
+
+    Attributes
+    ----------
+    eye : {"left", "right"}
+    width_px, height_px : int
+        Size of the display.
+    hand_px : (N, 2) float64
+        Outline of the live hand as the eye sees it through the display.
+    drawn_px : (N, 2) float64
+        The same outline as the headset draws it: on the hand if the calibration is right.
+    cursor_px : (M, 2) float64
+        The cursor as the headset draws it; empty if there is none.
+    is_true : bool
+        Whether the eye is the simulated wearer's true one; otherwise it is predicted.
+    image : (h, w, 3) uint8 or None
+        RGB of the world behind the display, stretched over it; None if it is not known.
+    """
+
+    eye: Eye
+    width_px: int
+    height_px: int
+    hand_px: Float64
+    drawn_px: Float64
+    cursor_px: Float64
+    is_true: bool
+    image: UInt8 | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self, "hand_px", np.float64, None, 2)
+        freeze(self, "drawn_px", np.float64, None, 2)
+        freeze(self, "cursor_px", np.float64, None, 2)
+        freeze(self, "image", np.uint8, None, None, 3)
+
+
+def see(
+    eye: Eye,
+    display: EyeDisplay,
+    eye_shift_m: ArrayLike,
+    drawn_shift_m: ArrayLike,
+    outline_E_m: Float64,
+    cursor_E_m: Float64,
+    *,
+    is_true: bool,
+    image: UInt8 | None = None,
+) -> EyeView:
+    """Return what an eye at one place sees of a hand, drawn for an eye at another.
+
+    Parameters
+    ----------
+    eye : {"left", "right"}
+    display : EyeDisplay
+    eye_shift_m : (3,) array_like
+        φ of the eye that looks.
+    drawn_shift_m : (3,) array_like
+        φ that the headset renders with.
+    outline_E_m : (N, 3) float64
+        The live hand's outline.
+    cursor_E_m : (M, 3) float64
+    is_true, image
+        As in `EyeView`.
+    """
+    seen, drawn = eye_projection(display, eye_shift_m), eye_projection(display, drawn_shift_m)
+    return EyeView(
+        eye=eye,
+        width_px=display.width_px,
+        height_px=display.height_px,
+        hand_px=_in_front(seen, outline_E_m),
+        drawn_px=_in_front(drawn, outline_E_m),
+        cursor_px=_in_front(drawn, cursor_E_m),
+        is_true=is_true,
+        image=image,
+    )
+
+
+def _in_front(P: Float64, points_E_m: Float64) -> Float64:
+    return project(P, points_E_m[points_E_m[:, 2] > _NEAREST_M])
