@@ -1,4 +1,4 @@
-"""How the program looks: spacing, colours for light and dark, icons. The one place for all three."""
+"""How the program looks: spacing, colours for light and dark, icons; the one place for them."""
 
 from __future__ import annotations
 
