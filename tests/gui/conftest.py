@@ -1,0 +1,222 @@
+"""Snapshots of a rendered calibration, for panels to show: no camera, headset or thread."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handcal.calibrate import CalibrationSettings, Observation, PlacedHand, State
+from handcal.config import settings_json
+from handcal.display import view_of_eye
+from handcal.geometry import rigid, transform
+from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.link.server import LinkStatistics
+from handcal.link.wire import Rejection
+from handcal.results import Results, SolveSettings, results_json, solve_session
+from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.session import Session, SessionRecord
+from handcal.sim.alignments import AlignmentSettings, simulate_alignment
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World, render
+from handcal.sim.room import make_room
+from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.snapshot import CameraStatus, Procedure, Snapshot
+from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig
+from handcal.wearer_view import EyeView, see
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+SENSOR = SensorSettings()
+T_W_H = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])
+T_D_CURSOR = rigid([-0.2, 0.0, 0.0], [-0.01, 0.01, 0.50])
+T_D_LIVE = T_D_CURSOR @ rigid([0.02, -0.03, 0.06], [0.012, -0.008, 0.01])
+NOW_NS = 1_000_000_000_000
+AGE_NS = 42_000_000
+LINK = LinkStatistics(
+    connected=True,
+    sent=12_345,
+    received=6_789,
+    lost=3,
+    lost_inbound=1,
+    resent=5,
+    acked=17,
+    unacked=0,
+    failed=0,
+    rejected={str(reason): 0 for reason in Rejection},
+    pose_rate_hz=60.0,
+    latency_ms=2.4,
+    clock_offset_ms=5000.123,
+    clock_drift_ppm=-12.0,
+    clock_uncertainty_ms=0.31,
+    bytes_sent=4_500_000,
+    bytes_received=650_000,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """The hand that became the cursor, and the live one, as the rig's camera sees them."""
+
+    cursor: PlacedHand
+    live: PlacedHand
+    frame: Frame
+    rotation_rad: Float64
+
+
+@pytest.fixture(scope="session")
+def rig() -> Rig:
+    return example_rig()
+
+
+@pytest.fixture(scope="session")
+def shots(rig: Rig) -> Shots:
+    world = World(make_hand(1), make_room(1))
+    (_, cursor), (frame, live) = (_shoot(rig, world, T) for T in (T_D_CURSOR, T_D_LIVE))
+    turned = T_D_LIVE[:3, :3] @ T_D_CURSOR[:3, :3].T
+    return Shots(cursor, live, frame, Rotation.from_matrix(turned).as_rotvec())
+
+
+@pytest.fixture(scope="session")
+def alignments() -> tuple[Alignment, ...]:
+    """Return two alignments of both eyes, shifted by at most 3 mm each way."""
+    return tuple(_align(seed) for seed in (1, 2))
+
+
+@pytest.fixture(scope="session")
+def results(rig: Rig, alignments: Sequence[Alignment]) -> Results:
+    return solve_session(alignments, rig, SolveSettings())
+
+
+@pytest.fixture
+def record(
+    tmp_path: Path, rig: Rig, alignments: Sequence[Alignment], results: Results
+) -> SessionRecord:
+    """Return what a solved session's folder holds."""
+    settings = settings_json(CalibrationSettings())
+    with Session.create(tmp_path / "sessions", rig, settings, "wearer-1") as session:
+        for alignment in alignments:
+            session.save_alignment(alignment)
+        session.save_results(results_json(results))
+        session.record("solved", **results_json(results))
+    return Session.open(session.path)
+
+
+@pytest.fixture
+def snapshot(
+    rig: Rig, shots: Shots, results: Results, record: SessionRecord
+) -> Callable[..., Snapshot]:
+    """Return a maker of snapshots: of a state, aligning by default, with changes to it.
+
+    ``snapshot(State.ALIGN, observation={"is_red": True}, camera={"dropped": 3}, number=2)``
+    changes fields of the parts `observation`, `procedure`, `camera` and `link`, and of the
+    snapshot itself; ``observation=None`` leaves it out.
+    """
+
+    def make(
+        state: State = State.ALIGN,
+        *,
+        observation: Mapping[str, Any] | None = {},
+        procedure: Mapping[str, Any] = {},
+        camera: Mapping[str, Any] = {},
+        link: Mapping[str, Any] = {},
+        **changes: Any,
+    ) -> Snapshot:
+        observed = _observe(state, shots)
+        snapshot = Snapshot(
+            number=1,
+            t_host_ns=NOW_NS,
+            frame=shots.frame,
+            observation=None if observation is None else replace(observed, **observation),
+            camera=replace(CameraStatus("Simulated camera", rate_hz=30.0), **camera),
+            link=replace(LINK, **link),
+            link_problem="",
+            problem="",
+            procedure=replace(_procedure(state, shots, results), **procedure),
+            record=record,
+            views=_views(rig, shots),
+        )
+        return replace(snapshot, **changes)
+
+    return make
+
+
+def _shoot(rig: Rig, world: World, T_D_hand: Float64) -> tuple[Frame, PlacedHand]:
+    T_W_D, camera = T_W_H @ rig.T_H_D, rig.depth_intrinsics
+    depth_m, color = render(world, T_W_D, T_W_D @ T_D_hand, camera)
+    depth = sense_depth(depth_m, camera.fx, np.random.default_rng(0), SENSOR)
+    t_ns = NOW_NS - AGE_NS
+    frame = Frame(1, t_ns, t_ns, depth, SENSOR.depth_scale_m, camera, color, camera)
+    cloud = segment_hand(frame, SegmentSettings())
+    points_W_m = transform(T_W_D, cloud.points_m)
+    return frame, PlacedHand(cloud, t_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0))
+
+
+def _align(seed: int) -> Alignment:
+    """Return an alignment of one hand displacement; both eyes see it from one viewpoint."""
+    simulated = AlignmentSettings(
+        count=600, display_distance_m=Z_E_S_M, shift_max_m=0.003, resample=True, depth_sigma_m=1e-3
+    )
+    one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, simulated)
+    return Alignment(
+        cursor_m=one.cursor_m,
+        hand_m=one.hand_m,
+        cursor_is_cut=one.cursor_cut,
+        hand_is_cut=one.hand_cut,
+        T_E_W=dict.fromkeys(EYES, one.T_E_W),
+        eyes=EYES,
+        rotation_rad=one.rotation_rad,
+        t_a_ns=1_000_000_000 * seed,
+        t_b_ns=1_000_000_000 * seed + 500_000_000,
+    )
+
+
+def _observe(state: State, shots: Shots) -> Observation:
+    is_aligning = state is State.ALIGN
+    return Observation(
+        state,
+        shots.live,
+        problem="",
+        is_steady=True,
+        rotation_rad=shots.rotation_rad if is_aligning else None,
+        segment_ms=4.2,
+        guard_ms=3.1 if is_aligning else None,
+    )
+
+
+def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
+    has_cursor = state in (State.ALIGN, State.ALIGNED, State.SOLVED)
+    is_solved = state in (State.SOLVED, State.APPLYING, State.APPLIED)
+    is_sent = state in (State.APPLYING, State.APPLIED)
+    applied_m = {eye: results.shifts[eye].shift_m if is_sent else np.zeros(3) for eye in EYES}
+    return Procedure(
+        state=state,
+        eyes=EYES,
+        cursor=shots.cursor if has_cursor else None,
+        refusal="",
+        refused=0,
+        guard_limit_rad=float(np.radians(9.0)),
+        results=results if is_solved else None,
+        expected_after_another_arcmin={"left": 3.1, "right": 3.4} if is_solved else {},
+        applied_shift_m=applied_m,
+        is_applied=state is not State.APPLYING,
+    )
+
+
+def _views(rig: Rig, shots: Shots) -> dict[Eye, EyeView]:
+    """Return what eyes that lie beside the viewpoints see through uncorrected displays."""
+    views = {}
+    for eye, display in rig.eyes.items():
+        outline_E_m, cursor_E_m = (
+            transform(view_of_eye(display, T_W_H) @ hand.T_W_D, hand.cloud.contour_m)
+            for hand in (shots.live, shots.cursor)
+        )
+        shift_m = np.array([0.002, -0.001, 0.003])
+        views[eye] = see(eye, display, shift_m, np.zeros(3), outline_E_m, cursor_E_m, is_true=True)
+    return views
