@@ -7,32 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from handcal.calibrate import Observation, PlacedHand, State
+from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
 from handcal.results import Results
 from handcal.session import SessionRecord
 from handcal.types import Eye, Float64, Frame
 from handcal.wearer_view import EyeView
-
-
-@dataclass(frozen=True, slots=True)
-class CameraStatus:
-    """How the camera does.
-
-    Attributes
-    ----------
-    name : str
-    problem : str
-        Why no frames come, and what to do; empty while they come.
-    rate_hz : float
-        Frames over the last second.
-    dropped : int
-        Frames missing in the camera's own count since it was opened.
-    """
-
-    name: str
-    problem: str = ""
-    rate_hz: float = 0.0
-    dropped: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

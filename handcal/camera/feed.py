@@ -1,0 +1,136 @@
+"""Frames from a camera that may be unplugged and come back."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from handcal.camera.camera import Camera
+from handcal.closable import Closable
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.types import Frame
+
+_RATE_WINDOW_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class CameraStatus:
+    """How the camera does.
+
+    Attributes
+    ----------
+    name : str
+    problem : str
+        Why no frames come, and what to do; empty while they come.
+    rate_hz : float
+        Frames over the last second.
+    dropped : int
+        Frames missing in the camera's own count since it was opened.
+    """
+
+    name: str
+    problem: str = ""
+    rate_hz: float = 0.0
+    dropped: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class FeedSettings:
+    """How patient a feed is.
+
+    Attributes
+    ----------
+    read_s : float
+        Longest time that `CameraFeed.read` takes.
+    silent_s : float
+        A camera silent for so long has a problem.
+    reopen_s : float
+        Time between attempts to open a camera that failed.
+    """
+
+    read_s: float = 0.2
+    silent_s: float = 1.0
+    reopen_s: float = 1.0
+
+
+class CameraFeed(Closable):
+    """Reads a camera, opening it again when it fails and when a recording ends.
+
+    Parameters
+    ----------
+    open_camera : callable
+        Returns an open camera; raises CameraError if there is none.
+    settings : FeedSettings
+    """
+
+    def __init__(
+        self, open_camera: Callable[[], Camera], settings: FeedSettings | None = None
+    ) -> None:
+        self._open_camera = open_camera
+        self._settings = settings or FeedSettings()
+        self._camera: Camera | None = None
+        self._name = "Camera"
+        self._problem = ""
+        self._dropped = 0
+        self._last_index: int | None = None
+        self._arrived_s: deque[float] = deque()
+        self._heard_s = time.monotonic()
+        self._next_open_s = 0.0
+
+    @property
+    def status(self) -> CameraStatus:
+        """How the camera does."""
+        oldest_s = time.monotonic() - _RATE_WINDOW_S
+        while self._arrived_s and self._arrived_s[0] < oldest_s:
+            self._arrived_s.popleft()
+        rate_hz = len(self._arrived_s) / _RATE_WINDOW_S
+        return CameraStatus(self._name, self._problem, rate_hz, self._dropped)
+
+    def read(self) -> Frame | None:
+        """Return the next frame, or None if none came soon; `status` says why."""
+        try:
+            if self._camera is None:
+                self._open()
+            assert self._camera is not None
+            frame = self._camera.read(self._settings.read_s)
+        except CameraTimeoutError as error:
+            if time.monotonic() - self._heard_s > self._settings.silent_s:
+                self._problem = str(error)
+            return None
+        except CameraEndError:
+            self.close()  # a recording begins again
+            self._next_open_s = 0.0
+            return None
+        except CameraError as error:
+            self.close()
+            self._problem = str(error)
+            return None
+        self._note(frame)
+        return frame
+
+    def close(self) -> None:
+        """Close the camera; reading opens it again."""
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+        self._last_index = None
+
+    def _open(self) -> None:
+        now_s = time.monotonic()
+        if now_s < self._next_open_s:
+            time.sleep(min(self._settings.read_s, self._next_open_s - now_s))
+            raise CameraError(self._problem)
+        self._next_open_s = now_s + self._settings.reopen_s
+        self._camera = self._open_camera()
+        self._name = self._camera.name
+        self._heard_s = time.monotonic()
+
+    def _note(self, frame: Frame) -> None:
+        self._problem = ""
+        self._heard_s = time.monotonic()
+        self._arrived_s.append(self._heard_s)
+        if self._last_index is not None:
+            self._dropped += max(0, frame.index - self._last_index - 1)
+        self._last_index = frame.index

@@ -1,0 +1,78 @@
+"""The virtual headset's process, seen from the program that starts it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from handcal.closable import Closable
+from handcal.errors import LinkError
+from handcal.link.pairing import KEY_VARIABLE
+
+_END_S = 5.0
+
+
+class VirtualHeadset(Closable):
+    """Runs ``handcal headset`` until closed.
+
+    Parameters
+    ----------
+    rig_path : Path
+        The rig that is worn.
+    port, scene_port : int
+        Where the PC's end of the link and the synthetic camera listen, on this machine.
+    pairing_key : str
+    seed : int
+        Of the wearer.
+    loss, reorder : float
+        Share of the datagrams lost, and reordered, in each direction.
+    """
+
+    def __init__(
+        self,
+        rig_path: Path,
+        port: int,
+        scene_port: int,
+        pairing_key: str,
+        *,
+        seed: int,
+        loss: float = 0.0,
+        reorder: float = 0.0,
+    ) -> None:
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+        options = {
+            "--port": port,
+            "--scene-port": scene_port,
+            "--rig": rig_path,
+            "--seed": seed,
+            "--loss": loss,
+            "--reorder": reorder,
+        }
+        command = [sys.executable, "-m", "handcal", "headset"]
+        command += [str(part) for option in options.items() for part in option]
+        self._process = subprocess.Popen(  # noqa: S603 (our own program)
+            command, env=os.environ | {KEY_VARIABLE: pairing_key}, stderr=self._errors
+        )
+
+    def require_running(self) -> None:
+        """Raise LinkError, with what the process complained of, if it has ended."""
+        if self._process.poll() is None:
+            return
+        self._errors.seek(0)
+        complaint = self._errors.read(1000).decode(errors="replace").strip()
+        raise LinkError(f"the virtual headset has ended. {complaint}".strip())
+
+    def close(self) -> None:
+        """End the process; safe to call twice."""
+        if self._errors.closed:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._errors.close()
