@@ -35,3 +35,7 @@ class PoseError(HandcalError):
 
 class PosePendingError(PoseError):
     """The headset's pose at a time has not arrived yet; asking again soon may succeed."""
+
+
+class CancelledError(HandcalError):
+    """Something long was given up on request; nothing has changed."""

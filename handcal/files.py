@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import secrets
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from handcal.errors import FileError
 from handcal.types import UInt8
 
 MAX_JSON_BYTES = 16 * 2**20
+_PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
 
 def write_atomic(path: Path, data: bytes) -> None:
@@ -96,25 +98,39 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
-def write_ply(path: Path, points_m: NDArray[np.floating], colors: UInt8 | None = None) -> None:
-    """Write (N, 3) points in metres, with (N, 3) RGB colours if given, as binary PLY."""
-    fields: list[tuple[str, str]] = [(axis, "<f4") for axis in "xyz"]
-    header = ["property float x", "property float y", "property float z"]
+def write_ply(
+    path: Path,
+    points_m: NDArray[np.floating],
+    colors: UInt8 | None = None,
+    properties: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
+    """Write (N, 3) points in metres as binary PLY, in the precision they are given in.
+
+    Parameters
+    ----------
+    path : Path
+    points_m : (N, 3) float32 or float64
+    colors : (N, 3) uint8, optional
+        RGB.
+    properties : mapping of name to (N,) float32, float64 or uint8, optional
+        What else there is to say of each point; floats may be NaN.
+    """
+    columns: dict[str, NDArray[Any]] = {axis: points_m[:, i] for i, axis in enumerate("xyz")}
     if colors is not None:
-        fields += [(channel, "u1") for channel in ("red", "green", "blue")]
-        header += ["property uchar red", "property uchar green", "property uchar blue"]
-    vertices = np.empty(len(points_m), dtype=fields)
-    for column, axis in enumerate("xyz"):
-        vertices[axis] = points_m[:, column]
-    if colors is not None:
-        for column, channel in enumerate(("red", "green", "blue")):
-            vertices[channel] = colors[:, column]
-    lines = [
+        columns |= {channel: colors[:, i] for i, channel in enumerate(("red", "green", "blue"))}
+    columns |= properties or {}
+    vertices = np.empty(
+        len(points_m),
+        dtype=[(name, column.dtype.newbyteorder("<")) for name, column in columns.items()],
+    )
+    for name, column in columns.items():
+        vertices[name] = column
+    header = [
         "ply",
         "format binary_little_endian 1.0",
         "comment metres",
         f"element vertex {len(vertices)}",
-        *header,
+        *(f"property {_PLY_TYPES[column.dtype.str[1:]]} {name}" for name, column in columns.items()),
         "end_header\n",
     ]
-    write_atomic(path, "\n".join(lines).encode() + vertices.tobytes())
+    write_atomic(path, "\n".join(header).encode() + vertices.tobytes())

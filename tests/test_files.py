@@ -114,3 +114,25 @@ def test_opencv_reads_our_ply(tmp_path: Path, colored: bool) -> None:
     assert np.array_equal(read_points.reshape(-1, 3), points_m)
     if colors is not None:
         assert np.array_equal(np.rint(read_colors.reshape(-1, 3) * 255), colors)
+
+
+def test_ply_keeps_doubles_and_further_properties_to_the_last_bit(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    points_m, residual_m = rng.normal(size=(9, 3)), rng.normal(size=9)
+    residual_m[3] = np.nan
+    is_cut = rng.integers(0, 2, 9, dtype=np.uint8)
+    path = tmp_path / "a.ply"
+    write_ply(path, points_m, properties={"residual_m": residual_m, "is_cut": is_cut})
+    header, body = path.read_bytes().split(b"end_header\n")
+    assert header.decode().splitlines()[3:] == [
+        "element vertex 9",
+        "property double x",
+        "property double y",
+        "property double z",
+        "property double residual_m",
+        "property uchar is_cut",
+    ]
+    read = np.frombuffer(body, np.dtype([("xyz", "<f8", 3), ("residual_m", "<f8"), ("cut", "u1")]))
+    assert np.array_equal(read["xyz"], points_m)
+    assert np.array_equal(read["residual_m"], residual_m, equal_nan=True)
+    assert np.array_equal(read["cut"], is_cut)
