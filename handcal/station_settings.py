@@ -1,0 +1,59 @@
+"""What a calibration station is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from handcal.calibrate import CalibrationSettings
+from handcal.resources import resource_path
+
+Source = Literal["simulator", "recording", "realsense"]
+HeadsetKind = Literal["virtual", "network"]
+DEFAULT_PORT = 47800
+
+
+@dataclass(frozen=True, slots=True)
+class StationSettings:
+    """What a station is made of.
+
+    Attributes
+    ----------
+    source : {"simulator", "recording", "realsense"}
+    recording : str
+        Path of the recording that `source` plays, over and over.
+    serial : str
+        Of the RealSense; empty takes the first.
+    headset : {"virtual", "network"}
+        The virtual headset is a process of its own on this machine; it brings the simulated wearer.
+    host, port : str, int
+        Where a network headset connects to.
+    rig : str
+        Path of the rig file; empty takes the example, which is the virtual headset's own.
+    seed : int
+        Of the simulated wearer, hand and room.
+    loss, reorder : float
+        Share of the virtual headset's datagrams lost, and reordered, in each direction.
+    sessions : str
+        Folder in which sessions are created.
+    calibration : CalibrationSettings
+    """
+
+    source: Source = "simulator"
+    recording: str = ""
+    serial: str = ""
+    headset: HeadsetKind = "virtual"
+    host: str = "0.0.0.0"  # noqa: S104 (a headset is another device; the datagrams are signed)
+    port: int = DEFAULT_PORT
+    rig: str = ""
+    seed: int = 1
+    loss: float = 0.0
+    reorder: float = 0.0
+    sessions: str = "sessions"
+    calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
+
+    @property
+    def rig_path(self) -> Path:
+        """Path of the rig file to read."""
+        return Path(self.rig) if self.rig else resource_path("example_rig.yaml")
