@@ -6,92 +6,270 @@ One thread owns a station: it calls `step` for ever, and whatever else is wanted
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 
-from handcal.calibrate import Calibration, CalibrationSettings, Observation, PlacedHand, State
+from handcal.calibrate import Calibration, PlacedHand, State
 from handcal.camera.camera import Camera
+from handcal.camera.feed import CameraFeed
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recording import RecordingCamera
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.closable import Closable
 from handcal.config import settings_json
 from handcal.display import view_of_eye
-from handcal.errors import (
-    CameraEndError,
-    CameraError,
-    CameraTimeoutError,
-    FileError,
-    HandcalError,
-    LinkError,
-)
+from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
 from handcal.link.pairing import new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
-from handcal.resources import resource_path
+from handcal.register.verdict import expected_after_another
+from handcal.results import Results
 from handcal.rig.rig_file import read_rig
 from handcal.session import Session, SessionRecord
 from handcal.sim.eyes import TrueEyes
-from handcal.sim.hand import make_hand
 from handcal.sim.process import VirtualHeadset
-from handcal.sim.render import World
-from handcal.sim.room import make_room
-from handcal.sim.scene import SceneReceiver
-from handcal.snapshot import CameraStatus, Procedure, Snapshot
-from handcal.types import EYES, Eye, Float64, Frame, Rig
+from handcal.sim.simulation import Simulation
+from handcal.snapshot import Procedure, Snapshot
+from handcal.station_settings import StationSettings
+from handcal.types import Eye, Float64
 from handcal.wearer_view import EyeView, see
 
-Source = Literal["simulator", "recording", "realsense"]
-HeadsetKind = Literal["virtual", "network"]
-DEFAULT_PORT = 47800
+_VIEW_PERIOD_S = 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class StationSettings:
-    """What a station is made of.
+class Station(Closable):
+    """One wearer at one station.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    wearer : str
+        Name or code; kept in the session.
+    resume : Path, optional
+        A session to go on with, instead of a new one.
+    pairing_key : str
+        Shared with a network headset; the virtual one is given a fresh key.
 
     Attributes
     ----------
-    source : {"simulator", "recording", "realsense"}
-    recording : str
-        Path of the recording that `source` plays, over and over.
-    serial : str
-        Of the RealSense; empty takes the first.
-    headset : {"virtual", "network"}
-        The virtual headset is a process of its own on this machine; it brings the simulated wearer.
-    host, port : str, int
-        Where a network headset connects to.
-    rig : str
-        Path of the rig file; empty takes the example, which is the virtual headset's own.
-    seed : int
-        Of the simulated wearer, hand and room.
-    loss, reorder : float
-        Share of the virtual headset's datagrams lost, and reordered, in each direction.
-    sessions : str
-        Folder in which sessions are created.
-    calibration : CalibrationSettings
+    calibration : Calibration
+    session : Session
+
+    Raises
+    ------
+    FileError
+        If the rig or the session to resume cannot be read, or no session can be created.
+    LinkError
+        If the network address cannot be bound, or the key is too short.
     """
 
-    source: Source = "simulator"
-    recording: str = ""
-    serial: str = ""
-    headset: HeadsetKind = "virtual"
-    host: str = "0.0.0.0"  # noqa: S104 (a headset is another device; the datagrams are signed)
-    port: int = DEFAULT_PORT
-    rig: str = ""
-    seed: int = 1
-    loss: float = 0.0
-    reorder: float = 0.0
-    sessions: str = "sessions"
-    calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
+    def __init__(
+        self,
+        settings: StationSettings,
+        wearer: str = "",
+        resume: Path | None = None,
+        pairing_key: str = "",
+    ) -> None:
+        self.settings = settings
+        is_virtual = settings.headset == "virtual"
+        self.pairing_key = new_pairing_key() if is_virtual else pairing_key
+        self.watch_views = False
+        self._simulation: Simulation | None = None
+        with ExitStack() as stack:
+            self.session = stack.enter_context(_open_session(settings, wearer, resume))
+            self._record = Session.open(self.session.path)
+            self.rig = self._record.rig
+            bind = LOOPBACK if is_virtual else (settings.host, settings.port)
+            self._link = stack.enter_context(HeadsetServer(self.pairing_key.encode(), bind))
+            if is_virtual:
+                self._simulation = stack.enter_context(
+                    Simulation(settings.seed, self._start_headset)
+                )
+                self._true_eyes = TrueEyes(self._simulation.world, self.rig, settings.seed)
+            self._feed = stack.enter_context(CameraFeed(self._open_camera))
+            self.calibration = Calibration(
+                self.rig,
+                self._link,
+                self.session,
+                settings.calibration,
+                resume=self._record if resume else None,
+            )
+            self._stack = stack.pop_all()
+        self._number = 0
+        self._problem = ""
+        self._revision = self.session.revision
+        self._judged: Results | None = None
+        self._expected_arcmin: Mapping[Eye, float] = {}
+        self._views: dict[Eye, EyeView] = {}
+        self._next_view_s = 0.0
 
     @property
-    def rig_path(self) -> Path:
-        """Path of the rig file to read."""
-        return Path(self.rig) if self.rig else resource_path("example_rig.yaml")
+    def address(self) -> tuple[str, int]:
+        """Where the headset connects to."""
+        return self._link.address
+
+    def step(self) -> Snapshot:
+        """Take a frame, if one comes soon, through the procedure; say how everything stands."""
+        frame = self._feed.read()
+        observation = None
+        try:
+            if frame is not None:
+                observation = self.calibration.step(frame)
+            if self.calibration.state is State.APPLYING:
+                self.calibration.poll_applied()
+            self._problem = ""
+        except (FileError, LinkError) as error:
+            self._problem = str(error)
+        if observation is not None and observation.hand is not None:
+            self._show(observation.hand)
+        self._number += 1
+        return Snapshot(
+            number=self._number,
+            t_host_ns=time.monotonic_ns(),
+            frame=frame,
+            observation=observation,
+            camera=self._feed.status,
+            link=self._link.statistics(),
+            link_problem=self._link_problem(),
+            problem=self._problem,
+            procedure=self._procedure(),
+            record=self._newest_record(),
+            views=dict(self._views),
+        )
+
+    def restart_headset(self) -> None:
+        """Start the virtual headset again; a network headset connects by itself."""
+        if self._simulation is not None:
+            self._simulation.restart()
+
+    def close(self) -> None:
+        """End the virtual headset, and close camera, link and session; safe to call twice."""
+        self._stack.close()
+
+    def _start_headset(self, scene_port: int) -> VirtualHeadset:
+        return VirtualHeadset(
+            self.session.path / "rig.yaml",
+            self._link.address[1],
+            scene_port,
+            self.pairing_key,
+            seed=self.settings.seed,
+            loss=self.settings.loss,
+            reorder=self.settings.reorder,
+        )
+
+    def _open_camera(self) -> Camera:
+        settings = self.settings
+        if settings.source == "realsense":
+            return RealSenseCamera(settings.serial)
+        if settings.source == "recording":
+            return RecordingCamera(Path(settings.recording), real_time=True)
+        if self._simulation is None:
+            raise CameraError("the simulated camera needs the virtual headset, with its wearer")
+        return SyntheticCamera(
+            self._simulation.world,
+            self._simulation.scene,
+            depth_intrinsics=self.rig.depth_intrinsics,
+            seed=settings.seed,
+        )
+
+    def _show(self, hand: PlacedHand) -> None:
+        """Draw the live hand in the headset, and what the eyes see of it for whoever watches."""
+        if self.calibration.state is State.APPLIED:
+            # The wearer judges the calibration by this outline on the own hand.
+            self._link.send_live_hand(hand.points_W_m, False)
+        now_s = time.monotonic()
+        if self.watch_views and now_s >= self._next_view_s:
+            self._next_view_s = now_s + _VIEW_PERIOD_S
+            eye: Eye = "right" if self._number % 2 else "left"
+            self._views[eye] = self._see(eye, hand)
+
+    def _see(self, eye: Eye, hand: PlacedHand) -> EyeView:
+        calibration, display = self.calibration, self.rig.eyes[eye]
+        drawn_shift_m = calibration.applied_shift_m[eye]
+        cursor = calibration.cursor
+        T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
+        image = None
+        if self._simulation is not None and self.settings.source == "simulator":
+            eye_shift_m = self._true_eyes.shift_m[eye]
+            scene = self._simulation.scene_at(hand.t_host_ns)
+            if scene is not None:
+                T_W_H = scene.T_W_D @ invert(self.rig.T_H_D)
+                image = self._true_eyes.look(eye, T_W_H, scene.T_W_hand)
+        elif calibration.results is not None and eye in calibration.results.shifts:
+            eye_shift_m = calibration.results.shifts[eye].shift_m
+        else:
+            eye_shift_m = drawn_shift_m
+        T_E_W = view_of_eye(display, T_W_H)
+        return see(
+            eye,
+            display,
+            eye_shift_m,
+            drawn_shift_m,
+            _outline_E(T_E_W, hand),
+            np.empty((0, 3)) if cursor is None else _outline_E(T_E_W, cursor),
+            is_true=image is not None,
+            image=image,
+        )
+
+    def _link_problem(self) -> str:
+        if self._simulation is not None:
+            try:
+                self._simulation.require_running()
+            except LinkError as error:
+                return str(error)
+        if self._link.connected:
+            return ""
+        if self._simulation is not None:
+            return "the virtual headset has not connected yet"
+        host, port = self._link.address
+        return (
+            f"no headset is connected; let it connect to UDP port {port} of this computer "
+            f"(listening at {host}) with the pairing key"
+        )
+
+    def _procedure(self) -> Procedure:
+        calibration = self.calibration
+        results = calibration.results
+        if results is not self._judged:
+            self._judged = results
+            self._expected_arcmin = (
+                expected_after_another(results, self.rig, self.settings.calibration.solve)
+                if results
+                else {}
+            )
+        return Procedure(
+            state=calibration.state,
+            eyes=calibration.eyes,
+            cursor=calibration.cursor,
+            refusal=calibration.refusal,
+            refused=calibration.refused,
+            guard_limit_rad=self.settings.calibration.guard.limit_rad,
+            results=results,
+            expected_after_another_arcmin=self._expected_arcmin,
+            applied_shift_m=calibration.applied_shift_m,
+            is_applied=calibration.is_applied,
+        )
+
+    def _newest_record(self) -> SessionRecord:
+        if self._revision != self.session.revision:
+            self._revision = self.session.revision
+            self._record = Session.open(self.session.path)
+        return self._record
+
+
+def _open_session(settings: StationSettings, wearer: str, resume: Path | None) -> Session:
+    if resume is not None:
+        return Session(resume)
+    rig = read_rig(settings.rig_path)
+    stored = {
+        "calibration": settings_json(settings.calibration),
+        "station": settings_json(settings),
+    }
+    return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
+
+
+def _outline_E(T_E_W: Float64, hand: PlacedHand) -> Float64:
+    return transform(T_E_W @ hand.T_W_D, hand.cloud.contour_m)
