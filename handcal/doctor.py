@@ -125,7 +125,7 @@ def _cameras() -> list[Finding]:
 
 def _camera(device: Device) -> Finding:
     found = f"{device.name}, serial {device.serial}, firmware {device.firmware}, USB {device.usb}"
-    if device.usb.startswith("2"):
+    if device.is_slow:
         advice = "USB 2 is too slow for 1280x720: use a USB 3 port and cable"
         return Finding("Camera", Health.LIMITED, found, advice)
     return Finding("Camera", Health.GOOD, found)

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from handcal.camera.realsense import librealsense
+from handcal.camera.sdk_frames import (
+    apart_ms,
+    extrinsics_between,
+    frame_of,
+    intrinsics_of,
+    with_color,
+)
 from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
-from handcal.geometry import rigid
-from handcal.types import Float64, Frame, Intrinsics, UInt8
+from handcal.types import Float64, Frame, Intrinsics
 
 _POLL_MS = 100
 _COLOR_TIMEOUT_S = 1.0
@@ -57,28 +59,21 @@ class RecordingCamera(Closable):
             self._depth = _Playback(rs, path, rs.stream.depth, real_time)
             color = self._depth.recorded_profile(rs.stream.color)
             if color is not None:
-                T_C_D = _extrinsics(self._depth.profile, color)
+                T_C_D = extrinsics_between(self._depth.profile, color)
                 self._color = _ColorTrack(_Playback(rs, path, rs.stream.color, real_time), T_C_D)
         except RuntimeError as error:
             self.close()
             raise CameraError(
                 f"{path} cannot be played as a RealSense recording with depth: {error}"
             ) from error
-        self.depth_intrinsics = _intrinsics(self._depth.profile)
+        self.depth_intrinsics = intrinsics_of(self._depth.profile)
 
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame with depth; see `Camera.read`."""
         if self._depth is None:
             raise CameraEndError(f"{self.name} is closed")
         depth = self._depth.read(timeout_s).get_depth_frame()
-        frame = Frame(
-            index=depth.get_frame_number(),
-            t_camera_ns=round(depth.get_timestamp() * 1e6),
-            t_host_ns=time.monotonic_ns(),
-            depth=np.array(depth.get_data(), np.uint16),
-            depth_scale_m=depth.get_units(),
-            depth_intrinsics=self.depth_intrinsics,
-        )
+        frame = frame_of(depth, self.depth_intrinsics)
         return frame if self._color is None else self._color.add_to(frame, depth)
 
     def close(self) -> None:
@@ -144,24 +139,14 @@ class _ColorTrack:
     def add_to(self, frame: Frame, depth: Any) -> Frame:
         """Return a frame with the colour nearest in time, if there is any."""
         color = self._nearest(depth)
-        image = None if color is None else _rgb(color)
-        if color is None or image is None:
-            return frame
-        return replace(
-            frame, color=image, color_intrinsics=_intrinsics(color.profile), T_C_D=self._T_C_D
-        )
+        return frame if color is None else with_color(frame, color, self._T_C_D)
 
     def _nearest(self, depth: Any) -> Any | None:
         """Return the colour nearest in time within its period, if their clock is the same."""
-        t_ms, clock = depth.get_timestamp(), depth.get_frame_timestamp_domain()
-        self._advance(t_ms)
-        candidates = [
-            (abs(color.get_timestamp() - t_ms), i)
-            for i, color in enumerate(self._around)
-            if color.get_frame_timestamp_domain() == clock
-        ]
-        apart_ms, i = min(candidates, default=(math.inf, 0))
-        return self._around[i] if apart_ms <= self._period_ms else None
+        self._advance(depth.get_timestamp())
+        nearest = min(self._around, key=lambda color: apart_ms(color, depth), default=None)
+        is_near = nearest is not None and apart_ms(nearest, depth) <= self._period_ms
+        return nearest if is_near else None
 
     def _advance(self, t_ms: float) -> None:
         while not self._ended and (not self._around or self._around[-1].get_timestamp() < t_ms):
@@ -296,19 +281,6 @@ def _wait_for_disk(path: Path, written: int) -> None:
         time.sleep(0.001)
 
 
-def _intrinsics(profile: Any) -> Intrinsics:
-    """Convert a stream's intrinsics; an inverse distortion, which OpenCV has not, is left out.
-
-    It is zero for the depth of every RealSense camera, and within a pixel or two for colour.
-    """
-    camera = profile.as_video_stream_profile().get_intrinsics()
-    is_forward = "inverse" not in str(camera.model)
-    distortion = tuple(camera.coeffs) if is_forward and any(camera.coeffs) else ()
-    return Intrinsics(
-        camera.width, camera.height, camera.fx, camera.fy, camera.ppx, camera.ppy, distortion
-    )
-
-
 def _rs_intrinsics(rs: Any, camera: Intrinsics) -> Any:
     intrinsics = rs.intrinsics()
     intrinsics.width, intrinsics.height = camera.width, camera.height
@@ -319,28 +291,8 @@ def _rs_intrinsics(rs: Any, camera: Intrinsics) -> Any:
     return intrinsics
 
 
-def _extrinsics(source: Any, target: Any) -> Float64:
-    extrinsics = source.get_extrinsics_to(target)
-    return rigid(np.reshape(extrinsics.rotation, (3, 3)).T, extrinsics.translation)  # column-major
-
-
 def _rs_extrinsics(rs: Any, T_target_source: Float64) -> Any:
     extrinsics = rs.extrinsics()
     extrinsics.rotation = T_target_source[:3, :3].T.ravel().tolist()
     extrinsics.translation = T_target_source[:3, 3].tolist()
     return extrinsics
-
-
-def _rgb(color: Any) -> UInt8 | None:
-    """Copy a colour image as RGB; None for a format that is not colour."""
-    image: NDArray[Any] = np.asanyarray(color.get_data())
-    match color.profile.format().name:
-        case "rgb8":
-            return np.array(image)
-        case "bgr8":
-            return np.array(image[..., ::-1])
-        case "yuyv":
-            packed = image.view(np.uint8).reshape(*image.shape[:2], 2)
-            return np.array(cv2.cvtColor(packed, cv2.COLOR_YUV2RGB_YUYV), np.uint8)
-        case _:
-            return None
