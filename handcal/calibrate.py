@@ -315,7 +315,6 @@ class Calibration:
         self._store_alignments()
         if self._session is not None:
             self._session.save_results(results_json(self.results))
-        self._record("solved", **results_json(self.results))
         return self.results
 
     def apply(self) -> None:
@@ -358,7 +357,10 @@ class Calibration:
         for eye, shift in self.results.shifts.items():
             self._drawn_shift_m[eye] = shift.shift_m
         self.state = State.APPLIED
-        self._record("applied", eyes=list(self.results.shifts))
+        if self._session is not None:
+            self._session.save_applied(
+                {eye: shift.shift_m for eye, shift in self.results.shifts.items()}
+            )
 
     def _send_projections(self, shifts_m: Mapping[Eye, Float64]) -> list[Outgoing]:
         sent = []

@@ -22,7 +22,12 @@ import numpy as np
 from handcal.calibrate import Calibration, CalibrationSettings, Observation, State
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.config import settings_json
-from handcal.display import arcmin_from_px, reprojection_error_px
+from handcal.display import (
+    TARGET_DEPTHS_M,
+    arcmin_from_px,
+    reprojection_error_px,
+    target_corners_m,
+)
 from handcal.errors import CameraTimeoutError, HandcalError, LinkError
 from handcal.link.pairing import KEY_VARIABLE, new_pairing_key
 from handcal.link.server import HeadsetServer
@@ -42,8 +47,6 @@ Report = Callable[[str, float], None]
 CALIBRATION = CalibrationSettings()
 _CONNECT_S = 20.0
 _STEP_S = 60.0
-_TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
-_TARGET_HALF_M = 0.04
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +117,7 @@ def run_demo(
         observations = _follow_plan(calibration, camera, headset, settings, report)
         statistics = server.statistics()
         session.record("link", **asdict(statistics))
+        session.finish()
     return {
         "seed": settings.seed,
         "session": str(session.path),
@@ -139,16 +143,9 @@ def reprojection_arcmin(
 ) -> float:
     """Return the mean error seen by the true eyes, in arcmin.
 
-    At four corners of an 8 cm square straight ahead of each eye, at 0.4, 0.5 and 0.6 m from it.
+    At the corners of the user test's target at its three distances.
     """
-    corners_E_m = np.array(
-        [
-            [x, y, depth_m]
-            for depth_m in _TARGET_DEPTHS_M
-            for x in (-_TARGET_HALF_M, _TARGET_HALF_M)
-            for y in (-_TARGET_HALF_M, _TARGET_HALF_M)
-        ]
-    )
+    corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
     errors = []
     for eye in EYES:
         display = rig.eyes[eye]

@@ -6,11 +6,17 @@ Pixel of world point v seen from the offline viewpoint C0: ``ζ m = K H0 E0 v``.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.geometry import invert, project, rigid
 from handcal.types import EyeDisplay, Float64
+
+TARGET_SIDE_M = 0.08
+TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
+"""Where the target of the user test stands (Hu et al. 2021, user test)."""
 
 
 def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:
@@ -86,6 +92,17 @@ def arcmin_from_px(display: EyeDisplay, error_px: ArrayLike) -> Float64:
     return arcmin
 
 
+def target_corners_m(depth_m: float) -> Float64:
+    """Return the corners of the user test's target, (4, 3) in E, clockwise from the upper left.
+
+    A square straight ahead of the offline viewpoint, `depth_m` away.
+    """
+    half_m = 0.5 * TARGET_SIDE_M
+    x = half_m * np.array([-1.0, 1.0, 1.0, -1.0])
+    y = half_m * np.array([-1.0, -1.0, 1.0, 1.0])
+    return np.column_stack([x, y, np.full(4, depth_m)])
+
+
 def reprojection_error_px(
     display: EyeDisplay, shift_m: ArrayLike, true_shift_m: ArrayLike, points_E_m: Float64
 ) -> Float64:
@@ -102,3 +119,43 @@ def reprojection_error_px(
     drawn = project(eye_projection(display, shift_m), points_E_m)
     needed = project(eye_projection(display, true_shift_m), points_E_m)
     return np.asarray(np.linalg.norm(drawn - needed, axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnMove:
+    """How the user test's target moves on the display when φ changes.
+
+    Attributes
+    ----------
+    right_px, up_px : float
+    right_arcmin, up_arcmin : float
+    size_ratio : float
+        Above 1 if it is drawn larger.
+    """
+
+    right_px: float
+    up_px: float
+    right_arcmin: float
+    up_arcmin: float
+    size_ratio: float
+
+
+def effect_at(
+    display: EyeDisplay, from_shift_m: ArrayLike, to_shift_m: ArrayLike, depth_m: float
+) -> DrawnMove:
+    """Return what a change of φ does to the target at a distance from the offline viewpoint."""
+    corners_E_m = target_corners_m(depth_m)
+    before_px, after_px = (
+        project(eye_projection(display, shift_m), corners_E_m)
+        for shift_m in (from_shift_m, to_shift_m)
+    )
+    right_px, down_px = (after_px - before_px).mean(axis=0)
+    right_arcmin, up_arcmin = arcmin_from_px(display, (right_px, -down_px))
+    diagonal_px = [float(np.linalg.norm(px[2] - px[0])) for px in (before_px, after_px)]
+    return DrawnMove(
+        right_px=float(right_px),
+        up_px=float(-down_px),
+        right_arcmin=float(right_arcmin),
+        up_arcmin=float(up_arcmin),
+        size_ratio=diagonal_px[1] / diagonal_px[0],
+    )

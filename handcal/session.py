@@ -2,64 +2,50 @@
 
 ::
 
-    NAME/journal.jsonl     what happened, one JSON object a line; the only file appended to
+    NAME/journal.jsonl     what events, one JSON object a line; the only file appended to
          rig.yaml          the rig as it was
          settings.json     the settings as they were
-         alignments/1.npz  the clouds and poses of each alignment
+         alignments/1.npz  the clouds and poses of each alignment, whose number never changes
          results.json      the newest results, if there are any
+         notes.txt         what people wrote, if anything
 
-An alignment exists from when the journal names it with its checksum until the journal says that it
-was dropped, so the folder is consistent at every moment and a killed program costs at most the line
-that it was writing.
+What exists is what the journal says: an alignment from when the journal names it with its checksum
+until it is deleted there, and again when it is restored. So the folder is consistent at every
+moment, and a killed program costs at most the line that it was writing.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
+
+from numpy.typing import ArrayLike
 
 from handcal.alignment_file import decode_alignment, encode_alignment
 from handcal.closable import Closable
 from handcal.errors import FileError
 from handcal.files import make_folder, read_json, read_limited, write_atomic, write_json
+from handcal.history import History, SessionEvent, Shelf, clean_wearer, read_shifts
+from handcal.journal import (
+    Event,
+    JournalContent,
+    JournalWriter,
+    happens_now,
+    journal_line,
+    read_journal,
+)
 from handcal.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
-from handcal.types import Alignment, Rig
+from handcal.trial import Trial, trial_json
+from handcal.types import Alignment, Eye, Float64, Rig
 
-SESSION_VERSION = 1
-MAX_JOURNAL_BYTES = 64 * 2**20
 MAX_ALIGNMENT_BYTES = 16 * 2**20
-MAX_ALIGNMENTS = 100
-
-_CREATED = "created"
-_ALIGNMENT = "alignment_saved"
-_DROPPED = "alignment_dropped"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """One line of the journal.
-
-    Attributes
-    ----------
-    number : int
-        Running number from 1.
-    time : str
-        UTC, ISO 8601.
-    name : str
-    data : dict
-    """
-
-    number: int
-    time: str
-    name: str
-    data: dict[str, Any]
+MAX_NOTES_CHARACTERS = 20_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,11 +57,31 @@ class SessionRecord:
     path : Path
     rig : Rig
     settings : dict
+    wearer : str
+        Name or code; empty if not told.
+    notes : str
     events : tuple of Event
     alignments : tuple of Alignment
-        Those not dropped.
+        Those not deleted, in the order in which they were saved.
+    alignment_numbers : tuple of int
+        Theirs, by which they can be deleted.
+    deleted : mapping of int to Alignment
+        The others, by number; they can be restored.
+    trials, trial_numbers, deleted_trials
+        Likewise, trials of the user test.
     results : dict or None
-        None if none were saved since the last drop.
+        The newest; None if none were saved since an alignment was deleted or restored.
+    is_solved : bool
+        Whether the results are those of all `alignments`.
+    is_applied : bool
+        Whether the headset has acknowledged the projections of these results.
+    applied_shift_m : mapping of eye to (3,) float64
+        What the headset rendered with last, solved or set by hand; an eye that is not in it was
+        left as in the offline calibration.
+    fine_tuned : mapping of eye to (3,) float64, or None
+        The φ last set by hand, as settled; None if none since the last results.
+    is_finished : bool
+        Whether the session was ended on purpose, and nothing events since.
     journal_bytes : int
         Length of the journal's complete lines.
     torn_bytes : int
@@ -85,9 +91,21 @@ class SessionRecord:
     path: Path
     rig: Rig
     settings: dict[str, Any]
+    wearer: str
+    notes: str
     events: tuple[Event, ...]
     alignments: tuple[Alignment, ...]
+    alignment_numbers: tuple[int, ...]
+    deleted: Mapping[int, Alignment]
+    trials: tuple[Trial, ...]
+    trial_numbers: tuple[int, ...]
+    deleted_trials: Mapping[int, Trial]
     results: dict[str, Any] | None
+    is_solved: bool
+    is_applied: bool
+    applied_shift_m: Mapping[Eye, Float64]
+    fine_tuned: Mapping[Eye, Float64] | None
+    is_finished: bool
     journal_bytes: int
     torn_bytes: int
 
@@ -116,13 +134,20 @@ class Session(Closable):
         except BaseException:
             self.close()
             raise
-        self._events = len(record.events)
-        self._alignments = len(record.alignments)
-        self._journal_bytes = record.journal_bytes
+        self._history = _replay(path, record.events)
+        self._journal = JournalWriter(
+            path / "journal.jsonl",
+            JournalContent(record.events, record.journal_bytes, record.torn_bytes),
+        )
 
     @classmethod
     def create(
-        cls, parent: Path, rig: Rig, settings: Mapping[str, Any], name: str | None = None
+        cls,
+        parent: Path,
+        rig: Rig,
+        settings: Mapping[str, Any],
+        name: str | None = None,
+        wearer: str = "",
     ) -> Self:
         """Start a session in a new folder.
 
@@ -135,14 +160,17 @@ class Session(Closable):
             JSON-able.
         name : str, optional
             Name of the folder; by default the time in UTC.
+        wearer : str
+            Name or code, one line of at most 100 characters.
 
         Raises
         ------
         FileError
             If the folder exists already or cannot be written.
         ValueError
-            If the rig is implausible or the settings hold NaN.
+            If the rig is implausible, the settings hold NaN, or the wearer's name is refused.
         """
+        wearer = clean_wearer(wearer)
         path = make_folder(parent) / (name or f"{datetime.now(UTC):session-%Y%m%d-%H%M%S-%f}")
         try:
             path.mkdir()
@@ -152,8 +180,9 @@ class Session(Closable):
         write_rig(path / "rig.yaml", rig)
         write_json(path / "settings.json", dict(settings))
         # The journal comes last: without it, the folder is no session.
-        line = _journal_line(1, _CREATED, {"rig_sha256": _sha256(_rig_bytes(path))})
-        write_atomic(path / "journal.jsonl", line)
+        created = {"rig_sha256": _sha256(_rig_bytes(path)), "wearer": wearer}
+        first = journal_line(happens_now(1, SessionEvent.CREATED, created))
+        write_atomic(path / "journal.jsonl", first)
         return cls(path)
 
     @staticmethod
@@ -166,30 +195,32 @@ class Session(Closable):
             If the folder is not a session, is of an unknown version, or a file in it is missing,
             damaged or too large.
         """
-        events, journal_bytes, torn_bytes = _read_journal(path / "journal.jsonl")
-        if events[0].data.get("rig_sha256") != _sha256(_rig_bytes(path)):
+        journal = read_journal(path / "journal.jsonl")
+        history = _replay(path, journal.events)
+        if history.rig_sha256 != _sha256(_rig_bytes(path)):
             raise FileError(f"{path / 'rig.yaml'} is damaged: its checksum is not the journal's")
-        saved: list[Event] = []
-        for event in events:
-            if event.name == _ALIGNMENT:
-                saved.append(event)
-            elif event.name == _DROPPED:
-                del saved[-1:]
-        if len(saved) > MAX_ALIGNMENTS:
-            raise FileError(f"{path} holds more than {MAX_ALIGNMENTS} alignments")
-        results = path / "results.json"
+        results, notes = path / "results.json", path / "notes.txt"
         return SessionRecord(
             path=path,
             rig=read_rig(path / "rig.yaml"),
             settings=read_json(path / "settings.json"),
-            events=tuple(events),
-            alignments=tuple(
-                _read_alignment(_alignment_path(path, number), event.data.get("sha256"))
-                for number, event in enumerate(saved, 1)
-            ),
+            wearer=history.wearer,
+            notes=_read_notes(notes) if notes.exists() else "",
+            events=journal.events,
+            alignments=tuple(_read_alignments(path, history.alignments.kept).values()),
+            alignment_numbers=tuple(history.alignments.kept),
+            deleted=MappingProxyType(_read_alignments(path, history.alignments.deleted)),
+            trials=tuple(history.trials.kept.values()),
+            trial_numbers=tuple(history.trials.kept),
+            deleted_trials=MappingProxyType(history.trials.deleted),
             results=read_json(results) if results.exists() else None,
-            journal_bytes=journal_bytes,
-            torn_bytes=torn_bytes,
+            is_solved=history.is_solved and results.exists(),
+            is_applied=history.is_applied and results.exists(),
+            applied_shift_m=MappingProxyType(history.applied_shift_m),
+            fine_tuned=history.fine_tuned and MappingProxyType(history.fine_tuned),
+            is_finished=history.is_finished,
+            journal_bytes=journal.complete_bytes,
+            torn_bytes=journal.torn_bytes,
         )
 
     def record(self, event: str, **data: Any) -> None:
@@ -202,7 +233,7 @@ class Session(Closable):
         ValueError
             If the data hold NaN, or the event's name is one that the session itself writes.
         """
-        if event in (_CREATED, _ALIGNMENT, _DROPPED):
+        if event in set(SessionEvent):
             raise ValueError(f"the event {event} is written by the session itself")
         self._append(event, data)
 
@@ -212,107 +243,177 @@ class Session(Closable):
         Raises
         ------
         FileError
-            If it cannot be written, is too large, or the session holds too many.
+            If it cannot be written, is too large, or the session has had too many.
         """
-        number = self._alignments + 1
-        if number > MAX_ALIGNMENTS:
-            raise FileError(f"{self.path} is full with {MAX_ALIGNMENTS} alignments; start another")
+        number = self._next_number(self._history.alignments)
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
         write_atomic(_alignment_path(self.path, number), data)
-        self._append(_ALIGNMENT, {"number": number, "sha256": _sha256(data)})
-        self._alignments = number
+        self._append(SessionEvent.ALIGNMENT_SAVED, {"number": number, "sha256": _sha256(data)})
         return number
 
-    def drop_alignment(self) -> None:
-        """Leave out the last alignment, and the results with it; the next takes its number.
+    def delete_alignment(self, number: int) -> None:
+        """Leave out an alignment, and the results with it.
 
         Raises
         ------
         FileError
             If the folder cannot be written.
         ValueError
-            If there is none.
+            If there is none of that number.
         """
-        if not self._alignments:
+        shelf = self._history.alignments
+        shelf.require(number, shelf.kept)
+        self._remove_results()
+        self._append(SessionEvent.ALIGNMENT_DELETED, {"number": number})
+
+    def restore_alignment(self, number: int) -> None:
+        """Take back the deletion of an alignment; the results go all the same.
+
+        Raises
+        ------
+        FileError
+            If the folder cannot be written.
+        ValueError
+            If none of that number is deleted.
+        """
+        shelf = self._history.alignments
+        shelf.require(number, shelf.deleted)
+        self._remove_results()
+        self._append(SessionEvent.ALIGNMENT_RESTORED, {"number": number})
+
+    def drop_alignment(self) -> None:
+        """Delete the last alignment; raises as `delete_alignment`."""
+        if not self._history.alignments.kept:
             raise ValueError("there is no alignment to drop")
-        results = self.path / "results.json"
-        try:
-            results.unlink(missing_ok=True)
-        except OSError as error:
-            raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
-        self._append(_DROPPED, {"number": self._alignments})
-        self._alignments -= 1
+        self.delete_alignment(max(self._history.alignments.kept))
+
+    def save_trial(self, trial: Trial) -> int:
+        """Store a trial of the user test, as of now, and return its number, from 1.
+
+        Raises
+        ------
+        FileError
+            If the journal cannot be written, or the session has had too many.
+        """
+        number = self._next_number(self._history.trials)
+        self._append(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
+        return number
+
+    def delete_trial(self, number: int) -> None:
+        """Leave out a trial.
+
+        Raises
+        ------
+        FileError
+            If the journal cannot be written.
+        ValueError
+            If there is none of that number.
+        """
+        shelf = self._history.trials
+        shelf.require(number, shelf.kept)
+        self._append(SessionEvent.TRIAL_DELETED, {"number": number})
+
+    def restore_trial(self, number: int) -> None:
+        """Take back the deletion of a trial.
+
+        Raises
+        ------
+        FileError
+            If the journal cannot be written.
+        ValueError
+            If none of that number is deleted.
+        """
+        shelf = self._history.trials
+        shelf.require(number, shelf.deleted)
+        self._append(SessionEvent.TRIAL_RESTORED, {"number": number})
 
     def save_results(self, results: Mapping[str, Any]) -> None:
-        """Replace the results, which must be JSON-able; FileError if they cannot be written."""
+        """Replace the results, those of all alignments; FileError if they cannot be written."""
         write_json(self.path / "results.json", dict(results))
+        self._append(SessionEvent.SOLVED, dict(results))
+
+    def save_applied(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
+        """Note that the headset renders with the solved φ.
+
+        Raises
+        ------
+        FileError
+            If the journal cannot be written.
+        ValueError
+            If a φ is not three finite numbers.
+        """
+        self._append(SessionEvent.APPLIED, {"eyes": list(shifts_m), "shift_m": _lists(shifts_m)})
+
+    def save_fine_tuned(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
+        """Note that the headset renders with φ set by hand; raises as `save_applied`."""
+        self._append(SessionEvent.FINE_TUNED, {"shift_m": _lists(shifts_m)})
+
+    def save_notes(self, text: str) -> None:
+        """Replace the notes.
+
+        Raises
+        ------
+        FileError
+            If they cannot be written.
+        ValueError
+            If they are longer than 20,000 characters.
+        """
+        if len(text) > MAX_NOTES_CHARACTERS:
+            raise ValueError(f"notes may have {MAX_NOTES_CHARACTERS:,} characters")
+        write_atomic(self.path / "notes.txt", text.encode(errors="replace"))
+
+    def finish(self) -> None:
+        """Note that the session ends here; FileError if the journal cannot be written.
+
+        More may follow, after which it is unfinished again.
+        """
+        self._append(SessionEvent.FINISHED, {})
 
     def close(self) -> None:
         """Let other programs write to the session; safe to call twice."""
         self._lock.release()
 
-    def _append(self, event: str, data: dict[str, Any]) -> None:
-        line = _journal_line(self._events + 1, event, data)
-        if self._journal_bytes + len(line) > MAX_JOURNAL_BYTES:
-            raise FileError(f"the journal of {self.path} is full; start another session")
-        path = self.path / "journal.jsonl"
+    def _next_number(self, shelf: Shelf[Any]) -> int:
         try:
-            # Opened anew each time, so that a folder that has gone is noticed.
-            with path.open("r+b") as file:
-                file.seek(self._journal_bytes)
-                file.truncate()  # what a failed or killed write may have left
-                file.write(line)
-                file.flush()
-                os.fsync(file.fileno())
+            return shelf.next_number()
+        except ValueError as error:
+            raise FileError(f"{self.path} is full: {error}; start another session") from error
+
+    def _remove_results(self) -> None:
+        results = self.path / "results.json"
+        try:
+            results.unlink(missing_ok=True)
         except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror or error}") from error
-        self._journal_bytes += len(line)
-        self._events += 1
+            raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
+
+    def _append(self, event: str, data: dict[str, Any]) -> None:
+        self._history.take(self._journal.append(event, data))
 
 
-def _journal_line(number: int, event: str, data: dict[str, Any]) -> bytes:
-    fields = {
-        "version": SESSION_VERSION,
-        "number": number,
-        "time": datetime.now(UTC).isoformat(),
-        "event": event,
-        "data": data,
+def _replay(path: Path, events: Sequence[Event]) -> History:
+    """Return what the events of a session's journal add up to; FileError if they do not."""
+    journal = path / "journal.jsonl"
+    if not events or events[0].name != SessionEvent.CREATED:
+        raise FileError(f"{journal} does not begin as the journal of a session")
+    history = History()
+    for event in events:
+        try:
+            history.take(event)
+        except ValueError as error:
+            raise FileError(f"{journal}: line {event.number}: {error}") from error
+    return history
+
+
+def _read_alignments(path: Path, checksums: Mapping[int, str]) -> dict[int, Alignment]:
+    return {
+        number: _read_alignment(_alignment_path(path, number), sha256)
+        for number, sha256 in checksums.items()
     }
-    return json.dumps(fields, allow_nan=False).encode() + b"\n"
 
 
-def _read_journal(path: Path) -> tuple[list[Event], int, int]:
-    """Return the events, and the length of the complete lines and of the unfinished last one."""
-    content = read_limited(path, MAX_JOURNAL_BYTES)
-    *lines, torn = content.split(b"\n")
-    try:
-        events = [_parse_line(number, line) for number, line in enumerate(lines, 1)]
-    except ValueError as error:
-        raise FileError(f"{path}: {error}") from error
-    if not events or events[0].name != _CREATED:
-        raise FileError(f"{path} does not begin as the journal of a session")
-    return events, len(content) - len(torn), len(torn)
-
-
-def _parse_line(number: int, line: bytes) -> Event:
-    try:
-        fields = json.loads(line)
-        version, event = fields["version"], fields["event"]
-        time, data = fields["time"], fields["data"]
-        found = fields["number"]
-    except (ValueError, RecursionError, KeyError, TypeError) as error:
-        raise ValueError(f"line {number} is not an event of a session") from error
-    if version != SESSION_VERSION:
-        raise ValueError(f"session version {version} is not {SESSION_VERSION}, the one known")
-    kinds = isinstance(event, str), isinstance(time, str), isinstance(data, dict)
-    if found != number or not all(kinds):
-        raise ValueError(f"line {number} is not the event expected there")
-    return Event(number, time, event, data)
-
-
-def _read_alignment(path: Path, sha256: object) -> Alignment:
+def _read_alignment(path: Path, sha256: str) -> Alignment:
     data = read_limited(path, MAX_ALIGNMENT_BYTES)
     if _sha256(data) != sha256:
         raise FileError(f"{path} is damaged: its checksum is not the journal's")
@@ -320,6 +421,14 @@ def _read_alignment(path: Path, sha256: object) -> Alignment:
         return decode_alignment(data)
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
+
+
+def _read_notes(path: Path) -> str:
+    return read_limited(path, 4 * MAX_NOTES_CHARACTERS).decode(errors="replace")
+
+
+def _lists(shifts_m: Mapping[Eye, ArrayLike]) -> dict[Eye, list[float]]:
+    return {eye: shift_m.tolist() for eye, shift_m in read_shifts(shifts_m).items()}
 
 
 def _alignment_path(path: Path, number: int) -> Path:

@@ -89,7 +89,8 @@ def test_the_link_was_bad_and_everything_arrived(result: dict[str, Any], session
         ["left"],
         ["left", "right"],
     ]
-    name, link = events[-1]
+    assert events[-1] == ("finished", {})
+    name, link = events[-2]
     assert name == "link"
     assert (link["unacked"], link["failed"]) == (0, 0)
     # Cursor, prompt and projections of two alignments.

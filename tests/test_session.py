@@ -68,8 +68,10 @@ def finished(tmp_path_factory: pytest.TempPathFactory, alignment: Alignment) -> 
 
 def test_everything_comes_back(finished: SessionRecord, alignment: Alignment) -> None:
     names = [event.name for event in finished.events]
-    assert names == ["created", "cursor_made", "alignment_saved", "refused", "alignment_saved"]
-    assert [event.number for event in finished.events] == [1, 2, 3, 4, 5]
+    assert names == [
+        "created", "cursor_made", "alignment_saved", "refused", "alignment_saved", "solved",
+    ]  # fmt: skip
+    assert [event.number for event in finished.events] == [1, 2, 3, 4, 5, 6]
     assert finished.events[1].data == {"points": 5000}
     assert finished.settings == SETTINGS
     assert finished.results == RESULTS
@@ -257,7 +259,7 @@ def test_a_changed_file_is_noticed(tmp_path: Path, finished: SessionRecord, name
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        ({"version": 2}, "session version 2 is not 1"),
+        ({"version": 3}, "session version 3 is not 2 or 1"),
         ({"number": 7}, "line 2 is not the event expected there"),
         ({"event": 3}, "line 2 is not the event expected there"),
         ({"data": []}, "line 2 is not the event expected there"),
@@ -301,7 +303,7 @@ def test_a_dropped_alignment_is_left_out_with_its_results(
 
     session.close()
     with Session(session.path) as again:
-        assert again.save_alignment(replace(alignment, t_b_ns=3)) == 2
+        assert again.save_alignment(replace(alignment, t_b_ns=3)) == 3
         again.drop_alignment()
         again.drop_alignment()
         with pytest.raises(ValueError, match="no alignment to drop"):

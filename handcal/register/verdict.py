@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.display import arcmin_from_px, eye_projection
+from handcal.display import arcmin_from_px, eye_projection, target_corners_m
 from handcal.geometry import invert, project, transform
 from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Float64, Rig, Verdict
 
@@ -60,9 +60,9 @@ def judge(
 def expected_error_arcmin(display: EyeDisplay, shift: EyeShift) -> float:
     """Return the root mean square error to expect from φ's covariance, in arcmin.
 
-    At four corners of an 8 cm square straight ahead at half a metre.
+    At the corners of the user test's target at half a metre.
     """
-    corners_m = np.array([[x, y, 0.5] for x in (-0.04, 0.04) for y in (-0.04, 0.04)])
+    corners_m = target_corners_m(0.5)
 
     def drawn_px(shift_m: Float64) -> Float64:
         return project(eye_projection(display, shift_m), corners_m)

@@ -1,0 +1,190 @@
+"""What a session's journal says that there is: one state, brought on event by event. No files."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handcal.journal import Event
+from handcal.trial import Trial, read_trial
+from handcal.types import EYES, Eye, Float64, readonly
+
+MAX_ALIGNMENTS = 100
+MAX_TRIALS = 1000
+MAX_WEARER_CHARACTERS = 100
+
+Item = TypeVar("Item")
+
+
+class SessionEvent(StrEnum):
+    """The events that a session writes itself, and that say what there is."""
+
+    CREATED = "created"
+    ALIGNMENT_SAVED = "alignment_saved"
+    ALIGNMENT_DROPPED = "alignment_dropped"
+    """Of version 1: deleted for good, and the next took its number."""
+    ALIGNMENT_DELETED = "alignment_deleted"
+    ALIGNMENT_RESTORED = "alignment_restored"
+    TRIAL_SAVED = "trial_saved"
+    TRIAL_DELETED = "trial_deleted"
+    TRIAL_RESTORED = "trial_restored"
+    SOLVED = "solved"
+    APPLIED = "applied"
+    FINE_TUNED = "fine_tuned"
+    FINISHED = "finished"
+
+
+class Shelf(Generic[Item]):
+    """Numbered things that can be deleted and restored.
+
+    Attributes
+    ----------
+    kept, deleted : dict of int to item
+    """
+
+    def __init__(self, kind: str, limit: int) -> None:
+        self.kept: dict[int, Item] = {}
+        self.deleted: dict[int, Item] = {}
+        self._kind = kind
+        self._limit = limit
+
+    def next_number(self) -> int:
+        """Return the number of the next, from 1; ValueError if there are too many."""
+        number = 1 + max((*self.kept, *self.deleted), default=0)
+        if number > self._limit:
+            raise ValueError(f"no room for more than {self._limit} {self._kind}s")
+        return number
+
+    def save(self, number: int, item: Item) -> None:
+        """Take a new one; ValueError unless it has the next number."""
+        if number != self.next_number():
+            raise ValueError(f"{self._kind} {number} is not the next")
+        self.kept[number] = item
+
+    def require(self, number: int, where: Mapping[int, Item]) -> None:
+        """Raise ValueError if there is none of that number in `kept` or in `deleted`."""
+        if number not in where:
+            state = "deleted " if where is self.deleted else ""
+            raise ValueError(f"there is no {state}{self._kind} {number}")
+
+    def delete(self, number: int) -> None:
+        """Put one aside; ValueError if there is none."""
+        self.require(number, self.kept)
+        self.deleted[number] = self.kept.pop(number)
+
+    def restore(self, number: int) -> None:
+        """Put one back in its place; ValueError if none of that number is deleted."""
+        self.require(number, self.deleted)
+        self.kept = dict(sorted({**self.kept, number: self.deleted.pop(number)}.items()))
+
+
+class History:
+    """What there is after the events so far.
+
+    Attributes
+    ----------
+    rig_sha256 : str
+    wearer : str
+    alignments : Shelf of str
+        Checksums.
+    trials : Shelf of Trial
+    is_solved, is_applied, is_finished : bool
+    applied_shift_m : dict of eye to (3,) float64
+    fine_tuned : dict of eye to (3,) float64, or None
+        As in `handcal.session.SessionRecord`.
+    """
+
+    def __init__(self) -> None:
+        self.rig_sha256 = ""
+        self.wearer = ""
+        self.alignments = Shelf[str]("alignment", MAX_ALIGNMENTS)
+        self.trials = Shelf[Trial]("trial", MAX_TRIALS)
+        self.is_solved = False
+        self.is_applied = False
+        self.is_finished = False
+        self.applied_shift_m: dict[Eye, Float64] = {}
+        self.fine_tuned: dict[Eye, Float64] | None = None
+
+    def take(self, event: Event) -> None:
+        """Go on by an event; one that is not the session's own changes nothing.
+
+        Raises
+        ------
+        ValueError
+            If the event lacks something, or cannot follow those before it.
+        """
+        try:
+            self._take(event.name, event.data, event.time)
+        except KeyError as error:
+            raise ValueError(f"{event.name} lacks {error}") from error
+        except (TypeError, AttributeError, OverflowError) as error:
+            raise ValueError(f"{event.name} holds something wrong: {error}") from error
+        self.is_finished = event.name == SessionEvent.FINISHED
+
+    def _take(self, name: str, data: dict[str, Any], time: str) -> None:
+        match name:
+            case SessionEvent.CREATED:
+                self.rig_sha256 = data["rig_sha256"]
+                self.wearer = clean_wearer(data.get("wearer", ""))
+            case SessionEvent.ALIGNMENT_SAVED:
+                self.alignments.save(data["number"], data["sha256"])
+            case SessionEvent.ALIGNMENT_DROPPED:
+                self.alignments.kept.pop(data["number"])
+            case SessionEvent.ALIGNMENT_DELETED:
+                self.alignments.delete(data["number"])
+            case SessionEvent.ALIGNMENT_RESTORED:
+                self.alignments.restore(data["number"])
+            case SessionEvent.TRIAL_SAVED:
+                self.trials.save(data["number"], read_trial(data["trial"], time))
+            case SessionEvent.TRIAL_DELETED:
+                self.trials.delete(data["number"])
+            case SessionEvent.TRIAL_RESTORED:
+                self.trials.restore(data["number"])
+            case SessionEvent.SOLVED:
+                self.is_solved, self.is_applied, self.fine_tuned = True, False, None
+            case SessionEvent.APPLIED if "shift_m" in data:  # version 1 did not tell
+                self.applied_shift_m |= read_shifts(data["shift_m"])
+                self.is_applied = self.is_solved
+            case SessionEvent.FINE_TUNED:
+                self.fine_tuned = read_shifts(data["shift_m"])
+                self.applied_shift_m |= self.fine_tuned
+        if name.startswith("alignment_"):
+            self.is_solved = self.is_applied = False
+
+
+def clean_wearer(name: str) -> str:
+    """Return a wearer's name or code without the blanks around it.
+
+    Raises
+    ------
+    ValueError
+        If it is longer than 100 characters or holds line breaks or control characters.
+    """
+    name = name.strip()
+    if len(name) > MAX_WEARER_CHARACTERS:
+        raise ValueError(f"a wearer's name may have {MAX_WEARER_CHARACTERS} characters")
+    if any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name):
+        raise ValueError("a wearer's name may hold no line breaks or control characters")
+    return name
+
+
+def read_shifts(shifts_m: Mapping[Any, ArrayLike]) -> dict[Eye, Float64]:
+    """Return φ of each eye as (3,) arrays.
+
+    Raises
+    ------
+    ValueError
+        For an unknown eye, or a φ that is not three finite numbers.
+    """
+    unknown = set(shifts_m) - set(EYES)
+    if unknown:
+        raise ValueError(f"an eye is left or right, not {unknown.pop()!r}")
+    read = {eye: readonly(shifts_m[eye], np.float64, (3,)) for eye in EYES if eye in shifts_m}
+    if not all(np.isfinite(shift_m).all() for shift_m in read.values()):
+        raise ValueError("φ must be finite")
+    return read

@@ -1,0 +1,212 @@
+"""Trials of the user test: how far the calibrated projection misses what the wearer sees.
+
+As in Hu et al. 2021 (user test): the wearer's φ is adjusted by hand until the virtual target covers
+the real one; where its corners are drawn then is taken for the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handcal.display import arcmin_from_px, eye_projection, target_corners_m
+from handcal.geometry import project
+from handcal.types import EYES, Eye, EyeDisplay, Float64, freeze
+
+_SHAPES: dict[str, tuple[int, ...]] = {
+    "corners_E_m": (4, 3),
+    "calibrated_shift_m": (3,),
+    "adjusted_shift_m": (3,),
+    "drawn_px": (4, 2),
+    "truth_px": (4, 2),
+    "error_px": (4,),
+    "error_arcmin": (4,),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """One target at one distance, seen by one eye.
+
+    Attributes
+    ----------
+    eye : {"left", "right"}
+    target_depth_m : float
+    corners_E_m : (4, 3) float64
+        The target's corners in E, clockwise from the upper left.
+    calibrated_shift_m, adjusted_shift_m : (3,) float64
+        φ as calibrated, and as adjusted by hand.
+    drawn_px, truth_px : (4, 2) float64
+        The corners drawn with the one and with the other.
+    error_px, error_arcmin : (4,) float64
+        Their distances.
+    time : str
+        When it was saved, UTC, ISO 8601; empty before.
+
+    Raises
+    ------
+    ValueError
+        For a wrong shape, a number that is not finite, or an unknown eye.
+    """
+
+    eye: Eye
+    target_depth_m: float
+    corners_E_m: Float64
+    calibrated_shift_m: Float64
+    adjusted_shift_m: Float64
+    drawn_px: Float64
+    truth_px: Float64
+    error_px: Float64
+    error_arcmin: Float64
+    time: str = ""
+
+    def __post_init__(self) -> None:
+        if self.eye not in EYES:
+            raise ValueError(f"Trial.eye: left or right, not {self.eye!r}")
+        for name, shape in _SHAPES.items():
+            freeze(self, name, np.float64, *shape)
+        for name in ("target_depth_m", *_SHAPES):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"Trial.{name}: must be finite")
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How numbers are spread; `sd` is that of a sample."""
+
+    mean: float
+    sd: float
+    median: float
+    min: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorStatistics:
+    """Errors of several trials.
+
+    Attributes
+    ----------
+    trials, corners : int
+        Each corner counts as one error, as in the paper.
+    px, arcmin : Spread
+    """
+
+    trials: int
+    corners: int
+    px: Spread
+    arcmin: Spread
+
+
+@dataclass(frozen=True, slots=True)
+class TrialStatistics:
+    """All trials, and those of each eye and of each distance that there are.
+
+    Attributes
+    ----------
+    total : ErrorStatistics or None
+        None without trials.
+    by_eye : mapping of eye to ErrorStatistics
+    by_depth_m : mapping of float to ErrorStatistics
+    """
+
+    total: ErrorStatistics | None
+    by_eye: Mapping[Eye, ErrorStatistics]
+    by_depth_m: Mapping[float, ErrorStatistics]
+
+
+def make_trial(
+    display: EyeDisplay,
+    eye: Eye,
+    depth_m: float,
+    calibrated_shift_m: ArrayLike,
+    adjusted_shift_m: ArrayLike,
+) -> Trial:
+    """Judge a calibrated φ by the one adjusted by hand.
+
+    Raises
+    ------
+    ValueError
+        If a shift is not three finite numbers, or the target does not stand before the eye.
+    """
+    corners_E_m = target_corners_m(depth_m)
+    drawn_px, truth_px = (
+        project(eye_projection(display, shift_m), corners_E_m)
+        for shift_m in (calibrated_shift_m, adjusted_shift_m)
+    )
+    if not (np.isfinite(drawn_px).all() and np.isfinite(truth_px).all()):
+        raise ValueError(f"a target at {depth_m:g} m does not stand before the eye")
+    error_px = np.linalg.norm(drawn_px - truth_px, axis=1)
+    return Trial(
+        eye=eye,
+        target_depth_m=depth_m,
+        corners_E_m=corners_E_m,
+        calibrated_shift_m=np.array(calibrated_shift_m, dtype=np.float64),
+        adjusted_shift_m=np.array(adjusted_shift_m, dtype=np.float64),
+        drawn_px=drawn_px,
+        truth_px=truth_px,
+        error_px=error_px,
+        error_arcmin=arcmin_from_px(display, error_px),
+    )
+
+
+def summarise(trials: Sequence[Trial]) -> TrialStatistics:
+    """Return statistics of trials; JSON-able with `dataclasses.asdict`."""
+    return TrialStatistics(
+        total=_errors(trials) if trials else None,
+        by_eye=_by(trials, lambda trial: trial.eye),
+        by_depth_m=_by(trials, lambda trial: trial.target_depth_m),
+    )
+
+
+def trial_json(trial: Trial) -> dict[str, Any]:
+    """Return a trial, without its time, as JSON-able values."""
+    arrays = {name: getattr(trial, name).tolist() for name in _SHAPES}
+    return {"eye": trial.eye, "target_depth_m": trial.target_depth_m} | arrays
+
+
+def read_trial(data: Mapping[str, Any], time: str) -> Trial:
+    """Return the trial that `trial_json` gave.
+
+    Raises
+    ------
+    ValueError
+        If anything in it is missing or wrong.
+    """
+    names = [field.name for field in fields(Trial) if field.name != "time"]
+    try:
+        return Trial(**{name: data[name] for name in names}, time=time)
+    except KeyError as error:
+        raise ValueError(f"the trial has no {error}") from error
+    except (TypeError, OverflowError) as error:
+        raise ValueError(f"the trial holds something else than numbers: {error}") from error
+
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+def _by(trials: Sequence[Trial], key: Callable[[Trial], Key]) -> dict[Key, ErrorStatistics]:
+    groups: dict[Key, list[Trial]] = {}
+    for trial in trials:
+        groups.setdefault(key(trial), []).append(trial)
+    return {value: _errors(groups[value]) for value in sorted(groups)}  # type: ignore[type-var]
+
+
+def _errors(trials: Sequence[Trial]) -> ErrorStatistics:
+    px = np.concatenate([trial.error_px for trial in trials])
+    arcmin = np.concatenate([trial.error_arcmin for trial in trials])
+    return ErrorStatistics(len(trials), len(px), _spread(px), _spread(arcmin))
+
+
+def _spread(values: Float64) -> Spread:
+    return Spread(
+        mean=float(values.mean()),
+        sd=float(values.std(ddof=1)),
+        median=float(np.median(values)),
+        min=float(values.min()),
+        max=float(values.max()),
+    )

@@ -1,0 +1,67 @@
+"""The sessions in a folder that were not ended on purpose, and may be gone on with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from handcal.errors import FileError
+from handcal.history import SessionEvent
+from handcal.journal import read_journal
+from handcal.lock import FileLock
+from handcal.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class UnfinishedSession:
+    """A session whose journal does not end in `finished`.
+
+    Attributes
+    ----------
+    path : Path
+    started : str
+        UTC, ISO 8601; empty if it cannot be told.
+    wearer : str
+    alignments, trials : int
+        Those not deleted.
+    problem : str
+        Why it cannot be gone on with, such as damage or another program; empty if it can.
+    """
+
+    path: Path
+    started: str = ""
+    wearer: str = ""
+    alignments: int = 0
+    trials: int = 0
+    problem: str = ""
+
+
+def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
+    """Return the unfinished sessions among the folders in `parent`, the newest first."""
+    journals = parent.glob("*/journal.jsonl")
+    found = [_inspect(journal.parent) for journal in journals]
+    return sorted(
+        (session for session in found if session is not None),
+        key=lambda session: (session.started, session.path.name),
+        reverse=True,
+    )
+
+
+def _inspect(path: Path) -> UnfinishedSession | None:
+    started = ""
+    try:
+        events = read_journal(path / "journal.jsonl").events
+        if events:
+            started = events[0].time
+            if events[-1].name == SessionEvent.FINISHED:
+                return None
+        lock = FileLock(path / "lock")
+        try:
+            record = Session.open(path)
+        finally:
+            lock.release()
+    except FileError as error:
+        return UnfinishedSession(path, started, problem=str(error))
+    return UnfinishedSession(
+        path, started, record.wearer, len(record.alignments), len(record.trials)
+    )
