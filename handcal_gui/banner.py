@@ -1,0 +1,70 @@
+"""One line above everything for what went wrong, until it is mended or closed."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
+
+from handcal_gui.theme import SPACING_PX, colors, icon
+
+
+class Banner(QWidget):
+    """Shows the newest message; hidden while there is none.
+
+    A condition, which goes by itself, gives way to a message, which a person must close.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("banner")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._message = ""
+        self._condition = ""
+        self._icon = QLabel()
+        self._text = QLabel(objectName="bannerText", wordWrap=True)
+        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        close = QToolButton(objectName="bannerClose", text="Close", autoRaise=True)
+        close.setToolTip("Close this message (Esc)")
+        close.clicked.connect(self.clear)
+        self._close = close
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2)
+        layout.addWidget(self._icon)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(close)
+        self._refresh()
+
+    @property
+    def text(self) -> str:
+        """What is shown; empty if nothing is."""
+        return self._message or self._condition
+
+    def show_message(self, text: str) -> None:
+        """Show a message until it is closed or another comes."""
+        self._message = text
+        self._refresh()
+
+    def show_condition(self, text: str) -> None:
+        """Show what is wrong now; empty text takes it away."""
+        if text != self._condition:
+            self._condition = text
+            self._refresh()
+
+    def clear(self) -> None:
+        """Close the message."""
+        self._message = ""
+        self._refresh()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._refresh()
+
+    def _refresh(self) -> None:
+        self._icon.setPixmap(icon("warning").pixmap(2 * SPACING_PX))
+        self._text.setText(self.text)
+        self._close.setVisible(bool(self._message))
+        self.setStyleSheet(f"#banner {{ border: 1px solid {colors().red}; border-radius: 4px; }}")
+        self.setVisible(bool(self.text))

@@ -1,0 +1,254 @@
+"""The main window: pages in the middle, panels in docks around them, menus above."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from PySide6.QtCore import QByteArray, Qt, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QDockWidget,
+    QFrame,
+    QMainWindow,
+    QScrollArea,
+    QStackedWidget,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal_gui.banner import Banner
+from handcal_gui.panels.camera import CameraPanel
+from handcal_gui.panels.cloud import CloudPanel
+from handcal_gui.panels.fine_tune import FineTunePanel
+from handcal_gui.panels.link import LinkPanel
+from handcal_gui.panels.results import ResultsPanel
+from handcal_gui.panels.rotation import RotationPanel
+from handcal_gui.panels.session import SessionPanel
+from handcal_gui.panels.trials import TrialsPanel
+from handcal_gui.panels.wearer_view import WearerViewPanel
+from handcal_gui.start_page import StartPage
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.wizard.wizard import WizardPanel
+
+Page = Literal["start", "live", "review"]
+_LAYOUT_VERSION = 1
+_LEFT, _RIGHT, _BOTTOM = (
+    Qt.DockWidgetArea.LeftDockWidgetArea,
+    Qt.DockWidgetArea.RightDockWidgetArea,
+    Qt.DockWidgetArea.BottomDockWidgetArea,
+)
+
+
+_TITLES = {
+    "camera": "Camera",
+    "cloud": "Hand cloud",
+    "wearer_view": "Wearer's view",
+    "rotation": "Rotation",
+    "results": "Results",
+    "fine_tune": "Fine-tune",
+    "trials": "Trials",
+    "session": "Session",
+    "link": "Link",
+}
+_DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
+    "start": frozenset(),
+    "live": frozenset(_TITLES),
+    "review": frozenset({"cloud", "results", "trials", "session"}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Panels:
+    """Every panel of the window."""
+
+    camera: CameraPanel
+    cloud: CloudPanel
+    wearer_view: WearerViewPanel
+    rotation: RotationPanel
+    results: ResultsPanel
+    fine_tune: FineTunePanel
+    trials: TrialsPanel
+    session: SessionPanel
+    link: LinkPanel
+
+
+class MainWindow(QMainWindow):
+    """Holds pages and panels; knows nothing of what they show.
+
+    Parameters
+    ----------
+    start, wizard, review : QWidget
+        The pages.
+    panels : Panels
+
+    Attributes
+    ----------
+    closing : Signal()
+        The window is about to close.
+    space_pressed : Signal()
+        The space bar, where nothing else takes it.
+    """
+
+    closing = Signal()
+    space_pressed = Signal()
+
+    def __init__(
+        self, start: StartPage, wizard: WizardPanel, review: QWidget, panels: Panels
+    ) -> None:
+        super().__init__()
+        self.setObjectName("mainWindow")
+        self.setWindowTitle("handcal")
+        self.panels = panels
+        self.banner = Banner()
+        self._pages: dict[Page, QWidget] = {"start": start, "live": wizard, "review": review}
+        self._stack = QStackedWidget()
+        for page in self._pages.values():
+            self._stack.addWidget(_scrollable(page))
+        middle = QWidget()
+        layout = QVBoxLayout(middle)
+        layout.setContentsMargins(SPACING_PX // 2, SPACING_PX // 2, SPACING_PX // 2, 0)
+        layout.addWidget(self.banner)
+        layout.addWidget(self._stack, 1)
+        self.setCentralWidget(middle)
+        self.setDockNestingEnabled(True)
+        self.setCorner(Qt.Corner.BottomLeftCorner, _LEFT)
+        self.setCorner(Qt.Corner.BottomRightCorner, _RIGHT)
+        self._docks = self._make_docks()
+        self._layouts: dict[Page, QByteArray] = {}
+        self._page: Page = "start"
+        self._arrange()
+        self._default_layout = self.saveState(_LAYOUT_VERSION)
+        self._make_menus()
+        self._give_space_to_the_wizard()
+        self.show_page("start")
+
+    @property
+    def page(self) -> Page:
+        """The page shown."""
+        return self._page
+
+    def show_page(self, page: Page) -> None:
+        """Show a page with the docks that belong to it, laid out as they were left."""
+        self._keep_layout()
+        self._page = page
+        self._stack.setCurrentIndex(list(self._pages).index(page))
+        self.restoreState(self._layouts.get(page, self._default_layout), _LAYOUT_VERSION)
+        for name, dock in self._docks.items():
+            belongs = name in _DOCKS_OF_PAGE[page]
+            if not belongs:
+                dock.hide()
+            elif page not in self._layouts:
+                dock.show()
+            dock.toggleViewAction().setEnabled(belongs)
+        if page not in self._layouts:
+            self._docks["results"].raise_()
+
+    def reset_layout(self) -> None:
+        """Put the docks of the page back to where they were at the first start."""
+        self._layouts.pop(self._page, None)
+        page, self._page = self._page, "start"  # so that the present layout is not kept
+        self.show_page(page)
+
+    def layouts(self) -> dict[Page, str]:
+        """Return the layout of every page as text, for `restore_layouts`."""
+        self._keep_layout()
+        return {
+            page: base64.b64encode(state.data()).decode() for page, state in self._layouts.items()
+        }
+
+    def restore_layouts(self, layouts: Mapping[Page, str]) -> None:
+        """Take layouts of an earlier run; what does not fit is left out."""
+        for page, text in layouts.items():
+            state = QByteArray.fromBase64(text.encode())
+            if page in _DOCKS_OF_PAGE and self.restoreState(state, _LAYOUT_VERSION):
+                self._layouts[page] = state
+        page, self._page = self._page, "start"
+        self.show_page(page)
+
+    def is_visible(self, panel: QWidget) -> bool:
+        """Tell whether any of a panel can be seen."""
+        return not panel.visibleRegion().isEmpty()
+
+    def add_action(self, menu: str, text: str, keys: str, do: Callable[[], object]) -> QAction:
+        """Add an action to one of the menus File, View and Help."""
+        action = QAction(text, self)
+        if keys:
+            action.setShortcut(QKeySequence(keys))
+        action.triggered.connect(lambda _checked=False: do())
+        before = self._dock_actions_start if menu == "View" else None
+        self._menus[menu].insertAction(before, action)
+        return action
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Let the space bar do what comes next, and Esc close the message."""
+        if event.key() == Qt.Key.Key_Space and not event.isAutoRepeat():
+            self.space_pressed.emit()
+        elif event.key() == Qt.Key.Key_Escape:
+            self.banner.clear()
+        else:
+            super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Say so before closing."""
+        self.closing.emit()
+        super().closeEvent(event)
+
+    def _keep_layout(self) -> None:
+        if self._page != "start":
+            self._layouts[self._page] = self.saveState(_LAYOUT_VERSION)
+
+    def _make_docks(self) -> dict[str, QDockWidget]:
+        docks = {}
+        for name, title in _TITLES.items():
+            dock = QDockWidget(title, self)
+            dock.setObjectName(f"{name}Dock")
+            dock.setWidget(getattr(self.panels, name))
+            docks[name] = dock
+        return docks
+
+    def _arrange(self) -> None:
+        docks = self._docks
+        for name, area in (
+            ("camera", _LEFT),
+            ("cloud", _LEFT),
+            ("rotation", _RIGHT),
+            ("results", _RIGHT),
+            ("wearer_view", _BOTTOM),
+        ):
+            self.addDockWidget(area, docks[name])
+        for name in ("fine_tune", "trials", "session", "link"):
+            self.tabifyDockWidget(docks["results"], docks[name])
+        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+        across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
+        self.resizeDocks([docks["camera"], docks["rotation"]], [380, 430], across)
+        self.resizeDocks([docks["camera"], docks["cloud"]], [380, 340], down)
+        self.resizeDocks([docks["rotation"], docks["results"]], [270, 450], down)
+        self.resizeDocks([docks["wearer_view"]], [320], down)
+
+    def _make_menus(self) -> None:
+        self._menus = {
+            name: self.menuBar().addMenu(f"&{name}") for name in ("File", "View", "Help")
+        }
+        view = self._menus["View"]
+        self._dock_actions_start = view.addSeparator()
+        for dock in self._docks.values():
+            view.addAction(dock.toggleViewAction())
+
+    def _give_space_to_the_wizard(self) -> None:
+        """Keep the focus off buttons that are clicked, which would take the space bar."""
+        for button in self.findChildren(QAbstractButton):
+            if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
+                button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+
+
+def _scrollable(page: QWidget) -> QScrollArea:
+    area = QScrollArea()
+    area.setWidget(page)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    return area

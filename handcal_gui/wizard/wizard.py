@@ -1,0 +1,208 @@
+"""The wizard's face: the steps, one sentence, what is still missing, and the buttons."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtWidgets import (
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.snapshot import Snapshot
+from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard
+
+_MOST_CHECKS = 3
+_MOST_OTHERS = 3
+
+
+class WizardPanel(QWidget):
+    """Shows a `Wizard` and asks for what it offers.
+
+    Attributes
+    ----------
+    asked : Signal(Action)
+        A button was pressed.
+    plan_changed : Signal(str)
+    """
+
+    asked = Signal(object)
+    plan_changed = Signal(str)
+
+    def __init__(self, wizard: Wizard, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("wizard")
+        self.wizard = wizard
+        self.shown: View | None = None
+        self._rail = _Rail()
+        self._title = QLabel(objectName="wizardTitle")
+        self._sentence = QLabel(objectName="wizardSentence", wordWrap=True)
+        self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
+        self._note = QLabel(objectName="wizardNote", wordWrap=True)
+        self._main = QPushButton(objectName="wizardMain")
+        self._others = [QPushButton(objectName=f"wizardOther{i}") for i in range(_MOST_OTHERS)]
+        self._plan = QComboBox(objectName="wizardPlan")
+        self._lay_out()
+        self._main.clicked.connect(lambda: self._ask(self.shown.main if self.shown else None))
+        for i, button in enumerate(self._others):
+            button.clicked.connect(lambda _checked=False, i=i: self._ask_other(i))
+        self._plan.currentIndexChanged.connect(self._choose_plan)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show what the wizard says of a snapshot."""
+        view = self.wizard.view(snapshot)
+        if view != self.shown:
+            self.shown = view
+            self._refresh(view)
+
+    def press_main(self) -> None:
+        """Do what the main button does."""
+        self._main.click()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw icons when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and self.shown is not None:
+            self._refresh(self.shown)
+
+    def _lay_out(self) -> None:
+        font = self._title.font()
+        font.setPointSizeF(1.6 * font.pointSizeF())
+        font.setBold(True)
+        self._title.setFont(font)
+        font = self._sentence.font()
+        font.setPointSizeF(1.2 * font.pointSizeF())
+        self._sentence.setFont(font)
+        self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
+        # Two lines always, so that what is below stays where it is.
+        self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
+        self._note.setMinimumHeight(2 * self._note.fontMetrics().lineSpacing() + 2)
+        self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
+        font = self._main.font()
+        font.setPointSizeF(1.2 * font.pointSizeF())
+        font.setBold(True)
+        self._main.setFont(font)
+        self._main.setMinimumHeight(5 * SPACING_PX)
+        self._main.setMinimumWidth(28 * SPACING_PX)
+        self._main.setDefault(True)
+        self._plan.addItems(list(PLANS.values()))
+        self._plan.setCurrentText(PLANS[self.wizard.plan])
+        self._plan.setToolTip(
+            "One eye after the other tells each eye's place, and takes two alignments.\n"
+            "Both eyes at once is quicker, but cannot tell an eye distance that differs from the "
+            "rig's."
+        )
+        plan_label = QLabel("&Align")
+        plan_label.setBuddy(self._plan)
+        plan = QHBoxLayout()
+        plan.addWidget(self._title)
+        plan.addStretch()
+        plan.addWidget(plan_label)
+        plan.addWidget(self._plan)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self._main)
+        buttons.addStretch()
+        for button in self._others:
+            buttons.addWidget(button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._rail)
+        layout.addSpacing(SPACING_PX)
+        layout.addLayout(plan)
+        layout.addWidget(self._sentence)
+        for row in self._checks:
+            layout.addWidget(row)
+        layout.addWidget(self._note)
+        layout.addStretch()
+        layout.addLayout(buttons)
+
+    def _refresh(self, view: View) -> None:
+        self._rail.show_step(view.step)
+        self._title.setText(view.step.value)
+        self._sentence.setText(view.sentence)
+        for i, row in enumerate(self._checks):
+            row.show_check(view.checks[i] if i < len(view.checks) else None)
+        self._note.setText(view.note)
+        self._note.setStyleSheet(f"color: {colors().red}")
+        self._main.setText(view.main.label)
+        self._main.setEnabled(view.main.is_enabled)
+        self._main.setToolTip("Space bar")
+        for i, button in enumerate(self._others):
+            button.setVisible(i < len(view.others))
+            if i < len(view.others):
+                button.setText(view.others[i].label)
+                button.setEnabled(view.others[i].is_enabled)
+        self._plan.setEnabled(view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR))
+
+    def _ask(self, offer: Offer | None) -> None:
+        if offer is not None and offer.is_enabled:
+            self.asked.emit(offer.action)
+
+    def _ask_other(self, i: int) -> None:
+        if self.shown is not None and i < len(self.shown.others):
+            self._ask(self.shown.others[i])
+
+    def _choose_plan(self, index: int) -> None:
+        plan: EyePlan = list(PLANS)[index]
+        self.wizard.plan = plan
+        self.plan_changed.emit(plan)
+
+
+class _Rail(QWidget):
+    """The steps in a row, the present one emphasised."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
+        for label in self._labels.values():
+            label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+            layout.addWidget(label)
+
+    def show_step(self, present: Step) -> None:
+        place = STEPS.index(present)
+        for i, (step, label) in enumerate(self._labels.items()):
+            mark = "✓ " if i < place else ""
+            color = colors().good if i < place else colors().muted
+            label.setText(f"{mark}{step.value}")
+            if step is present:
+                label.setText(f"▸ {step.value}")
+                color = self.palette().windowText().color().name()
+            weight = "bold" if step is present else "normal"
+            line = colors().live if step is present else colors().muted
+            label.setStyleSheet(
+                f"color: {color}; font-weight: {weight}; border-bottom: 3px solid {line};"
+            )
+
+
+class _CheckRow(QWidget):
+    """One precondition: an icon, and a text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._icon = QLabel()
+        self._text = QLabel(wordWrap=True)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._icon)
+        layout.addWidget(self._text, 1)
+        self.setMinimumHeight(3 * SPACING_PX)
+
+    def show_check(self, check: Check | None) -> None:
+        if check is None:
+            self._icon.clear()
+            self._text.clear()
+            return
+        name, word = ("check", "Yes") if check.holds else ("wait", "Not yet")
+        self._icon.setPixmap(icon(name).pixmap(2 * SPACING_PX))
+        self._icon.setAccessibleName(word)
+        self._text.setText(check.text)
