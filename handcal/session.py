@@ -120,6 +120,12 @@ class Session(Closable):
     ----------
     path : Path
 
+    Attributes
+    ----------
+    path : Path
+    revision : int
+        Grows with everything written.
+
     Raises
     ------
     FileError
@@ -128,6 +134,7 @@ class Session(Closable):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.revision = 0
         self._lock = FileLock(path / "lock")
         try:
             record = self.open(path)
@@ -363,6 +370,7 @@ class Session(Closable):
         if len(text) > MAX_NOTES_CHARACTERS:
             raise ValueError(f"notes may have {MAX_NOTES_CHARACTERS:,} characters")
         write_atomic(self.path / "notes.txt", text.encode(errors="replace"))
+        self.revision += 1
 
     def finish(self) -> None:
         """Note that the session ends here; FileError if the journal cannot be written.
@@ -390,6 +398,7 @@ class Session(Closable):
 
     def _append(self, event: str, data: dict[str, Any]) -> None:
         self._history.take(self._journal.append(event, data))
+        self.revision += 1
 
 
 def _replay(path: Path, events: Sequence[Event]) -> History:
