@@ -104,7 +104,6 @@ def record(
         for alignment in alignments:
             session.save_alignment(alignment)
         session.save_results(results_json(results))
-        session.record("solved", **results_json(results))
     return Session.open(session.path)
 
 
