@@ -11,11 +11,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.display import eye_projection
+from handcal.display import arcmin_from_px, eye_projection
 from handcal.geometry import project
 from handcal.types import Eye, EyeDisplay, Float64, UInt8, freeze
 
 _NEAREST_M = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overlay:
+    """The live hand's outline as a headset draws it, and by how much that misses the hand.
+
+    Attributes
+    ----------
+    outline_px : (N, 2) float64
+        Point by point that of `EyeView.hand_px`.
+    error_px, error_arcmin : float or None
+        Mean distance of these points; None without an outline.
+    """
+
+    outline_px: Float64
+    error_px: float | None
+    error_arcmin: float | None
+
+    def __post_init__(self) -> None:
+        freeze(self, "outline_px", np.float64, None, 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +49,10 @@ class EyeView:
         Size of the display.
     hand_px : (N, 2) float64
         Outline of the live hand as the eye sees it through the display.
-    drawn_px : (N, 2) float64
-        The same outline as the headset draws it: on the hand if the calibration is right.
+    drawn : Overlay
+        With what the headset renders with now: on the hand if the calibration is right.
+    offline : Overlay
+        With the offline calibration, as before any alignment.
     cursor_px : (M, 2) float64
         The cursor as the headset draws it; empty if there is none.
     is_true : bool
@@ -43,14 +65,14 @@ class EyeView:
     width_px: int
     height_px: int
     hand_px: Float64
-    drawn_px: Float64
+    drawn: Overlay
+    offline: Overlay
     cursor_px: Float64
     is_true: bool
     image: UInt8 | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "hand_px", np.float64, None, 2)
-        freeze(self, "drawn_px", np.float64, None, 2)
         freeze(self, "cursor_px", np.float64, None, 2)
         freeze(self, "image", np.uint8, None, None, 3)
 
@@ -82,18 +104,28 @@ def see(
     is_true, image
         As in `EyeView`.
     """
-    seen, drawn = eye_projection(display, eye_shift_m), eye_projection(display, drawn_shift_m)
+    drawn = eye_projection(display, drawn_shift_m)
+    outline_m = _in_front(outline_E_m)
+    hand_px = project(eye_projection(display, eye_shift_m), outline_m)
     return EyeView(
         eye=eye,
         width_px=display.width_px,
         height_px=display.height_px,
-        hand_px=_in_front(seen, outline_E_m),
-        drawn_px=_in_front(drawn, outline_E_m),
-        cursor_px=_in_front(drawn, cursor_E_m),
+        hand_px=hand_px,
+        drawn=_overlay(display, project(drawn, outline_m), hand_px),
+        offline=_overlay(display, project(eye_projection(display), outline_m), hand_px),
+        cursor_px=project(drawn, _in_front(cursor_E_m)),
         is_true=is_true,
         image=image,
     )
 
 
-def _in_front(P: Float64, points_E_m: Float64) -> Float64:
-    return project(P, points_E_m[points_E_m[:, 2] > _NEAREST_M])
+def _in_front(points_E_m: Float64) -> Float64:
+    return points_E_m[points_E_m[:, 2] > _NEAREST_M]
+
+
+def _overlay(display: EyeDisplay, outline_px: Float64, hand_px: Float64) -> Overlay:
+    if not len(outline_px):
+        return Overlay(outline_px, None, None)
+    error_px = float(np.linalg.norm(outline_px - hand_px, axis=1).mean())
+    return Overlay(outline_px, error_px, float(arcmin_from_px(display, error_px)))
