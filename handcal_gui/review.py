@@ -1,0 +1,107 @@
+"""A stored session: read, solved again, and shown in the panels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+
+from handcal.calibrate import CalibrationSettings
+from handcal.config import read_settings
+from handcal.errors import FileError
+from handcal.register.verdict import expected_after_another
+from handcal.results import Results, SolveSettings, solve_session
+from handcal.session import Session, SessionRecord
+from handcal_gui.compare import Comparison
+from handcal_gui.jobs import IsCancelled, Job, Report
+from handcal_gui.review_page import ReviewPage
+from handcal_gui.window import MainWindow
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stored:
+    record: SessionRecord
+    settings: SolveSettings
+    results: Results | None
+
+
+class Review(QObject):
+    """Opens one stored session after the other, read-only.
+
+    Parameters
+    ----------
+    window : MainWindow
+    page : ReviewPage
+    comparison : Comparison
+
+    Attributes
+    ----------
+    opened : Signal(Path)
+    failed : Signal(str)
+        A session could not be opened, and why.
+    """
+
+    opened = Signal(object)
+    failed = Signal(str)
+
+    def __init__(self, window: MainWindow, page: ReviewPage, comparison: Comparison) -> None:
+        super().__init__(window)
+        self._window = window
+        self._page = page
+        self._comparison = comparison
+        self._job: Job | None = None
+        self.record: SessionRecord | None = None
+
+    def open(self, path: Path) -> None:
+        """Read and solve a session, then show it."""
+        self.close()
+
+        def work(report: Report, is_cancelled: IsCancelled) -> _Stored:
+            record = Session.open(path)
+            calibration = read_settings(CalibrationSettings, record.settings.get("calibration", {}))
+            settings = calibration.solve
+            if not record.alignments:
+                return _Stored(record, settings, None)
+            try:
+                results = solve_session(
+                    record.alignments, record.rig, settings, report, is_cancelled
+                )
+            except ValueError as error:
+                raise FileError(f"{path} cannot be solved: {error}") from error
+            return _Stored(record, settings, results)
+
+        self._job = Job(work, self)
+        self._job.succeeded.connect(self._show)
+        self._job.failed.connect(self.failed)
+        self._job.start()
+
+    def close(self) -> None:
+        """Stop what goes on; safe to call twice."""
+        self._comparison.cancel()
+        if self._job is not None:
+            self._job.cancel()
+            self._job.wait()
+            self._job = None
+        self.record = None
+
+    def _show(self, stored: _Stored) -> None:
+        self.record = record = stored.record
+        panels = self._window.panels
+        note = "" if stored.results else "It holds no alignment yet."
+        self._page.show_session(record, stored.results, note)
+        expected = (
+            expected_after_another(stored.results, record.rig, stored.settings)
+            if stored.results
+            else {}
+        )
+        panels.results.show_results(stored.results, record.alignments, record.rig, expected)
+        panels.session.set_read_only(True)
+        panels.session.show_record(record, stored.results)
+        panels.trials.set_read_only(True)
+        panels.trials.show_record(record)
+        if stored.results is not None:
+            panels.cloud.show_alignment(record.alignments[-1])
+            self._comparison.use(record.alignments, record.rig, stored.settings)
+        self._window.show_page("review")
+        self.opened.emit(record.path)
