@@ -62,6 +62,8 @@ def _convert(kind: Any, value: object, where: str) -> Any:
         if value in choices:
             return value
         raise FileError(f"{where} must be one of {', '.join(map(str, choices))}")
+    if origin is tuple and isinstance(value, list) and choices[-1] is Ellipsis:
+        return tuple(_convert(choices[0], part, where) for part in value)
     if origin is tuple and isinstance(value, list) and len(value) == len(choices):
         return tuple(_convert(kind, part, where) for kind, part in zip(choices, value, strict=True))
     if is_dataclass(kind) and isinstance(kind, type):
@@ -76,7 +78,7 @@ def _convert(kind: Any, value: object, where: str) -> Any:
 
 def _name(kind: Any, choices: tuple[Any, ...]) -> str:
     if get_origin(kind) is tuple:
-        return f"a list of {len(choices)} values"
+        return "a list" if choices[-1] is Ellipsis else f"a list of {len(choices)} values"
     return {float: "a finite number", int: "a whole number", bool: "true or false"}.get(
         kind, "a text"
     )

@@ -120,10 +120,11 @@ def _cameras() -> list[Finding]:
     if not devices:
         advice = "plug a RealSense into a USB 3 port; the simulator works without"
         return [Finding("Camera", Health.LIMITED, "none connected", advice)]
-    return [_camera(device) for device in devices]
+    return [examine_camera(device) for device in devices]
 
 
-def _camera(device: Device) -> Finding:
+def examine_camera(device: Device) -> Finding:
+    """Tell what a device is, and whether it is connected well enough."""
     found = f"{device.name}, serial {device.serial}, firmware {device.firmware}, USB {device.usb}"
     if device.is_slow:
         advice = "USB 2 is too slow for 1280x720: use a USB 3 port and cable"
@@ -140,9 +141,14 @@ def _screen() -> Finding:
 
 def _disk() -> Finding:
     try:
-        free_bytes = shutil.disk_usage(Path.cwd()).free
+        return examine_disk(Path.cwd())
     except OSError as error:
         return Finding("Disk", Health.BROKEN, str(error), "run handcal in a folder that exists")
+
+
+def examine_disk(folder: Path) -> Finding:
+    """Tell whether a session fits on the disk of a folder that exists; OSError otherwise."""
+    free_bytes = shutil.disk_usage(folder).free
     found = f"{free_bytes / 2**30:.1f} GiB free here"
     if free_bytes < _LEAST_FREE_BYTES:
         return Finding("Disk", Health.BROKEN, found, "make room: a session takes some megabytes")

@@ -19,8 +19,15 @@ MAX_JSON_BYTES = 16 * 2**20
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
 
-def write_atomic(path: Path, data: bytes) -> None:
+def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write `data` so that `path` holds either its old content or all of the new.
+
+    Parameters
+    ----------
+    path : Path
+    data : bytes
+    mode : int
+        Permissions, less the umask; 0o600 hides a secret from other users.
 
     Raises
     ------
@@ -30,7 +37,8 @@ def write_atomic(path: Path, data: bytes) -> None:
     temporary = path.parent / f".{path.name}.{secrets.token_hex(8)}"
     try:
         try:
-            with temporary.open("xb") as file:
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+            with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
@@ -130,7 +138,10 @@ def write_ply(
         "format binary_little_endian 1.0",
         "comment metres",
         f"element vertex {len(vertices)}",
-        *(f"property {_PLY_TYPES[column.dtype.str[1:]]} {name}" for name, column in columns.items()),
+        *(
+            f"property {_PLY_TYPES[column.dtype.str[1:]]} {name}"
+            for name, column in columns.items()
+        ),
         "end_header\n",
     ]
     write_atomic(path, "\n".join(header).encode() + vertices.tobytes())

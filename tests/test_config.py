@@ -38,6 +38,7 @@ class Outer:
     is_on: bool = False
     kind: Literal["a", "b"] = "a"
     limit_s: float | None = None
+    names: tuple[str, ...] = ()
     inner: Inner = field(default_factory=Inner)
 
 
@@ -86,10 +87,12 @@ def test_every_kind_of_value_comes_back(ratio: float, place: list[float], limit:
         "is_on": True,
         "kind": "b",
         "limit_s": limit,
+        "names": ["a", "b", "c"],
         "inner": {"ratio": abs(ratio), "place_m": place},
     }
     settings = read_settings(Outer, data)
-    assert settings == Outer(3, "y", True, "b", limit, Inner(abs(ratio), tuple(place)))  # type: ignore[arg-type]
+    inner = Inner(abs(ratio), (place[0], place[1], place[2]))
+    assert settings == Outer(3, "y", True, "b", limit, ("a", "b", "c"), inner)
     assert json.loads(json.dumps(settings_json(settings))) == data
 
 
@@ -118,6 +121,8 @@ def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> 
         ({"inner": {"place_m": [1, 2]}}, "settings.inner.place_m must be a list of 3 values"),
         ({"inner": {"place_m": 1}}, "settings.inner.place_m must be a list of 3 values"),
         ({"inner": {"place_m": [1, 2, "3"]}}, "settings.inner.place_m must be a finite number"),
+        ({"names": "abc"}, "settings.names must be a list, not 'abc'"),
+        ({"names": ["a", 1]}, "settings.names must be a text, not '1'"),
         ({"count": 1.0}, "settings.count must be a whole number, not '1.0'"),
         ({"count": True}, "settings.count must be a whole number, not 'True'"),
         ({"name": 1}, "settings.name must be a text, not '1'"),

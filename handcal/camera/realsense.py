@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -109,7 +110,7 @@ class RealSenseCamera(Closable):
 
     def __init__(self, serial: str = "") -> None:
         rs = librealsense()
-        self._device = _choose(connected_devices(), serial)
+        self._device = choose_device(connected_devices(), serial)
         self._pipeline = rs.pipeline()
         profile = _start(rs, self._pipeline, self._device)
         depth, color = profile.get_stream(rs.stream.depth), profile.get_stream(rs.stream.color)
@@ -152,7 +153,14 @@ class RealSenseCamera(Closable):
         raise CameraTimeoutError(f"{self.name}: no frame for {timeout_s:g} s")
 
 
-def _choose(devices: list[Device], serial: str) -> Device:
+def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
+    """Return the device with a serial number, or the first.
+
+    Raises
+    ------
+    CameraError
+        If it is not among them.
+    """
     if not devices:
         raise CameraError("no RealSense camera is connected; plug one into a USB 3 port")
     for device in devices:

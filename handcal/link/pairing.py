@@ -7,7 +7,7 @@ import secrets
 from pathlib import Path
 
 from handcal.errors import LinkError
-from handcal.files import read_limited
+from handcal.files import make_folder, read_limited, write_atomic
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 
 KEY_VARIABLE = "HANDCAL_PAIRING_KEY"
@@ -39,4 +39,18 @@ def read_pairing_key(path: Path | None = None) -> bytes:
         raise LinkError(
             f"the pairing key has {len(key)} bytes; take one of at least {MIN_PAIRING_KEY_BYTES}"
         )
+    return key
+
+
+def write_pairing_key(path: Path) -> str:
+    """Put a fresh key where only this user can read it, and return it.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
+    key = new_pairing_key()
+    make_folder(path.parent)
+    write_atomic(path, f"{key}\n".encode(), mode=0o600)
     return key

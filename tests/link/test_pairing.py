@@ -4,7 +4,12 @@ from pathlib import Path
 import pytest
 
 from handcal.errors import FileError, LinkError
-from handcal.link.pairing import KEY_VARIABLE, new_pairing_key, read_pairing_key
+from handcal.link.pairing import (
+    KEY_VARIABLE,
+    new_pairing_key,
+    read_pairing_key,
+    write_pairing_key,
+)
 from handcal.link.wire import derive_keys
 
 
@@ -38,3 +43,12 @@ def test_any_bytes_are_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
     key = b"\xff\xfe" * 8
     monkeypatch.setenv(KEY_VARIABLE, os.fsdecode(key))
     assert read_pairing_key() == key
+
+
+def test_a_written_key_is_this_users_alone_and_replaces_the_old(tmp_path: Path) -> None:
+    path = tmp_path / "config" / "pairing.key"
+    first, second = write_pairing_key(path), write_pairing_key(path)
+    assert first != second
+    assert read_pairing_key(path) == second.encode()
+    if os.name == "posix":
+        assert path.stat().st_mode & 0o777 == 0o600

@@ -1,0 +1,159 @@
+"""Whether a station can be opened as it is set up: what is there, what is not, what to do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from ipaddress import IPv4Address
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from handcal.camera.realsense import choose_device, connected_devices, librealsense
+from handcal.doctor import Finding, Health, examine_camera, examine_disk
+from handcal.errors import HandcalError, LinkError
+from handcal.link.server import LOOPBACK
+from handcal.link.settings import DEFAULT_SETTINGS
+from handcal.link.transport import Address, UdpTransport, local_address
+from handcal.link.wire import MIN_PAIRING_KEY_BYTES
+from handcal.rig.rig_file import read_rig
+from handcal.station_settings import StationSettings
+
+Part: TypeAlias = Literal["camera", "headset", "rig", "sessions"]
+PARTS: dict[Part, str] = {
+    "camera": "Camera",
+    "headset": "Headset",
+    "rig": "Rig file",
+    "sessions": "Session folder",
+}
+RECORDING_SUFFIXES = (".db3", ".bag")
+
+_ANYWHERE: Address = ("192.0.2.1", 9)  # an address for documentation; nothing is sent there
+
+
+def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Finding]:
+    """Look at each part of a station without opening it; never raises.
+
+    Takes some 0.1 s where a RealSense is asked for, otherwise a few milliseconds.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    pairing_key : str
+        For a network headset.
+    """
+    return {
+        "camera": _look("camera", lambda: _camera(settings), "or use the simulator"),
+        "headset": _look("headset", lambda: _headset(settings, pairing_key), "choose another port"),
+        "rig": _look("rig", lambda: _rig(settings), "choose another rig file"),
+        "sessions": _look("sessions", lambda: _sessions(settings), "choose another folder"),
+    }
+
+
+def is_ready(findings: Mapping[Part, Finding]) -> bool:
+    """Tell whether a station with these findings can be opened."""
+    return all(finding.health is not Health.BROKEN for finding in findings.values())
+
+
+def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
+    try:
+        finding = look()
+    except (HandcalError, OSError, ValueError) as error:  # ValueError: a path with a null byte
+        finding = Finding("", Health.BROKEN, str(error), advice)
+    return replace(finding, what=PARTS[part])
+
+
+def _good(found: str) -> Finding:
+    return Finding("", Health.GOOD, found)
+
+
+def _limited(found: str, advice: str) -> Finding:
+    return Finding("", Health.LIMITED, found, advice)
+
+
+def _broken(found: str, advice: str) -> Finding:
+    return Finding("", Health.BROKEN, found, advice)
+
+
+def _camera(settings: StationSettings) -> Finding:
+    match settings.source:
+        case "realsense":
+            return examine_camera(choose_device(connected_devices(), settings.serial))
+        case "recording":
+            return _recording(settings.recording)
+        case "simulator":
+            return _good("simulated; no hardware is needed")
+
+
+def _recording(name: str) -> Finding:
+    librealsense()
+    path = Path(name)
+    if not name:
+        return _broken("no recording is chosen", "choose a file")
+    if path.suffix not in RECORDING_SUFFIXES:
+        kinds = " or ".join(RECORDING_SUFFIXES)
+        return _broken(f"{path.name} is no RealSense recording", f"choose a {kinds} file")
+    if not path.is_file():
+        return _broken(f"there is no file {path}", "choose another")
+    return _good(f"{path.stat().st_size / 2**20:,.1f} MiB, played over and over")
+
+
+def _headset(settings: StationSettings, pairing_key: str) -> Finding:
+    if settings.headset == "network":
+        return _network_headset(settings, pairing_key)
+    _require_free(LOOPBACK)
+    if settings.source != "simulator":
+        return _limited(
+            "the virtual headset knows nothing of a real hand",
+            "fit to look at the camera's picture; to calibrate, use a network headset",
+        )
+    return _good("virtual, with a simulated wearer; started on this computer")
+
+
+def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
+    if settings.source == "simulator":
+        return _broken(
+            "the simulator's wearer wears the virtual headset", "use the virtual headset"
+        )
+    if len(pairing_key.encode()) < MIN_PAIRING_KEY_BYTES:
+        return _broken("the pairing key is too short", "make a new one")
+    try:
+        address = IPv4Address(settings.host)
+    except ValueError:
+        advice = "give four numbers; 0.0.0.0 listens on all networks"
+        return _broken(f"{settings.host!r} is not an address", advice)
+    if not 1 <= settings.port <= 65535:
+        return _broken(f"{settings.port} is no port", "choose one from 1 to 65535")
+    _require_free((settings.host, settings.port))
+    if not address.is_unspecified:
+        return _good(f"connects to {settings.host}, UDP port {settings.port}")
+    try:
+        host, _ = local_address(_ANYWHERE)
+    except LinkError:
+        return _limited("this computer has no network", "connect it to the headset's network")
+    return _good(f"connects to this computer, {host}, UDP port {settings.port}")
+
+
+def _require_free(address: Address) -> None:
+    """Raise LinkError unless the address can be listened at."""
+    UdpTransport(address, DEFAULT_SETTINGS.receive_buffer_bytes).close()
+
+
+def _rig(settings: StationSettings) -> Finding:
+    name = read_rig(settings.rig_path).name
+    if not settings.rig and settings.headset == "network":
+        return _limited(name, "choose the file of this headset's own offline calibration")
+    return _good(name)
+
+
+def _sessions(settings: StationSettings) -> Finding:
+    if not settings.sessions:
+        return _broken("no folder is chosen", "choose one")
+    folder = Path(settings.sessions).expanduser().absolute()
+    there = next(path for path in (folder, *folder.parents) if path.exists())
+    if not there.is_dir():
+        return _broken(f"{there} is a file", "choose a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        return _broken(f"nothing may be written in {there}", "choose another folder")
+    disk = examine_disk(there)
+    return disk if there == folder else replace(disk, found=f"{disk.found}; will be created")

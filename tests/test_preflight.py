@@ -1,0 +1,165 @@
+"""The check before a start: every part of a station that could not be opened is named."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from handcal import preflight
+from handcal.camera.realsense import Device
+from handcal.doctor import Finding, Health
+from handcal.errors import LinkError
+from handcal.link.pairing import new_pairing_key
+from handcal.preflight import PARTS, Part, check_station, is_ready
+from handcal.resources import resource_path
+from handcal.station_settings import StationSettings
+
+KEY = new_pairing_key()
+D415 = Device("Intel RealSense D415", "123", "5.16", "3.2")
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> StationSettings:
+    return StationSettings(sessions=str(tmp_path), host="127.0.0.1", port=_free_port())
+
+
+@pytest.fixture
+def taken_port() -> Iterator[int]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        yield other.getsockname()[1]
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def find(part: Part, settings: StationSettings, key: str = KEY) -> Finding:
+    findings = check_station(settings, key)
+    assert {part: finding.what for part, finding in findings.items()} == PARTS
+    for finding in findings.values():
+        assert finding.found
+        assert bool(finding.advice) is (finding.health is not Health.GOOD)
+    broken = any(finding.health is Health.BROKEN for finding in findings.values())
+    assert is_ready(findings) is not broken
+    return findings[part]
+
+
+def test_the_simulator_needs_nothing(settings: StationSettings) -> None:
+    check_station(settings, "")
+    started_s = time.perf_counter()
+    findings = check_station(settings, "")
+    assert time.perf_counter() - started_s < 0.2
+    assert {finding.health for finding in findings.values()} == {Health.GOOD}
+    assert is_ready(findings)
+    assert "HoloLens 1" in findings["rig"].found
+
+
+def test_a_realsense_is_found_or_missed(
+    settings: StationSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices: list[Device] = []
+    monkeypatch.setattr(preflight, "connected_devices", lambda: devices)
+    live = replace(settings, source="realsense", headset="network")
+    assert find("camera", live).health is Health.BROKEN
+    assert "plug one into a USB 3 port" in find("camera", live).found
+    devices.append(D415)
+    assert find("camera", live).health is Health.GOOD
+    assert "serial 123" in find("camera", live).found
+    assert "serial 9 is not connected" in find("camera", replace(live, serial="9")).found
+    devices[0] = replace(D415, usb="2.1")
+    assert find("camera", live).health is Health.LIMITED
+
+
+@pytest.mark.parametrize("source", ["realsense", "recording"])
+def test_a_missing_sdk_is_named(
+    settings: StationSettings, monkeypatch: pytest.MonkeyPatch, source: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyrealsense2", None)
+    finding = find("camera", replace(settings, source=source))  # type: ignore[arg-type]
+    assert finding.health is Health.BROKEN
+    assert "no package exists for macOS" in finding.found
+    assert "simulator" in finding.advice
+
+
+def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) -> None:
+    pytest.importorskip("pyrealsense2")
+    played = replace(settings, source="recording")
+    assert find("camera", played).found == "no recording is chosen"
+    text, path = tmp_path / "hand.txt", tmp_path / "hand.db3"
+    assert "is no RealSense recording" in find("camera", replace(played, recording=str(text))).found
+    with_path = replace(played, recording=str(path))
+    assert find("camera", with_path).found == f"there is no file {path}"
+    path.write_bytes(bytes(2**21))
+    assert find("camera", with_path).found == "2.0 MiB, played over and over"
+    assert find("camera", replace(played, recording="\0.db3")).health is Health.BROKEN
+
+
+def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: Path) -> None:
+    recorded = replace(settings, source="recording", recording=str(tmp_path / "hand.db3"))
+    assert find("headset", recorded).health is Health.LIMITED
+    assert find("rig", recorded).health is Health.GOOD
+    networked = replace(recorded, headset="network")
+    assert find("headset", networked).health is Health.GOOD
+    assert str(settings.port) in find("headset", networked).found
+    assert find("rig", networked).health is Health.LIMITED  # the example's
+    own = replace(networked, rig=str(resource_path("example_rig.yaml")))
+    assert find("rig", own).health is Health.GOOD
+
+
+def test_a_network_headset_cannot_be_waited_for(
+    settings: StationSettings, taken_port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "simulator" in find("headset", replace(settings, headset="network")).found
+    live = replace(settings, source="realsense", headset="network")
+    assert "cannot listen" in find("headset", replace(live, port=taken_port)).found
+    assert find("headset", replace(live, host="192.0.2.1")).health is Health.BROKEN
+    assert find("headset", replace(live, host="pc")).found == "'pc' is not an address"
+    assert find("headset", replace(live, port=70_000)).found == "70000 is no port"
+    assert find("headset", live, key="short").found == "the pairing key is too short"
+    everywhere = replace(live, host="0.0.0.0")
+    monkeypatch.setattr(preflight, "local_address", lambda _: ("192.168.1.20", 5))
+    assert "192.168.1.20" in find("headset", everywhere).found
+
+    def fail(_: object) -> None:
+        raise LinkError("cannot reach")
+
+    monkeypatch.setattr(preflight, "local_address", fail)
+    assert find("headset", everywhere).health is Health.LIMITED
+
+
+def test_an_unfit_rig_is_named(settings: StationSettings, tmp_path: Path) -> None:
+    absent = find("rig", replace(settings, rig=str(tmp_path / "absent.yaml")))
+    assert absent.health is Health.BROKEN
+    assert "cannot read" in absent.found
+    bad = tmp_path / "bad.yaml"
+    bad.write_text(resource_path("example_rig.yaml").read_text().replace("T_H_D", "T_D_H"))
+    assert "T_H_D must be a 4×4" in find("rig", replace(settings, rig=str(bad))).found
+
+
+def test_the_session_folder_must_take_a_session(
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert find("sessions", replace(settings, sessions="")).found == "no folder is chosen"
+    new = replace(settings, sessions=str(tmp_path / "new" / "folder"))
+    assert find("sessions", new).health is Health.GOOD
+    assert "will be created" in find("sessions", new).found
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "new").touch()
+    assert find("sessions", new).found == f"{tmp_path / 'new'} is a file"
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert "nothing may be written" in find("sessions", settings).found
+    monkeypatch.undo()
+    full = shutil.disk_usage(tmp_path)._replace(free=100 * 2**20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    assert find("sessions", settings).health is Health.BROKEN
