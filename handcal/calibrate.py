@@ -9,30 +9,34 @@
         |                                                           |   v
         '--make_cursor-- APPLIED <--acknowledged-- APPLYING <--apply-- SOLVED
 
-It composes the other rooms and computes nothing new. One thread drives it: `step` for every
-frame, the rest in between.
+Any alignment may be deleted and restored in between, and solved anew; φ may be set by hand where no
+cursor is shown. It composes the other rooms and computes nothing new. One thread drives it: `step`
+for every frame, the rest in between.
 """
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
 from handcal.display import projection_matrix, view_of_eye
-from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
+from handcal.errors import FileError, HandcalError, HandError, PoseError, PosePendingError
 from handcal.geometry import invert, transform
 from handcal.hand.segment import SegmentSettings, segment_hand
-from handcal.link.reliable import Outgoing
+from handcal.history import MAX_ALIGNMENTS, Shelf, read_shifts
+from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
-from handcal.register.guard import GuardSettings, RotationGuard
+from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.results import Results, SolveSettings, results_json, solve_session
-from handcal.session import Session
+from handcal.session import Session, SessionRecord
 from handcal.types import (
     EYES,
     Alignment,
@@ -43,6 +47,9 @@ from handcal.types import (
     Projection,
     Rig,
 )
+
+MAX_HAND_SET_SHIFT_M = 0.030
+"""Each component of a φ set by hand: beyond the eye box, whose size it is."""
 
 _LATEST_CONFIRMATION_S = 1.0
 """Hands are kept for so long, lest a confirmation sent again finds its frame gone."""
@@ -78,6 +85,8 @@ class CalibrationSettings:
         The frame of an alignment may lie this far from t_b.
     steady_s, steady_m : float
         The hand is steady if it moved less than this for so long.
+    apply_timeout_s : float
+        The headset has so long to acknowledge projections (`Calibration.poll_applied`).
     """
 
     segment: SegmentSettings = field(default_factory=SegmentSettings)
@@ -87,6 +96,7 @@ class CalibrationSettings:
     match_tolerance_s: float = 0.1
     steady_s: float = 0.4
     steady_m: float = 0.005
+    apply_timeout_s: float = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,27 +157,31 @@ class Observation:
 class Calibration:
     """One wearer's calibration.
 
-    It begins by sending the offline projections, lest the headset still render with what another
-    calibration sent.
+    It begins by sending the offline projections, or those of the calibration that it goes on with,
+    lest the headset still render with what another calibration sent.
 
     Parameters
     ----------
     rig : Rig
     link : HeadsetServer
     session : Session or None
-        Where everything is recorded, at the moment it happens.
+        Where everything is recorded, at the moment it happens; what it could not take is written
+        before whatever comes next.
     settings : CalibrationSettings
+    resume : SessionRecord or None
+        What `session` holds, to go on with.
 
     Attributes
     ----------
     state : State
     eyes : tuple of eye
         Those that the present alignment is for.
-    alignments : list of Alignment
     results : Results or None
-        Of all alignments; None before `solve`.
+        Of all alignments; None before `solve`, and when an alignment has been deleted or restored.
     refused : int
         Confirmations refused by the guard.
+    refusal : str
+        Why the last confirmation of the present cursor was refused; empty if none was.
     """
 
     def __init__(
@@ -176,13 +190,14 @@ class Calibration:
         link: HeadsetServer,
         session: Session | None = None,
         settings: CalibrationSettings | None = None,
+        resume: SessionRecord | None = None,
     ) -> None:
         self.rig = rig
         self.state = State.SHOW_HAND
         self.eyes: tuple[Eye, ...] = EYES
-        self.alignments: list[Alignment] = []
         self.results: Results | None = None
         self.refused = 0
+        self.refusal = ""
         self._link = link
         self._session = session
         self._settings = settings or CalibrationSettings()
@@ -194,9 +209,39 @@ class Calibration:
         self._cursor_id = 0
         self._guard: RotationGuard | None = None
         self._confirmation: Confirmation | None = None
-        self._drawn_shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
-        self._stored: list[Alignment] = []
-        self._sent = self._send_projections(self._drawn_shift_m)
+        self._shelf = Shelf[Alignment]("alignment", MAX_ALIGNMENTS)
+        self._unstored: deque[Callable[[Session], object]] = deque()
+        self._shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
+        self._sent: dict[Eye, Outgoing] = {}
+        self._apply_until_s = 0.0
+        if resume is not None:
+            self._resume(resume)
+        self._send_projections(self._shift_m)
+
+    @property
+    def alignments(self) -> tuple[Alignment, ...]:
+        """Those not deleted, in the order in which they were made."""
+        return tuple(self._shelf.kept.values())
+
+    @property
+    def alignment_numbers(self) -> tuple[int, ...]:
+        """Numbers of `alignments`, the same as in the session."""
+        return tuple(self._shelf.kept)
+
+    @property
+    def cursor(self) -> PlacedHand | None:
+        """The frozen hand, while the headset shows it."""
+        return self._cursor
+
+    @property
+    def applied_shift_m(self) -> Mapping[Eye, Float64]:
+        """Both eyes' φ that the headset renders with, solved or set by hand."""
+        return MappingProxyType(dict(self._shift_m))
+
+    @property
+    def is_applied(self) -> bool:
+        """Whether the headset has acknowledged the newest projection of each eye."""
+        return all(message.state is Delivery.ACKED for message in self._sent.values())
 
     def step(self, frame: Frame) -> Observation:
         """Take a frame: find the hand, guide the alignment, take a confirmation.
@@ -233,9 +278,10 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no steady hand, or an alignment has not been applied yet.
+            If there is no steady hand, an alignment has not been applied yet, or there are too
+            many.
         ValueError
-            If no eye is given.
+            Unless one eye is given, or each of both once.
         HandError
             If hardly a point lies off the cut edges.
         FileError
@@ -245,18 +291,24 @@ class Calibration:
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
         if not self._is_steady():
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
-        if not eyes:
-            raise ValueError("at least one eye must be open")
+        if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
+            raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
+        try:
+            self._shelf.next_number()
+        except ValueError as error:
+            raise ProcedureError(f"{error} in a session; start another") from error
         hand = self._hands[-1]
         self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
         self._cursor = hand
         self._cursor_id += 1
         self._confirmation = None
+        self.refusal = ""
         self.eyes = tuple(eyes)
         self.state = State.ALIGN
         self._link.send_cursor(transform(hand.T_W_D, hand.cloud.contour_m), self._cursor_id)
         self._link.send_prompt(_align_prompt(self.eyes), self.eyes)
-        self._record("cursor_made", cursor_id=self._cursor_id, eyes=list(self.eyes))
+        made = {"cursor_id": self._cursor_id, "eyes": list(self.eyes)}
+        self._store(lambda session: session.record("cursor_made", **made))
 
     def confirm(self) -> None:
         """Confirm the alignment from the PC, as of the newest frame; the next step takes it.
@@ -287,14 +339,38 @@ class Calibration:
             If the session cannot be written; the alignment is given up all the same.
         """
         if self.state in (State.ALIGNED, State.SOLVED):
-            self.alignments.pop()
-            self.results = None
-        elif self.state is not State.ALIGN:
+            self.delete_alignment(self.alignment_numbers[-1])
+        elif self.state is State.ALIGN:
+            self._show_hand_again()
+        else:
             raise ProcedureError(f"there is nothing to redo ({self.state})")
-        self._clear_cursor()
-        self._send_projections(self._drawn_shift_m)  # `apply` may have failed for one eye only
-        self.state = State.SHOW_HAND
-        self._store_alignments()
+
+    def delete_alignment(self, number: int) -> None:
+        """Leave out an alignment, and the results with it.
+
+        Raises
+        ------
+        ProcedureError
+            While a cursor is being aligned or projections are being applied.
+        ValueError
+            If there is none of that number.
+        FileError
+            If the session cannot be written; the alignment is left out all the same.
+        """
+        self._require_settled()
+        self._shelf.delete(number)
+        self._forget_results()
+        self._store(lambda session: session.delete_alignment(number))
+
+    def restore_alignment(self, number: int) -> None:
+        """Take back the deletion of an alignment; the results go all the same.
+
+        Raises as `delete_alignment`.
+        """
+        self._require_settled()
+        self._shelf.restore(number)
+        self._forget_results()
+        self._store(lambda session: session.restore_alignment(number))
 
     def solve(self) -> Results:
         """Solve all alignments so far.
@@ -310,12 +386,10 @@ class Calibration:
             raise ProcedureError("wait until the projections are applied")
         if not self.alignments or self.state is State.ALIGN:
             raise ProcedureError("align the hand with the cursor first")
-        self.results = solve_session(self.alignments, self.rig, self._settings.solve)
+        results = self._solve()
         self.state = State.SOLVED
-        self._store_alignments()
-        if self._session is not None:
-            self._session.save_results(results_json(self.results))
-        return self.results
+        self._store(lambda session: session.save_results(results_json(results)))
+        return results
 
     def apply(self) -> None:
         """Send the solved projections to the headset and take the cursor away.
@@ -328,10 +402,27 @@ class Calibration:
         if self.results is None or self.state is not State.SOLVED:
             raise ProcedureError("solve first")
         self._clear_cursor()
-        self._sent = self._send_projections(
-            {eye: shift.shift_m for eye, shift in self.results.shifts.items()}
-        )
+        self._send_projections(self._solved_shift_m())
+        self._apply_until_s = time.monotonic() + self._settings.apply_timeout_s
         self.state = State.APPLYING
+
+    def poll_applied(self) -> bool:
+        """Tell, without waiting, whether the headset has acknowledged every projection by now.
+
+        Raises
+        ------
+        ProcedureError
+            If nothing was sent.
+        LinkError
+            If the link has given one up, or the time set is over; `apply` may be called again.
+        FileError
+            If the session cannot be written; the projections are applied all the same.
+        """
+        is_pending = any(message.state is Delivery.PENDING for message in self._sent.values())
+        if self.state is State.APPLYING and is_pending and time.monotonic() < self._apply_until_s:
+            return False
+        self.wait_applied(0.0)
+        return True
 
     def wait_applied(self, timeout_s: float = 5.0) -> None:
         """Wait until the headset has acknowledged every projection.
@@ -345,32 +436,92 @@ class Calibration:
         FileError
             If the session cannot be written; the projections are applied all the same.
         """
-        if self.state is not State.APPLYING or self.results is None:
+        if self.state is not State.APPLYING:
             raise ProcedureError("apply first")
         deadline_s = time.monotonic() + timeout_s
         try:
-            for handle in self._sent:
-                self._link.wait_acked(handle, max(0.0, deadline_s - time.monotonic()))
+            for message in self._sent.values():
+                self._link.wait_acked(message, max(0.0, deadline_s - time.monotonic()))
         except HandcalError:
             self.state = State.SOLVED
             raise
-        for eye, shift in self.results.shifts.items():
-            self._drawn_shift_m[eye] = shift.shift_m
+        applied_m = self._solved_shift_m()
+        self._shift_m |= applied_m
         self.state = State.APPLIED
-        if self._session is not None:
-            self._session.save_applied(
-                {eye: shift.shift_m for eye, shift in self.results.shifts.items()}
-            )
+        self._store(lambda session: session.save_applied(applied_m))
+
+    def set_shift(self, shifts_m: Mapping[Eye, ArrayLike]) -> list[Outgoing]:
+        """Let the headset render with φ set by hand, from now on; an eye not given keeps its own.
+
+        Returns
+        -------
+        list of Outgoing
+            The projections on their way.
+
+        Raises
+        ------
+        ProcedureError
+            While there is a cursor or an alignment that has not been applied yet.
+        ValueError
+            If a φ is not three finite numbers up to 30 mm.
+        LinkError
+            If the link is closed.
+        """
+        if self.state not in (State.SHOW_HAND, State.APPLIED):
+            raise ProcedureError(f"φ cannot be set by hand now ({self.state}): solve and apply")
+        shifts = read_shifts(shifts_m)
+        for eye, shift_m in shifts.items():
+            if np.abs(shift_m).max() > MAX_HAND_SET_SHIFT_M:
+                limit_mm = 1e3 * MAX_HAND_SET_SHIFT_M
+                raise ValueError(f"φ of the {eye} eye must stay within ±{limit_mm:g} mm")
+        self._shift_m |= shifts
+        return self._send_projections(shifts)
+
+    def record_shift(self) -> None:
+        """Note in the session that the φ set by hand has settled; FileError if it cannot be."""
+        settled_m = self.applied_shift_m
+        self._store(lambda session: session.save_fine_tuned(settled_m))
+
+    def _resume(self, record: SessionRecord) -> None:
+        """Go on where a session ended: what was on its way then has to be done again."""
+        self._shelf.kept = dict(zip(record.alignment_numbers, record.alignments, strict=True))
+        self._shelf.deleted = dict(record.deleted)
+        self._shift_m |= record.applied_shift_m
+        if record.is_solved:
+            self._solve()
+            self.state = State.APPLIED if record.is_applied else State.SOLVED
+        elif record.alignments:
+            self.state = State.ALIGNED
+
+    def _solve(self) -> Results:
+        self.results = solve_session(self.alignments, self.rig, self._settings.solve)
+        return self.results
+
+    def _solved_shift_m(self) -> dict[Eye, Float64]:
+        assert self.results is not None
+        return {eye: shift.shift_m for eye, shift in self.results.shifts.items()}
+
+    def _require_settled(self) -> None:
+        if self.state in (State.ALIGN, State.APPLYING):
+            raise ProcedureError(f"alignments cannot be changed now ({self.state})")
+
+    def _forget_results(self) -> None:
+        self.results = None
+        if self.state is not State.APPLIED:
+            self._show_hand_again()
+
+    def _show_hand_again(self) -> None:
+        self._clear_cursor()
+        self._send_projections(self._shift_m)  # `apply` may have failed for one eye only
+        self.state = State.SHOW_HAND
 
     def _send_projections(self, shifts_m: Mapping[Eye, Float64]) -> list[Outgoing]:
-        sent = []
         for eye, shift_m in shifts_m.items():
             display = self.rig.eyes[eye]
             P = projection_matrix(display, shift_m)
-            sent.append(
-                self._link.send_projection(Projection(eye, P, display.width_px, display.height_px))
-            )
-        return sent
+            projection = Projection(eye, P, display.width_px, display.height_px)
+            self._sent[eye] = self._link.send_projection(projection)
+        return [self._sent[eye] for eye in shifts_m]
 
     def _forget_hands(self) -> None:
         """Let go of what is too old for a confirmation, and for telling whether it is steady."""
@@ -458,9 +609,10 @@ class Calibration:
         if self._is_over(rotation_W):
             self.refused += 1
             limit_deg = np.degrees(self._settings.guard.limit_rad)
+            advice = turn_advice(hand.T_W_D[:3, :3].T @ rotation_W)
             self._refuse(
                 f"Your hand is turned by {angle_deg:.1f}°, more than {limit_deg:g}°. "
-                "Turn it as the cursor is and confirm again.",
+                f"{advice.text} and confirm again.",
                 "turned",
                 angle_deg,
             )
@@ -475,11 +627,12 @@ class Calibration:
             rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
             t_a_ns=self._cursor.cloud.t_camera_ns,
             t_b_ns=hand.cloud.t_camera_ns,
-            drawn_shift_m=dict(self._drawn_shift_m),
+            drawn_shift_m=dict(self._shift_m),
         )
-        self.alignments.append(alignment)
+        self._shelf.save(self._shelf.next_number(), alignment)
         self.state = State.ALIGNED
-        self._store_alignments()
+        self.refusal = ""
+        self._store(lambda session: session.save_alignment(alignment))
 
     def _hand_at(self, t_host_ns: int) -> PlacedHand:
         """Return the hand nearest in time."""
@@ -489,20 +642,11 @@ class Calibration:
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
-    def _store_alignments(self) -> None:
-        """Bring the session up to date, with what could not be written before."""
-        if self._session is None:
-            return
-        while self._stored != self.alignments[: len(self._stored)]:
-            self._session.drop_alignment()
-            self._stored.pop()
-        for alignment in self.alignments[len(self._stored) :]:
-            self._session.save_alignment(alignment)
-            self._stored.append(alignment)
-
     def _refuse(self, prompt: str, reason: str, angle_deg: float | None = None) -> None:
+        self.refusal = prompt
         self._link.send_prompt(prompt, self.eyes)
-        self._record("refused", reason=reason, angle_deg=angle_deg, cursor_id=self._cursor_id)
+        refused = {"reason": reason, "angle_deg": angle_deg, "cursor_id": self._cursor_id}
+        self._store(lambda session: session.record("refused", **refused))
 
     def _rotation(self, hand: PlacedHand) -> Float64:
         assert self._guard is not None
@@ -513,15 +657,25 @@ class Calibration:
 
     def _clear_cursor(self) -> None:
         self._cursor = self._guard = self._confirmation = None
+        self.refusal = ""
         # The wearer lowers the hand now: only what is seen from here on may become a cursor.
         self._hands.clear()
         self._unplaced.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
 
-    def _record(self, event: str, **data: object) -> None:
-        if self._session is not None:
-            self._session.record(event, **data)
+    def _store(self, write: Callable[[Session], object]) -> None:
+        """Write to the session, after what could not be written before."""
+        if self._session is None:
+            return
+        self._unstored.append(write)
+        while self._unstored:
+            oldest = self._unstored.popleft()
+            try:
+                oldest(self._session)
+            except FileError:
+                self._unstored.appendleft(oldest)
+                raise
 
 
 def _align_prompt(eyes: Sequence[Eye]) -> str:

@@ -293,7 +293,7 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     stage.press()
     assert stage.see(T_D_TURNED).state is State.ALIGN
     assert stage.calibration.refused == 1
-    assert stage.calibration.alignments == []
+    assert stage.calibration.alignments == ()
     eventually(lambda: "turned by" in stage.shown().prompt)
     assert "more than 9°" in stage.shown().prompt
     name, data = events(session)[-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +14,24 @@ from handcal.register.solve import check_cloud
 from handcal.register.surface import describe_surface
 from handcal.types import Bool, Float64
 
+Axis: TypeAlias = Literal["x", "y", "z"]
+AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
+
 # Mean error with 1.5 mm of noise 0.7° in a few milliseconds, and 0.4° in twice the time.
 _LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
 _ONCE = RigidSettings(max_points=800, max_interior=400, tolerance_m=3e-4)
+
+
+# What turns a hand back: about each of D's axes, in the positive and in the negative sense. It is
+# held up before the wearer, who looks as the camera does: x right, y down, z away.
+_ADVICE: dict[Axis, tuple[str, str]] = {
+    "x": ("Tip your fingers toward you", "Tip your fingers away from you"),
+    "y": (
+        "Turn the right edge of your hand toward you",
+        "Turn the right edge of your hand away from you",
+    ),
+    "z": ("Tilt your hand clockwise", "Tilt your hand anticlockwise"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,3 +102,36 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
     """
     guard = RotationGuard(check_cloud("cursor_m", cursor_m), settings=_ONCE)
     return guard.rotation(check_cloud("hand_m", hand_m))
+
+
+@dataclass(frozen=True, slots=True)
+class TurnAdvice:
+    """How to turn the hand back, about the axis about which it is turned most.
+
+    Attributes
+    ----------
+    axis : {"x", "y", "z"}
+        Of the depth camera: pitch, yaw, roll of the hand.
+    angle_rad : float
+        To turn the hand by, right-handed about that axis.
+    text : str
+        In words for the wearer, without the angle or a full stop.
+    """
+
+    axis: Axis
+    angle_rad: float
+    text: str
+
+
+def turn_advice(rotation_rad: ArrayLike) -> TurnAdvice:
+    """Return how to undo a rotation from the cursor to the hand.
+
+    Parameters
+    ----------
+    rotation_rad : (3,) array_like
+        Rotation vector about D's axes, as `RotationGuard.rotation` gives it in D.
+    """
+    back_rad = -np.asarray(rotation_rad, dtype=np.float64)
+    index = int(np.argmax(np.abs(back_rad)))
+    axis, angle_rad = AXES[index], float(back_rad[index])
+    return TurnAdvice(axis, angle_rad, _ADVICE[axis][0 if angle_rad > 0 else 1])
