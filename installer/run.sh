@@ -1,10 +1,17 @@
 #!/usr/bin/env bash
-# Installs what is missing and calibrates the simulated headset, with no hardware or display.
+# Installs what is missing and calibrates a simulated headset, with no hardware: in a window that
+# operates itself, or without one where there is no display.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 export OMP_NUM_THREADS=1 # two threads on two busy cores are slower than one
 output=results/demo
 mkdir -p "$output"
-.venv/bin/handcal demo --seed 1 --eyes each --output "$output" --json "$output/demo.json" "$@"
+if [[ -n ${DISPLAY:-}${WAYLAND_DISPLAY:-} ]]; then
+    .venv/bin/handcal-gui --source simulator --autopilot --output "$output" "$@"
+else
+    .venv/bin/handcal demo --seed 1 --eyes each --output "$output" --json "$output/demo.json" "$@"
+    session=$(.venv/bin/python -c "import json, sys; print(json.load(open(sys.argv[1]))['session'])" "$output/demo.json")
+    .venv/bin/handcal export "$session" --output "$output/export"
+fi
 echo "Results: $root/$output"

@@ -9,10 +9,15 @@ fail() {
     exit 1
 }
 
-# What the wheels load from the system: librealsense needs libusb and udev, Open3D needs OpenGL.
+# What the wheels load from the system: librealsense needs libusb and udev, Open3D and Qt need
+# OpenGL, and Qt's windows the libraries of X11. A caller may ask for more in test_packages.
 apt_packages=(
     python3 python3-venv
     libusb-1.0-0 libudev1 libgl1 libegl1 libx11-6 libidn2-0
+    libglib2.0-0 libfontconfig1 libdbus-1-3 libxkbcommon0 libxkbcommon-x11-0 fonts-dejavu-core
+    libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0
+    libxcb-shape0 libxcb-xkb1 libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libx11-xcb1
+    ${test_packages[@]+"${test_packages[@]}"}
 )
 
 install_system_packages() {

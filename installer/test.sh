@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what is missing and passes every check.
 set -euo pipefail
+test_packages=(xvfb xauth xdotool poppler-utils) # real windows on a virtual screen, and PDF pages
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 export OMP_NUM_THREADS=1 # two threads on two busy cores are slower than one
