@@ -34,7 +34,7 @@ def write_rig(path: Path, rig: Rig) -> None:
     check_rig(rig)
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.write("handcal_rig", RIG_VERSION)
-    storage.write("name", _quoted(rig.name))
+    storage.write("name", quoted(rig.name))
     for eye in EYES:
         display = rig.eyes[eye]
         storage.startWriteStruct(eye, cv2.FileNode_MAP)
@@ -81,7 +81,7 @@ def read_rig(path: Path) -> Rig:
     return rig
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     """Quote a text: OpenCV leaves plain words as they are, and reads ``true`` as no text."""
     escaped = text.replace("\\", r"\\").replace('"', r"\"")
     return f'"{escaped}"'

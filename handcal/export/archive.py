@@ -1,0 +1,81 @@
+"""The session folder as one zip file, which extracted is the session again."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from handcal.errors import FileError
+from handcal.session import SessionRecord
+
+MAX_ARCHIVE_BYTES = 4 * 2**30
+_CHUNK_BYTES = 2**19
+
+
+def write_archive(
+    path: Path, record: SessionRecord, excluded: Path, checkpoint: Callable[[float], None]
+) -> None:
+    """Write a session's folder as a zip file, under its own name.
+
+    Equal sessions give equal bytes: files come in order, without their times. Locks, hidden and
+    temporary files, links, and what the journal gained since the record was read stay out.
+
+    Parameters
+    ----------
+    path : Path
+    record : SessionRecord
+    excluded : Path
+        A folder that is left out if it lies in the session's: where exports go.
+    checkpoint : callable
+        Told the share done, every half megabyte at the latest; what it raises ends the writing.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read or written, or there are more than 4 GiB.
+    """
+    folder = record.path.absolute()
+    try:
+        sizes = {file: file.stat().st_size for file in _files(folder, excluded.absolute())}
+        sizes[folder / "journal.jsonl"] = record.journal_bytes
+        total_bytes = sum(sizes.values())
+        if total_bytes > MAX_ARCHIVE_BYTES:
+            raise FileError(
+                f"{folder} holds {total_bytes:,} bytes, more than the {MAX_ARCHIVE_BYTES:,} "
+                "that fit in one zip file; copy the folder instead"
+            )
+        with path.open("xb") as stream:
+            done_bytes = 0
+            with zipfile.ZipFile(stream, "w") as archive:
+                for file, left_bytes in sizes.items():
+                    entry = _entry(file.relative_to(folder.parent))
+                    with file.open("rb") as source, archive.open(entry, "w") as target:
+                        while chunk := source.read(min(left_bytes, _CHUNK_BYTES)):
+                            target.write(chunk)
+                            left_bytes -= len(chunk)
+                            done_bytes += len(chunk)
+                            checkpoint(done_bytes / total_bytes)
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _files(folder: Path, excluded: Path) -> Iterator[Path]:
+    """Yield the files of a session, in order."""
+    for path in sorted(folder.iterdir()):
+        if path.is_symlink() or path.name.startswith(".") or path.absolute() == excluded:
+            continue
+        if path.is_dir():
+            yield from _files(path, excluded)
+        elif path.is_file() and path.name != "lock":
+            yield path
+
+
+def _entry(name: Path) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name.as_posix())  # of 1980: equal bytes whenever it is written
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    entry.external_attr = 0o644 << 16
+    return entry

@@ -1,0 +1,37 @@
+"""The clouds of every alignment as PLY files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from handcal.export.outcome import Outcome
+from handcal.files import make_folder, write_ply
+
+
+def write_clouds(folder: Path, outcome: Outcome, checkpoint: Callable[[float], None]) -> None:
+    """Write ``alignment-N-cursor.ply`` and ``alignment-N-hand.ply`` for each alignment.
+
+    Points are doubles in W, in metres; `is_cut` is 1 beside a cut edge. The hand's
+    `residual_left_m` and `residual_right_m`, where solved, are each point's distance to its
+    partner on the cursor, NaN for an outlier.
+    """
+    make_folder(folder)
+    record = outcome.record
+    solved = outcome.results.alignments if outcome.results else ()
+    numbered = zip(record.alignment_numbers, record.alignments, solved, strict=True)
+    for done, (number, alignment, shifts) in enumerate(numbered):
+        checkpoint(done / len(solved))
+        write_ply(
+            folder / f"alignment-{number}-cursor.ply",
+            alignment.cursor_m,
+            properties={"is_cut": alignment.cursor_is_cut.astype(np.uint8)},
+        )
+        residuals_m = {f"residual_{eye}_m": shift.residuals_m for eye, shift in shifts.items()}
+        write_ply(
+            folder / f"alignment-{number}-hand.ply",
+            alignment.hand_m,
+            properties={"is_cut": alignment.hand_is_cut.astype(np.uint8)} | residuals_m,
+        )

@@ -1,0 +1,52 @@
+"""What the words and symbols of the report mean."""
+
+DEFINITIONS = {
+    "φ = (φ₁, φ₂, φ₃)": (
+        "Where the wearer's eye is, from where the viewpoint camera of the offline calibration "
+        "was: to the right, down and forward, along the axes of E."
+    ),
+    "± σ": (
+        "One standard deviation, from the covariance's diagonal. For the method “consistent” it "
+        "covers the registration, and fused also how exactly people align. For each alignment by "
+        "another method it is plain least squares with independent pairs, which is optimistic."
+    ),
+    "fused": (
+        "All alignments together, weighed by their covariances, with what is known before: the "
+        "size of the eye box, and how far the φ of two eyes differ."
+    ),
+    "final, applied": (
+        "The final φ is the one tuned by hand where there is one, else the solved one. It is "
+        "applied if the headset acknowledged it and rendered with it in the end."
+    ),
+    "expected error": (
+        "What φ's covariance leads to in the display: root mean square at the corners of an 8 cm "
+        "square straight ahead at half a metre, in arcminutes (′, a sixtieth of a degree)."
+    ),
+    "eye distance": "Distance between the two solved eyes, from φ and the rig.",
+    "residual, RMS": (
+        "Distance of a hand point to its partner on the cursor after registration; RMS over the "
+        "inliers of all alignments."
+    ),
+    "inliers": (
+        "Share of the hand's points whose partner is near, and not beside a cut edge such as the "
+        "forearm's."
+    ),
+    "rotation": "By how much the hand was turned against the cursor at the confirmation.",
+    "reprojection error": (
+        "In the user test: distance in the display between a corner of the target drawn with the "
+        "calibrated φ and with the φ that was adjusted by hand until the drawn target covered the "
+        "real one."
+    ),
+    "W, H, D": "Frames: the world, the headset's rig, the depth camera.",
+    "C0, C1": "The viewpoint of the offline calibration, and the wearer's eye.",
+    "E, S, V": (
+        "The ideal on-axis eye-display camera at C0, the display's focal plane, and the headset's "
+        "rendering camera. Axes: x right, y down, z forward."
+    ),
+    "method": (
+        "Hu, Rodriguez y Baena, Cutolo: Rotation-constrained optical see-through headset "
+        "calibration with bare-hand alignment. ISMAR 2021. “paper” is its solver as published; "
+        "“linear” the same model with all equations of each pair; “consistent” the exact model, "
+        "robust to cut edges and a turned hand; “icp” the rigid baseline."
+    ),
+}

@@ -1,0 +1,151 @@
+"""A session's export: the formats asked for, made together and put in place at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+from handcal.errors import CancelledError
+from handcal.export.archive import write_archive
+from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
+from handcal.export.clouds import write_clouds
+from handcal.export.outcome import Outcome, conclude
+from handcal.export.staging import Staging
+from handcal.export.tables import write_parameters, write_trials
+from handcal.session import SessionRecord
+
+Format: TypeAlias = Literal["report", "csv", "yaml", "json", "ply", "zip"]
+
+
+@dataclass(frozen=True, slots=True)
+class FormatInfo:
+    """What a format is called, and the patterns of its files' names in the export's folder."""
+
+    title: str
+    patterns: tuple[str, ...]
+
+
+FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
+    {
+        "report": FormatInfo("Report (PDF)", ("report.pdf",)),
+        "csv": FormatInfo("Parameters and trials (CSV)", ("parameters.csv", "trials.csv")),
+        "yaml": FormatInfo("Calibration (OpenCV YAML)", ("calibration.yaml",)),
+        "json": FormatInfo(
+            "Matrices for OpenCV, OpenGL, Unity, OpenXR (JSON)", ("calibration.json",)
+        ),
+        "ply": FormatInfo(
+            "Clouds (PLY)", ("clouds/alignment-*-cursor.ply", "clouds/alignment-*-hand.ply")
+        ),
+        "zip": FormatInfo("Whole session (ZIP)", ("session.zip",)),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ExportSettings:
+    """What is exported.
+
+    Attributes
+    ----------
+    formats : tuple of str
+        Some of `FORMATS`.
+    near_m, far_m : float
+        Clipping distances of the OpenGL and Unity matrices.
+    """
+
+    formats: tuple[Format, ...] = tuple(FORMATS)
+    near_m: float = 0.1
+    far_m: float = 100.0
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.formats if name not in FORMATS]
+        if unknown or not self.formats:
+            raise ValueError(f"choose formats from {', '.join(FORMATS)}")
+        if not 0.0 < self.near_m < self.far_m < float("inf"):
+            raise ValueError(
+                f"0 < near_m < far_m is needed, got {self.near_m:g} and {self.far_m:g}"
+            )
+
+
+def export_session(
+    record: SessionRecord,
+    folder: Path,
+    settings: ExportSettings,
+    report: Callable[[str, float], None],
+    is_cancelled: Callable[[], bool],
+) -> tuple[Path, ...]:
+    """Export a session into a folder, and return the files.
+
+    The files appear together when all are complete, and replace those of an earlier export of the
+    same formats; whatever goes wrong before leaves the folder as it was.
+
+    Parameters
+    ----------
+    record : SessionRecord
+    folder : Path
+        Created if needed. Two sessions need two folders: the names of the files are fixed.
+    settings : ExportSettings
+    report : callable
+        Told what is being made and which share of the whole is done, 0..1.
+    is_cancelled : callable
+        Asked every few tenths of a second whether to give up.
+
+    Raises
+    ------
+    CancelledError
+        If `is_cancelled`.
+    FileError
+        If the session cannot be solved, or a file cannot be written or replaced.
+    """
+
+    def checkpoint(what: str, share: float) -> None:
+        if is_cancelled():
+            raise CancelledError("the export was cancelled; nothing has changed")
+        report(what, share)
+
+    formats = [name for name in FORMATS if name in settings.formats]
+    with Staging(folder) as staging:
+        checkpoint("Solving the alignments again", 0.0)
+        outcome = conclude(record)
+        for done, name in enumerate(formats, 1):
+
+            def part(share: float, done: int = done, name: Format = name) -> None:
+                checkpoint(FORMATS[name].title, (done + share) / (len(formats) + 1))
+
+            part(0.0)
+            _write(name, outcome, staging.path, folder, settings, part)
+        checkpoint("Moving the files in place", 1.0)
+        return staging.publish([pattern for name in formats for pattern in FORMATS[name].patterns])
+
+
+def _write(
+    name: Format,
+    outcome: Outcome,
+    place: Path,
+    folder: Path,
+    settings: ExportSettings,
+    checkpoint: Callable[[float], None],
+) -> None:
+    """Write the files of one format into `place`, which are meant for `folder`."""
+    match name:
+        case "report":
+            from handcal.export.report import write_report  # matplotlib takes a second
+
+            checkpoint(0.1)
+            write_report(place / "report.pdf", outcome, checkpoint)
+        case "csv":
+            write_parameters(place / "parameters.csv", outcome)
+            write_trials(place / "trials.csv", outcome)
+        case "yaml":
+            write_calibration_yaml(place / "calibration.yaml", outcome)
+        case "json":
+            write_calibration_json(
+                place / "calibration.json", outcome, settings.near_m, settings.far_m
+            )
+        case "ply":
+            write_clouds(place / "clouds", outcome, checkpoint)
+        case "zip":
+            write_archive(place / "session.zip", outcome.record, folder, checkpoint)

@@ -1,0 +1,268 @@
+"""The report's figures, each drawn into axes that it is given.
+
+Left and right differ in colour, marker and line, so that the report also reads in grey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from handcal.display import eye_projection
+from handcal.export.outcome import Outcome
+from handcal.geometry import project, transform
+from handcal.results import Results
+from handcal.trial import Trial
+from handcal.types import EYES, Alignment, Eye, EyeDisplay, EyeShift, Float64
+
+_COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
+_MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
+_LINES: Mapping[Eye, str] = {"left": "-", "right": "--"}
+_HAND, _CURSOR = "#0072B2", "#D55E00"
+_LABEL_PT, _TITLE_PT = 7.5, 8.5
+# An outline is sought in a mask in which a display's longer side is so long, and gaps between
+# points are closed.
+_MASK_PX, _GAP_PX = 1000, 17
+_AROUND_DISPLAY = 0.12
+
+
+def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Results) -> None:
+    """Draw how the registration error of each alignment fell, one pair of axes for each eye."""
+    for ax, eye in zip(axes, EYES, strict=True):
+        for number, shifts in zip(numbers, results.alignments, strict=True):
+            if eye in shifts:
+                rms_mm = 1e3 * np.sqrt(shifts[eye].history_m2)
+                steps = np.arange(1, len(rms_mm) + 1)
+                ax.plot(steps, rms_mm, ".-", linewidth=0.8, markersize=3, label=f"{number}")
+        ax.set_ylim(bottom=0.0)
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        _name(ax, f"{eye} eye", "iteration", "RMS pair distance, mm")
+        if 0 < len(ax.lines) <= 8:
+            ax.legend(title="alignment", fontsize=6.5, title_fontsize=6.5, frameon=False)
+
+
+def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> None:
+    """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
+    count = len(results.alignments)
+    for component, ax in enumerate(axes):
+        for eye in EYES:
+            offset = -0.12 if eye == "left" else 0.12
+            each = {
+                place + offset: shifts[eye]
+                for place, shifts in enumerate(results.alignments, 1)
+                if eye in shifts
+            }
+            if eye in results.shifts:
+                each[count + 1 + offset] = results.shifts[eye]
+            ax.errorbar(
+                list(each),
+                [1e3 * shift.shift_m[component] for shift in each.values()],
+                [1e3 * _sigma_m(shift)[component] for shift in each.values()],
+                fmt=_MARKERS[eye],
+                color=_COLORS[eye],
+                markersize=4,
+                linewidth=1.0,
+                capsize=2,
+                label=eye,
+            )
+            if "fine_tuned" in outcome.shifts_m[eye]:
+                tuned_mm = 1e3 * outcome.shifts_m[eye]["fine_tuned"][component]
+                ax.plot(count + 2 + offset, tuned_mm, _MARKERS[eye], color=_COLORS[eye], mfc="none")
+        ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
+        ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
+        ax.set_xlim(0.5, count + 2.5)
+        shown = range(0, count, max(1, -(-count // 8)))
+        names = [str(outcome.record.alignment_numbers[index]) for index in shown]
+        ax.set_xticks(
+            [*(index + 1 for index in shown), count + 1, count + 2], [*names, "fused", "tuned"]
+        )
+        _name(ax, f"φ{'₁₂₃'[component]}", "alignment", "mm")
+    axes[0].legend(fontsize=6.5, frameon=False)
+
+
+def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results) -> None:
+    """Draw φ1 and φ2 of every alignment and fused with their 1σ ellipses, axes for each eye."""
+    for ax, eye in zip(axes, EYES, strict=True):
+        for number, shifts in zip(numbers, results.alignments, strict=True):
+            if eye in shifts:
+                _ellipse(ax, shifts[eye], "0.45", linewidth=0.8)
+                x_mm, y_mm, _ = 1e3 * shifts[eye].shift_m
+                ax.text(x_mm, y_mm, f"{number}", fontsize=6.5, color="0.3", ha="center")
+        if eye in results.shifts:
+            _ellipse(ax, results.shifts[eye], _COLORS[eye], linewidth=1.6)
+            ax.plot(*(1e3 * results.shifts[eye].shift_m[:2]), "+", color=_COLORS[eye])
+        ax.plot(0.0, 0.0, "x", color="black", markersize=5)
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.margins(0.08)
+        ax.invert_yaxis()
+        _name(ax, f"{eye} eye", "φ₁, mm (to the right)", "φ₂, mm (down)")
+
+
+def draw_residuals(
+    ax: Axes, alignment: Alignment, eye: Eye, shift: EyeShift, most_mm: float
+) -> None:
+    """Draw the hand as the eye faces it, each point coloured by its residual; outliers crossed."""
+    x_mm, y_mm, _ = 1e3 * transform(alignment.T_E_W[eye], alignment.hand_m).T
+    residual_mm = 1e3 * shift.residuals_m
+    is_outlier = np.isnan(residual_mm)
+    ax.scatter(
+        x_mm[is_outlier],
+        y_mm[is_outlier],
+        marker="x",
+        s=3,
+        color="0.6",
+        linewidth=0.3,
+        rasterized=True,
+    )
+    colored = ax.scatter(
+        x_mm[~is_outlier],
+        y_mm[~is_outlier],
+        c=residual_mm[~is_outlier],
+        s=1.2,
+        linewidth=0.0,
+        cmap="viridis",
+        norm=Normalize(0.0, most_mm, clip=True),
+        rasterized=True,
+    )
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.invert_yaxis()
+    _color_bar(ax, colored)
+
+
+def draw_overlay(
+    ax: Axes, display: EyeDisplay, alignment: Alignment, eye: Eye, eye_shift_m: Float64
+) -> None:
+    """Draw what an eye at one place saw at the moment of an alignment, in the display's pixels.
+
+    The hand as the eye sees it through the display, and the cursor as the headset drew it.
+    """
+    hand_E, cursor_E = (
+        transform(alignment.T_E_W[eye], points) for points in (alignment.hand_m, alignment.cursor_m)
+    )
+    seen = project(eye_projection(display, eye_shift_m), hand_E)
+    drawn = project(eye_projection(display, alignment.drawn_shift_m[eye]), cursor_E)
+    for outline in _outlines(seen, display):
+        ax.fill(*outline.T, facecolor=_HAND, alpha=0.25, linewidth=0.0)
+        ax.plot(*outline.T, color=_HAND, linewidth=0.6)
+    for outline in _outlines(drawn, display):
+        ax.plot(*outline.T, color=_CURSOR, linewidth=1.0, linestyle=(0, (4, 1.5)))
+    width, height = display.width_px, display.height_px
+    ax.add_patch(Rectangle((-0.5, -0.5), width, height, fill=False, linewidth=0.6))
+    ax.set_xlim(-_AROUND_DISPLAY * width, (1 + _AROUND_DISPLAY) * width)
+    ax.set_ylim((1 + _AROUND_DISPLAY) * height, -_AROUND_DISPLAY * height)
+    ax.set_aspect("equal")
+
+
+def draw_trial_errors(axes: Sequence[Axes], trials: Sequence[Trial]) -> None:
+    """Draw box plots of the corners' errors by distance and eye: in pixels, and in arcminutes."""
+    depths_m = sorted({trial.target_depth_m for trial in trials})
+    for ax, name, unit in zip(axes, ("error_px", "error_arcmin"), ("px", "arcmin"), strict=True):
+        for eye in EYES:
+            offset = -0.18 if eye == "left" else 0.18
+            for place, depth_m in enumerate(depths_m):
+                errors = [
+                    getattr(trial, name)
+                    for trial in trials
+                    if (trial.eye, trial.target_depth_m) == (eye, depth_m)
+                ]
+                if errors:
+                    ax.boxplot(
+                        np.concatenate(errors),
+                        positions=[place + offset],
+                        widths=0.28,
+                        boxprops={"color": _COLORS[eye], "linestyle": _LINES[eye]},
+                        medianprops={"color": _COLORS[eye], "linewidth": 1.6},
+                        whiskerprops={"color": _COLORS[eye]},
+                        capprops={"color": _COLORS[eye]},
+                        flierprops={"marker": _MARKERS[eye], "markersize": 2.5},
+                    )
+        for eye in EYES:
+            ax.plot([], [], _LINES[eye], color=_COLORS[eye], label=f"{eye} eye")
+        ax.set_xticks(range(len(depths_m)), [f"{depth_m:g}" for depth_m in depths_m])
+        ax.set_xlim(-0.6, len(depths_m) - 0.4)
+        ax.set_ylim(bottom=0.0)
+        _name(ax, f"reprojection error, {unit}", "distance of the target, m", unit)
+    axes[0].legend(fontsize=6.5, frameon=False)
+
+
+def draw_running_mean(ax: Axes, numbers: Sequence[int], trials: Sequence[Trial]) -> None:
+    """Draw each trial's mean error and the mean of all so far, by eye."""
+    for eye in EYES:
+        errors = {
+            number: float(trial.error_arcmin.mean())
+            for number, trial in zip(numbers, trials, strict=True)
+            if trial.eye == eye
+        }
+        if errors:
+            means = np.cumsum(list(errors.values())) / np.arange(1, len(errors) + 1)
+            color, label = _COLORS[eye], f"{eye}, mean so far"
+            ax.plot(list(errors), list(errors.values()), _MARKERS[eye], color=color, markersize=3)
+            ax.plot(list(errors), means, _LINES[eye], color=color, label=label)
+    ax.set_ylim(bottom=0.0)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    _name(ax, "mean error so far", "trial", "arcmin")
+    ax.legend(fontsize=6.5, frameon=False)
+
+
+def _name(ax: Axes, title: str, x: str, y: str) -> None:
+    ax.set_title(title, fontsize=_TITLE_PT, loc="left")
+    ax.set_xlabel(x, fontsize=_LABEL_PT)
+    ax.set_ylabel(y, fontsize=_LABEL_PT)
+
+
+def _sigma_m(shift: EyeShift) -> Float64:
+    return np.asarray(np.sqrt(np.diag(shift.covariance_m2)))
+
+
+def _ellipse(ax: Axes, shift: EyeShift, color: str, linewidth: float) -> None:
+    """Add the 1σ ellipse of φ1 and φ2."""
+    variances, directions = np.linalg.eigh(1e6 * shift.covariance_m2[:2, :2])
+    width_mm, height_mm = 2.0 * np.sqrt(variances)
+    ax.add_patch(
+        Ellipse(
+            tuple(1e3 * shift.shift_m[:2]),
+            width_mm,
+            height_mm,
+            angle=float(np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))),
+            fill=False,
+            edgecolor=color,
+            linewidth=linewidth,
+        )
+    )
+
+
+def _color_bar(ax: Axes, colored: ScalarMappable) -> None:
+    inset = ax.inset_axes((0.97, 0.1, 0.025, 0.8))
+    bar = ax.figure.colorbar(colored, cax=inset, extend="max")
+    bar.ax.tick_params(labelsize=6.0, pad=1, length=2)
+    bar.set_label("mm", fontsize=6.0, labelpad=1)
+
+
+def _outlines(pixels: Float64, display: EyeDisplay) -> list[Float64]:
+    """Return the outlines, each (N, 2) px and closed, of what a cloud covers on a display.
+
+    As far as it lies within the display's own size around it.
+    """
+    size = np.array([display.width_px, display.height_px])
+    scale = _MASK_PX / size.max()
+    width, height = np.ceil(3 * scale * size).astype(int)
+    placed = scale * (pixels + size)
+    inside = ((placed >= 0) & (placed <= [width - 1, height - 1])).all(axis=1)  # NaN is not
+    columns, rows = np.rint(placed[inside]).astype(int).T
+    mask = np.zeros((height, width), np.uint8)
+    mask[rows, columns] = 255
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_GAP_PX, _GAP_PX))
+    closed = cv2.erode(cv2.dilate(mask, disc), disc)
+    contours, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    return [
+        np.concatenate([contour, contour[:1]]).reshape(-1, 2) / scale - size
+        for contour in contours
+        if cv2.contourArea(contour) > _GAP_PX**2
+    ]

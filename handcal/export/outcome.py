@@ -1,0 +1,102 @@
+"""What a session came to, worked out once for every format: solved again, and what is applied."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from handcal.calibrate import CalibrationSettings
+from handcal.config import read_settings
+from handcal.display import projection_matrix
+from handcal.errors import FileError
+from handcal.results import Results, SolveSettings, solve_session
+from handcal.session import SessionRecord
+from handcal.types import EYES, Eye, Float64, Projection
+
+Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
+
+# Solved again by another version of NumPy, φ differs by rounding.
+_SAME_M = 1e-7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """A session and its results, with what a stored session does not keep: residuals, histories.
+
+    Attributes
+    ----------
+    record : SessionRecord
+    settings : SolveSettings
+        The session's own.
+    results : Results or None
+        All alignments solved again; None without alignments.
+    shifts_m : mapping of eye to mapping of origin to (3,) float64
+        Every φ there is for an eye, the final one first: fine-tuned by hand, solved, and the
+        offline calibration's zero.
+    """
+
+    record: SessionRecord
+    settings: SolveSettings
+    results: Results | None
+    shifts_m: Mapping[Eye, Mapping[Origin, Float64]]
+
+    @property
+    def name(self) -> str:
+        """The session's name: that of its folder."""
+        return self.record.path.absolute().name
+
+    @property
+    def started(self) -> str:
+        """When the session was created, UTC, ISO 8601."""
+        return self.record.events[0].time
+
+    def final(self, eye: Eye) -> Origin:
+        """Return which φ is the eye's final one."""
+        return next(iter(self.shifts_m[eye]))
+
+    def final_shift_m(self, eye: Eye) -> Float64:
+        """Return the eye's final φ, (3,)."""
+        return self.shifts_m[eye][self.final(eye)]
+
+    def is_applied(self, eye: Eye, origin: Origin) -> bool:
+        """Tell whether the headset rendered with one of the eye's φ in the end."""
+        last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
+        return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < _SAME_M)
+
+    def projection(self, eye: Eye, origin: Origin) -> Projection:
+        """Return what the headset renders an eye with for one of its φ."""
+        display = self.record.rig.eyes[eye]
+        P = projection_matrix(display, self.shifts_m[eye][origin])
+        return Projection(eye, P, display.width_px, display.height_px)
+
+
+def conclude(record: SessionRecord) -> Outcome:
+    """Solve a session's alignments again, with its own settings.
+
+    Raises
+    ------
+    FileError
+        If its settings are unreadable or an alignment cannot be solved.
+    """
+    settings = read_settings(CalibrationSettings, record.settings.get("calibration", {})).solve
+    results = None
+    if record.alignments:
+        try:
+            results = solve_session(record.alignments, record.rig, settings)
+        except ValueError as error:
+            raise FileError(f"{record.path} cannot be solved: {error}") from error
+    return Outcome(
+        record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
+    )
+
+
+def _shifts_m(record: SessionRecord, results: Results | None, eye: Eye) -> dict[Origin, Float64]:
+    shifts_m: dict[Origin, Float64] = {}
+    if record.fine_tuned is not None and eye in record.fine_tuned:
+        shifts_m["fine_tuned"] = record.fine_tuned[eye]
+    if results is not None and eye in results.shifts:
+        shifts_m["solved"] = results.shifts[eye].shift_m
+    return shifts_m | {"offline": np.zeros(3)}

@@ -1,0 +1,187 @@
+"""Parameters and trials as CSV (RFC 4180, UTF-8), units in the headers.
+
+A text that a spreadsheet would take for a formula gets an apostrophe in front.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handcal.export.outcome import Origin, Outcome
+from handcal.files import write_atomic
+from handcal.register.verdict import expected_error_arcmin
+from handcal.types import EYES, Eye, EyeShift, Float64
+
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+
+_WHOSE = ("session", "wearer")
+_PARAMETERS = (
+    *_WHOSE,
+    "source",
+    "alignment",
+    "eye",
+    "final",
+    "applied",
+    "method",
+    *(f"phi{axis}_mm" for axis in (1, 2, 3)),
+    *(f"sigma{axis}_mm" for axis in (1, 2, 3)),
+    *(f"covariance{pair}_mm2" for pair in (11, 12, 13, 22, 23, 33)),
+    "rms_mm",
+    "inlier_ratio",
+    "iterations",
+    "converged",
+    "stop_reason",
+    "expected_error_arcmin",
+    "verdict",
+    "reason",
+    "eyes_open",
+    "rotation_deg",
+    *(f"drawn_phi{axis}_mm" for axis in (1, 2, 3)),
+)
+_TRIALS = (
+    *_WHOSE,
+    "trial",
+    "time_utc",
+    "eye",
+    "target_depth_m",
+    *(f"calibrated_phi{axis}_mm" for axis in (1, 2, 3)),
+    *(f"adjusted_phi{axis}_mm" for axis in (1, 2, 3)),
+    "corner",
+    *(f"corner_{axis}_m" for axis in "xyz"),
+    "drawn_x_px",
+    "drawn_y_px",
+    "truth_x_px",
+    "truth_y_px",
+    "error_px",
+    "error_arcmin",
+)
+
+
+def write_parameters(path: Path, outcome: Outcome) -> None:
+    """Write each eye's φ: a row for every alignment, for all fused, and for what was set by hand.
+
+    Columns: docs/export.md.
+    """
+    _write(path, _PARAMETERS, outcome, _parameters(outcome))
+
+
+def write_trials(path: Path, outcome: Outcome) -> None:
+    """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
+    _write(path, _TRIALS, outcome, _trials(outcome))
+
+
+def _parameters(outcome: Outcome) -> Iterator[dict[str, Any]]:
+    record, results = outcome.record, outcome.results
+    if results is not None:
+        numbered = zip(record.alignment_numbers, record.alignments, results.alignments, strict=True)
+        for number, alignment, shifts in numbered:
+            for eye, shift in shifts.items():
+                yield {
+                    "source": "alignment",
+                    "alignment": number,
+                    "eye": eye,
+                    **_solved(outcome, eye, shift),
+                    "eyes_open": " ".join(alignment.eyes),
+                    "rotation_deg": float(np.degrees(np.linalg.norm(alignment.rotation_rad))),
+                    **_triple("drawn_phi{}_mm", 1e3 * alignment.drawn_shift_m[eye]),
+                }
+        for eye, shift in results.shifts.items():
+            verdict = results.verdicts[eye]
+            yield {
+                "source": "fused",
+                **_place(outcome, eye, "solved"),
+                **_solved(outcome, eye, shift),
+                "verdict": verdict.name,
+                "reason": verdict.reason,
+            }
+    for eye in EYES:
+        if "fine_tuned" in outcome.shifts_m[eye]:
+            yield {
+                "source": "fine-tuned",
+                **_place(outcome, eye, "fine_tuned"),
+                **_triple("phi{}_mm", 1e3 * outcome.shifts_m[eye]["fine_tuned"]),
+            }
+
+
+def _place(outcome: Outcome, eye: Eye, origin: Origin) -> dict[str, Any]:
+    return {
+        "eye": eye,
+        "final": _yes(outcome.final(eye) == origin),
+        "applied": _yes(outcome.is_applied(eye, origin)),
+    }
+
+
+def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
+    covariance_mm2 = 1e6 * shift.covariance_m2
+    return {
+        "method": outcome.settings.method,
+        **_triple("phi{}_mm", 1e3 * shift.shift_m),
+        **_triple("sigma{}_mm", np.sqrt(np.diag(covariance_mm2))),
+        **{
+            f"covariance{row + 1}{column + 1}_mm2": float(covariance_mm2[row, column])
+            for row, column in zip(*np.triu_indices(3), strict=True)
+        },
+        "rms_mm": 1e3 * shift.rms_m,
+        "inlier_ratio": shift.inlier_ratio,
+        "iterations": shift.iterations,
+        "converged": _yes(shift.converged),
+        "stop_reason": shift.stop_reason,
+        "expected_error_arcmin": expected_error_arcmin(outcome.record.rig.eyes[eye], shift),
+    }
+
+
+def _trials(outcome: Outcome) -> Iterator[dict[str, Any]]:
+    record = outcome.record
+    for number, trial in zip(record.trial_numbers, record.trials, strict=True):
+        for corner in range(len(trial.corners_E_m)):
+            x_m, y_m, z_m = map(float, trial.corners_E_m[corner])
+            yield {
+                "trial": number,
+                "time_utc": trial.time,
+                "eye": trial.eye,
+                "target_depth_m": trial.target_depth_m,
+                **_triple("calibrated_phi{}_mm", 1e3 * trial.calibrated_shift_m),
+                **_triple("adjusted_phi{}_mm", 1e3 * trial.adjusted_shift_m),
+                "corner": corner + 1,
+                "corner_x_m": x_m,
+                "corner_y_m": y_m,
+                "corner_z_m": z_m,
+                "drawn_x_px": float(trial.drawn_px[corner, 0]),
+                "drawn_y_px": float(trial.drawn_px[corner, 1]),
+                "truth_x_px": float(trial.truth_px[corner, 0]),
+                "truth_y_px": float(trial.truth_px[corner, 1]),
+                "error_px": float(trial.error_px[corner]),
+                "error_arcmin": float(trial.error_arcmin[corner]),
+            }
+
+
+def _triple(name: str, values: Float64) -> dict[str, float]:
+    return {name.format(number): float(value) for number, value in enumerate(values, 1)}
+
+
+def _yes(truth: bool) -> str:
+    return "yes" if truth else "no"
+
+
+def _write(
+    path: Path, columns: tuple[str, ...], outcome: Outcome, rows: Iterable[Mapping[str, Any]]
+) -> None:
+    whose = {"session": outcome.name, "wearer": outcome.record.wearer}
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, columns)
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: _cell(value) for name, value in {**whose, **row}.items()})
+    write_atomic(path, stream.getvalue().encode(errors="replace"))
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, str) and value.startswith(_FORMULA_STARTS):
+        return f"'{value}"
+    return value
