@@ -1,0 +1,70 @@
+"""Which points of cursor and hand belong together, quickly enough to be drawn live."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from handcal.geometry import rigid, transform
+from handcal.register.surface import nearest
+from handcal.types import Bool, Float64
+
+Pairs: TypeAlias = NDArray[np.intp]
+
+_CURSOR_POINTS = 1000
+_STEPS = 4
+# As in the solver: a pair farther apart than this many medians is an outlier.
+_OUTLIER_MEDIANS = 3.0
+
+
+def matched_pairs(
+    cursor_m: Float64,
+    hand_m: Float64,
+    rotation_rad: Float64,
+    cursor_is_cut: Bool,
+    count: int = 300,
+) -> Pairs:
+    """Pair points of the hand with those of the cursor that they lie on once laid over it.
+
+    The guard has found the rotation, so only the translation is sought: a coarse registration for
+    the eye. What is solved from has its own (`handcal.register.consistent`).
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (N, 3), (M, 3) float64
+        In one frame.
+    rotation_rad : (3,) float64
+        From the cursor to the hand, about that frame's axes.
+    cursor_is_cut : (N,) bool
+        Points beside a cut edge; pairs that end there are left out, as are outliers.
+    count : int
+        Points of the hand that a partner is sought for.
+
+    Returns
+    -------
+    (K, 2) int
+        Indices into cursor and hand.
+    """
+    cursor_index, hand_index = _thin(len(cursor_m), _CURSOR_POINTS), _thin(len(hand_m), count)
+    if not (len(cursor_index) and len(hand_index)):
+        return np.empty((0, 2), dtype=np.intp)
+    cursor, hand = cursor_m[cursor_index], hand_m[hand_index]
+    back = Rotation.from_rotvec(rotation_rad).inv().as_matrix()
+    moved = transform(rigid(back), hand - hand.mean(axis=0)) + cursor.mean(axis=0)
+    tree = cKDTree(cursor)
+    for _ in range(_STEPS):
+        _, partner = nearest(tree, moved)
+        moved += np.median(cursor[partner] - moved, axis=0)
+    distance_m, partner = nearest(tree, moved)
+    is_kept = ~cursor_is_cut[cursor_index[partner]]
+    is_kept &= distance_m <= _OUTLIER_MEDIANS * np.median(distance_m)
+    return np.column_stack([cursor_index[partner], hand_index])[is_kept]
+
+
+def _thin(length: int, count: int) -> NDArray[np.intp]:
+    """Return about `count` indices below `length`, evenly spread."""
+    return np.arange(0, length, max(1, length // count))
