@@ -83,7 +83,7 @@ def decode_alignment(data: bytes) -> Alignment:
             hand_is_cut=arrays["hand_is_cut"],
             T_E_W=_of_eyes(arrays, "T_E_W"),
             drawn_shift_m=_of_eyes(arrays, "drawn_shift_m"),
-            eyes=tuple(eye for name in arrays["eyes"] for eye in EYES if eye == name),
+            eyes=tuple(map(str, arrays["eyes"])),  # type: ignore[arg-type]
             rotation_rad=arrays["rotation_rad"],
             t_a_ns=t_a_ns,
             t_b_ns=t_b_ns,

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from handcal.register.fuse import FuseSettings, fuse_alignments
+from handcal.register.fuse import FuseSettings, covariances_after_another, fuse_alignments
 from handcal.register.solve import solve_alignment
-from handcal.register.verdict import VerdictSettings, eye_distance_m, judge
+from handcal.register.verdict import (
+    VerdictSettings,
+    expected_error_arcmin,
+    eye_distance_m,
+    judge,
+)
 from handcal.types import Alignment, Eye, EyeShift, Method, Rig, Verdict
 
 RESULTS_VERSION = 1
@@ -45,6 +50,9 @@ class Results:
     verdicts : mapping of eye to Verdict
     eye_distance_m : float or None
         Implied by the shifts; None unless both eyes are solved.
+    expected_after_another_arcmin : mapping of eye to float
+        What `expected_error_arcmin` of the shifts would become with one more alignment like those
+        so far.
     """
 
     method: Method
@@ -52,6 +60,7 @@ class Results:
     shifts: Mapping[Eye, EyeShift]
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
+    expected_after_another_arcmin: Mapping[Eye, float]
 
 
 def solve_session(alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> Results:
@@ -63,13 +72,21 @@ def solve_session(alignments: Sequence[Alignment], rig: Rig, settings: SolveSett
         If there are no alignments, or a cloud cannot be solved.
     """
     solved = [solve_alignment(alignment, rig, settings.method) for alignment in alignments]
-    shifts = fuse_alignments(list(zip(alignments, solved, strict=True)), rig, settings.fuse)
+    pairs = list(zip(alignments, solved, strict=True))
+    shifts = fuse_alignments(pairs, rig, settings.fuse)
+    after_another_m2 = covariances_after_another(pairs, rig, settings.fuse)
     return Results(
         method=settings.method,
         alignments=tuple(solved),
         shifts=shifts,
         verdicts=judge(rig, shifts, settings.verdict),
         eye_distance_m=eye_distance_m(rig, shifts),
+        expected_after_another_arcmin={
+            eye: expected_error_arcmin(
+                rig.eyes[eye], replace(shift, covariance_m2=after_another_m2[eye])
+            )
+            for eye, shift in shifts.items()
+        },
     )
 
 

@@ -216,6 +216,8 @@ class Alignment:
         object.__setattr__(self, "T_E_W", MappingProxyType(poses))
         shifts = {eye: readonly(m, np.float64, (3,)) for eye, m in self.drawn_shift_m.items()}
         object.__setattr__(self, "drawn_shift_m", MappingProxyType(shifts))
+        if not self.eyes or len(set(self.eyes)) < len(self.eyes) or set(self.eyes) - set(EYES):
+            raise ValueError(f"Alignment.eyes: one eye, or each of both once, not {self.eyes}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,6 @@ from PySide6.QtCore import QObject, Signal
 from handcal.calibrate import CalibrationSettings
 from handcal.config import read_settings
 from handcal.errors import FileError
-from handcal.register.verdict import expected_after_another
 from handcal.results import Results, SolveSettings, solve_session
 from handcal.session import Session, SessionRecord
 from handcal_gui.compare import Comparison
@@ -90,11 +89,7 @@ class Review(QObject):
         panels = self._window.panels
         note = "" if stored.results else "It holds no alignment yet."
         self._page.show_session(record, stored.results, note)
-        expected = (
-            expected_after_another(stored.results, record.rig, stored.settings)
-            if stored.results
-            else {}
-        )
+        expected = stored.results.expected_after_another_arcmin if stored.results else {}
         panels.results.show_results(stored.results, record.alignments, record.rig, expected)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)

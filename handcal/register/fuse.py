@@ -84,22 +84,51 @@ def fuse_alignments(
     HandError
         If a cursor lies wholly beside cut edges.
     """
-    if not solved:
-        raise ValueError("at least one alignment is needed")
-    rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
-    estimate_m, joint_m2 = _combine(rows, 1.0, settings)
-    disagreement = _disagreement(rows, estimate_m)
-    if disagreement > 1.0:
-        estimate_m, joint_m2 = _combine(rows, disagreement, settings)
-    took_part = [eye for eye in EYES if any(eye in shifts for _, shifts in solved)]
+    rows, disagreement = _observe_all(solved, rig, settings)
+    estimate_m, joint_m2 = _combine(rows, disagreement, settings)
     return {
         eye: _summarise(
             [shifts[eye] for _, shifts in solved if eye in shifts],
-            estimate_m[3 * EYES.index(eye) :][:3],
-            joint_m2[3 * EYES.index(eye) :, 3 * EYES.index(eye) :][:3, :3],
+            estimate_m[_of(eye)],
+            joint_m2[_of(eye), _of(eye)],
         )
-        for eye in took_part
+        for eye in _took_part(solved)
     }
+
+
+def covariances_after_another(
+    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
+) -> dict[Eye, Float64]:
+    """Return each eye's covariance (3, 3) in m² to expect after one more alignment.
+
+    One that tells as much as those so far do on average, and agrees with them as well. Takes and
+    raises what `fuse_alignments` does.
+    """
+    rows, disagreement = _observe_all(solved, rig, settings)
+    # The same information as of so many alignments more is that of so much less noise.
+    noise = disagreement * len(rows) / (len(rows) + 1)
+    _, joint_m2 = _combine(rows, noise, settings)
+    return {eye: joint_m2[_of(eye), _of(eye)] for eye in _took_part(solved)}
+
+
+def _observe_all(
+    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
+) -> tuple[list[Observed], float]:
+    """Return what every alignment saw, and by how much their noise is to be inflated."""
+    if not solved:
+        raise ValueError("at least one alignment is needed")
+    rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
+    estimate_m, _ = _combine(rows, 1.0, settings)
+    return rows, _disagreement(rows, estimate_m)
+
+
+def _took_part(solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]]) -> list[Eye]:
+    return [eye for eye in EYES if any(eye in shifts for _, shifts in solved)]
+
+
+def _of(eye: Eye) -> slice:
+    """Return an eye's place in [φ_left; φ_right]."""
+    return slice(3 * EYES.index(eye), 3 * EYES.index(eye) + 3)
 
 
 def _combine(
@@ -143,7 +172,7 @@ def _observe(
     seen_m = np.zeros(3)
     for eye, shift in shifts.items():
         weight = np.linalg.solve(total, normals[eye]) @ alignment.T_E_W[eye][:3, :3].T
-        H[:, 3 * EYES.index(eye) :][:, :3] = weight
+        H[:, _of(eye)] = weight
         seen_m += weight @ shift.shift_m
     return H, seen_m, np.mean(list(noises.values()), axis=0)
 
