@@ -1,0 +1,136 @@
+"""What the program remembers from one start to the next, and the file that holds it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, Self, TypeAlias
+
+from PySide6.QtCore import QStandardPaths
+
+from handcal.config import read_settings, settings_json
+from handcal.errors import FileError, HandcalError
+from handcal.export.export import ExportSettings
+from handcal.files import make_folder, read_json, write_json
+from handcal.link.pairing import read_pairing_key, write_pairing_key
+from handcal.station_settings import StationSettings
+from handcal_gui.wizard.steps import EyePlan
+
+Theme: TypeAlias = Literal["system", "light", "dark"]
+_MOST_WEARERS, _MOST_SESSIONS = 20, 8
+
+
+def _default_station() -> StationSettings:
+    documents = QStandardPaths.StandardLocation.DocumentsLocation
+    folder = Path(QStandardPaths.writableLocation(documents)) / "handcal sessions"
+    return StationSettings(sessions=str(folder))
+
+
+@dataclass(frozen=True, slots=True)
+class Preferences:
+    """What the technician chose, to be chosen again.
+
+    Attributes
+    ----------
+    station : StationSettings
+    plan : EyePlan
+        Which eyes are aligned when.
+    wearers, sessions : tuple of str
+        Names, and paths of session folders, the newest first.
+    export : ExportSettings
+    export_folder : str
+        Where the last export went; empty before the first.
+    fine_tune_step_m : float
+    theme : {"system", "light", "dark"}
+    geometry, live_layout, review_layout : str
+        Of the window and of its docks on either page, as Qt gives them, in base64.
+    """
+
+    station: StationSettings = field(default_factory=_default_station)
+    plan: EyePlan = "each"
+    wearers: tuple[str, ...] = ()
+    sessions: tuple[str, ...] = ()
+    export: ExportSettings = field(default_factory=ExportSettings)
+    export_folder: str = ""
+    fine_tune_step_m: float = 5e-4
+    theme: Theme = "system"
+    geometry: str = ""
+    live_layout: str = ""
+    review_layout: str = ""
+
+    def with_wearer(self, name: str) -> Self:
+        """Return these with a wearer's name as the newest."""
+        return replace(self, wearers=_newest_first(name, self.wearers, _MOST_WEARERS))
+
+    def with_session(self, path: Path) -> Self:
+        """Return these with a session as the newest."""
+        newest = str(path.absolute())
+        return replace(self, sessions=_newest_first(newest, self.sessions, _MOST_SESSIONS))
+
+
+class PreferencesFile:
+    """Preferences as JSON, and the key shared with network headsets, which only the user can read.
+
+    Parameters
+    ----------
+    path : Path, optional
+        By default in the user's configuration folder; the key lies beside it.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._path = path or _default_path()
+        self._key_path = self._path.with_name("pairing.key")
+
+    def load(self) -> tuple[Preferences, str]:
+        """Return the preferences, and what went wrong for a person to read; empty if nothing did.
+
+        A file that cannot be used is kept beside, ending in ``.bad``.
+        """
+        if not self._path.exists():
+            return Preferences(), ""
+        try:
+            return read_settings(Preferences, read_json(self._path), "preferences"), ""
+        except FileError as error:
+            bad = self._path.with_name(f"{self._path.name}.bad")
+            with suppress(OSError):
+                self._path.replace(bad)
+            return Preferences(), f"The preferences start anew; the old are in {bad}: {error}"
+
+    def save(self, preferences: Preferences) -> None:
+        """Write the preferences, or raise FileError."""
+        make_folder(self._path.parent)
+        write_json(self._path, settings_json(preferences))
+
+    def pairing_key(self) -> str:
+        """Return the key for network headsets; a fresh one where there is none that can be used.
+
+        Raises
+        ------
+        FileError
+            If a fresh one cannot be written.
+        """
+        with suppress(HandcalError, UnicodeDecodeError):
+            return read_pairing_key(self._key_path).decode()
+        return self.renew_pairing_key()
+
+    def renew_pairing_key(self) -> str:
+        """Replace the key; headsets that know the old one are no longer let in.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        return write_pairing_key(self._key_path)
+
+
+def _default_path() -> Path:
+    config = QStandardPaths.StandardLocation.AppConfigLocation
+    return Path(QStandardPaths.writableLocation(config)) / "preferences.json"
+
+
+def _newest_first(newest: str, others: tuple[str, ...], most: int) -> tuple[str, ...]:
+    if not newest:
+        return others
+    return (newest, *(other for other in others if other != newest))[:most]

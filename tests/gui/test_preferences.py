@@ -1,0 +1,130 @@
+"""Preferences come back as they were; a damaged file costs nothing but the preferences."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QStandardPaths
+
+from handcal.calibrate import CalibrationSettings
+from handcal.errors import FileError
+from handcal.export.export import ExportSettings
+from handcal.register.guard import GuardSettings
+from handcal.station_settings import StationSettings
+from handcal_gui.preferences import Preferences, PreferencesFile
+
+CHANGED = Preferences(
+    station=StationSettings(
+        source="realsense",
+        headset="network",
+        port=50_000,
+        calibration=CalibrationSettings(guard=GuardSettings(limit_rad=0.1)),
+    ),
+    plan="both",
+    wearers=("Ada", "γ 2"),
+    sessions=("/a/b",),
+    export=ExportSettings(formats=("report", "zip"), near_m=0.2),
+    export_folder="/c",
+    fine_tune_step_m=1e-3,
+    theme="dark",
+    geometry="AAAA",
+    live_layout="BBBB",
+    review_layout="CCCC",
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> PreferencesFile:
+    return PreferencesFile(tmp_path / "config" / "preferences.json")
+
+
+def test_the_first_start_has_defaults_in_the_users_own_folders(file: PreferencesFile) -> None:
+    preferences, problem = file.load()
+    assert preferences == Preferences()
+    assert problem == ""
+    documents = QStandardPaths.StandardLocation.DocumentsLocation
+    assert preferences.station.sessions.startswith(QStandardPaths.writableLocation(documents))
+
+
+def test_preferences_come_back(file: PreferencesFile) -> None:
+    file.save(CHANGED)
+    assert file.load() == (CHANGED, "")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\xff\xfe",
+        b"[]",
+        b"[" * 100_000,
+        b'{"theme": "pink"}',
+        b'{"wearers": [1]}',
+        b'{"export": {"formats": []}}',
+        b'{"station": {"port": 1.5}}',
+        b'{"later_version": 1}',
+        b" " * (16 * 2**20 + 1),
+    ],
+)
+def test_a_bad_file_is_kept_beside(file: PreferencesFile, tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "config" / "preferences.json"
+    path.parent.mkdir()
+    path.write_bytes(content)
+    preferences, problem = file.load()
+    assert preferences == Preferences()
+    assert "preferences.json.bad" in problem
+    assert path.with_name("preferences.json.bad").read_bytes() == content
+    assert file.load() == (Preferences(), "")
+
+
+def test_what_cannot_be_saved_is_told_and_leaves_the_old(
+    file: PreferencesFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file.save(CHANGED)
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(FileError, match="No space left"):
+        file.save(Preferences())
+    assert file.load() == (CHANGED, "")
+
+
+def test_wearers_and_sessions_are_remembered_newest_first(tmp_path: Path) -> None:
+    preferences = Preferences()
+    for name in ("Ada", "", "Bea", *(f"P{i}" for i in range(30)), "Ada"):
+        preferences = preferences.with_wearer(name)
+    assert preferences.wearers[:2] == ("Ada", "P29")
+    assert len(preferences.wearers) == len(set(preferences.wearers)) == 20
+    for name in ("a", "b", "a"):
+        preferences = preferences.with_session(tmp_path / name)
+    assert preferences.sessions == (str(tmp_path / "a"), str(tmp_path / "b"))
+
+
+def test_the_pairing_key_is_made_once_and_apart(file: PreferencesFile, tmp_path: Path) -> None:
+    key = file.pairing_key()
+    assert file.pairing_key() == key
+    path = tmp_path / "config" / "pairing.key"
+    if os.name == "posix":
+        assert path.stat().st_mode & 0o077 == 0
+    file.save(replace(CHANGED, theme="light"))
+    assert key not in json.dumps((tmp_path / "config" / "preferences.json").read_text())
+    renewed = file.renew_pairing_key()
+    assert renewed != key
+    assert file.pairing_key() == renewed
+
+
+@pytest.mark.parametrize("content", [b"", b"short", b"\xff" * 20, b"k" * 5000])
+def test_a_key_that_cannot_be_used_is_replaced(
+    file: PreferencesFile, tmp_path: Path, content: bytes
+) -> None:
+    path = tmp_path / "config" / "pairing.key"
+    path.parent.mkdir()
+    path.write_bytes(content)
+    assert len(file.pairing_key()) == 32
+    assert file.pairing_key().encode() != content
