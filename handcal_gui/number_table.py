@@ -1,0 +1,98 @@
+"""A table of numbers to read and to copy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
+
+from handcal_gui.theme import number_font
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One row: what it is, a cell for each column (the last reaches on to the end), its meaning."""
+
+    label: str
+    cells: tuple[str, ...]
+    tooltip: str = ""
+
+
+class NumberTable(QTableWidget):
+    """Shows rows of numbers, right-aligned.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers and, in lower case with dashes, as object name.
+    equal_columns : bool
+        All as wide; otherwise as wide as what is in them, and the last one to the end.
+    parent : QWidget or None
+    """
+
+    def __init__(
+        self, name: str, *, equal_columns: bool = False, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName(name.lower().replace(" ", "-"))
+        self.setAccessibleName(name)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setTabKeyNavigation(False)
+        self.setWordWrap(False)
+        self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        mode = QHeaderView.ResizeMode
+        across, down = self.horizontalHeader(), self.verticalHeader()
+        across.setSectionResizeMode(mode.Stretch if equal_columns else mode.ResizeToContents)
+        across.setStretchLastSection(True)
+        across.setSectionsClickable(False)
+        down.setSectionResizeMode(mode.ResizeToContents)
+        down.setSectionsClickable(False)
+        self._equal_columns = equal_columns
+        self._columns: tuple[str, ...] = ()
+        self._rows: tuple[Row, ...] = ()
+
+    def show_rows(self, columns: Sequence[str], rows: Sequence[Row]) -> None:
+        """Replace what is shown."""
+        self._columns, self._rows = tuple(columns), tuple(rows)
+        self.clearSpans()
+        self.setColumnCount(len(columns))
+        self.setRowCount(len(rows))
+        self.setHorizontalHeaderLabels(list(columns))
+        for number, row in enumerate(rows):
+            label = QTableWidgetItem(row.label)
+            label.setToolTip(row.tooltip)
+            self.setVerticalHeaderItem(number, label)
+            for column, text in enumerate(row.cells):
+                self.setItem(number, column, _number_item(text, row.tooltip))
+            if len(row.cells) < len(columns):
+                self.setSpan(number, len(row.cells) - 1, 1, len(columns) - len(row.cells) + 1)
+        if self._equal_columns:
+            widths = [self.sizeHintForColumn(column) for column in range(len(columns))]
+            self.horizontalHeader().setMinimumSectionSize(max(widths))
+
+    def as_text(self) -> str:
+        """Return the table as tab-separated lines."""
+        return rows_as_text(self._columns, self._rows)
+
+
+def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:
+    """Return rows as tab-separated lines below a line of headings."""
+    lines = [("", *columns), *((row.label, *row.cells) for row in rows)]
+    return "\n".join("\t".join(line) for line in lines)
+
+
+def _number_item(text: str, tooltip: str) -> QTableWidgetItem:
+    item = QTableWidgetItem(text)
+    item.setFont(number_font())
+    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    item.setToolTip(tooltip)
+    return item

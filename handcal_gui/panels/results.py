@@ -1,0 +1,171 @@
+"""The results panel: where each eye is, how far to trust it, and what one more would buy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
+
+from handcal.results import Results
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Alignment, Eye, Rig
+from handcal_gui.number_table import NumberTable, rows_as_text
+from handcal_gui.results.compare_tab import CompareTab
+from handcal_gui.results.convergence_plot import ConvergencePlot
+from handcal_gui.results.residuals_tab import ResidualsTab
+from handcal_gui.results.rows import (
+    EYE_NAMES,
+    PHI,
+    alignment_rows,
+    another_text,
+    result_rows,
+    verdict_rows,
+)
+from handcal_gui.results.verdict_card import VerdictCard
+from handcal_gui.theme import SPACING_PX
+
+_EMPTY = (
+    "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve: then each eye's "
+    "place, how sure it is, and the verdict appear here."
+)
+
+
+class ResultsPanel(QWidget):
+    """Shows results in tabs: numbers, convergence, residuals, alignments, comparison.
+
+    Attributes
+    ----------
+    compare_requested : Signal(str)
+        The method to solve the same alignments with; `show_comparison` or `comparison_failed` is
+        the answer.
+    compare_cancelled : Signal()
+        No answer is wanted any more.
+    """
+
+    compare_requested = Signal(str)
+    compare_cancelled = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("results-panel")
+        self.setAccessibleName("Results")
+        self._results: Results | None = None
+        self._cards = {eye: VerdictCard(eye) for eye in EYES}
+        self._numbers = NumberTable("Numbers of both eyes", equal_columns=True)
+        self._convergence = ConvergencePlot()
+        self._residuals = ResidualsTab()
+        self._alignments = NumberTable("Each alignment alone", equal_columns=True)
+        self._another = QLabel()
+        self._another.setWordWrap(True)
+        self._compare = CompareTab()
+        self._compare.requested.connect(self.compare_requested)
+        self._compare.cancelled.connect(self.compare_cancelled)
+        self._lay_out()
+        self._add_copy()
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the results of a snapshot, if they are others than those shown."""
+        procedure, record = snapshot.procedure, snapshot.record
+        if procedure.results is not self._results:
+            self.show_results(
+                procedure.results,
+                record.alignments,
+                record.rig,
+                procedure.expected_after_another_arcmin,
+            )
+
+    def show_results(
+        self,
+        results: Results | None,
+        alignments: Sequence[Alignment],
+        rig: Rig,
+        expected_after_another_arcmin: Mapping[Eye, float],
+    ) -> None:
+        """Show results, or that there are none.
+
+        Parameters
+        ----------
+        results : Results or None
+        alignments : sequence of Alignment
+            Those that were solved, in the same order; of any that are missing no residual map is
+            shown.
+        rig : Rig
+        expected_after_another_arcmin : mapping of eye to float
+            May be empty.
+        """
+        self._results = results
+        self._stack.setCurrentIndex(0 if results is None else 1)
+        if results is None:
+            return
+        for eye, card in self._cards.items():
+            card.show_verdict(results.verdicts.get(eye))
+        eyes = [EYE_NAMES[eye] for eye in EYES]
+        self._numbers.show_rows(eyes, result_rows(results, rig, expected_after_another_arcmin))
+        self._convergence.show_results(results)
+        self._residuals.show_results(results, alignments)
+        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, rig))
+        self._another.setText(another_text(results, rig, expected_after_another_arcmin))
+        self._compare.show_results(results, rig)
+
+    def show_comparison(self, other: Results) -> None:
+        """Show what another method makes of the same alignments."""
+        self._compare.show_comparison(other)
+
+    def comparison_failed(self, text: str) -> None:
+        """Say why there is no comparison."""
+        self._compare.show_failure(text)
+
+    def as_text(self) -> str:
+        """Return everything shown in numbers, as tab-separated text."""
+        if self._results is None:
+            return ""
+        verdicts = rows_as_text(("Verdict", "Reason"), verdict_rows(self._results))
+        tables = self._numbers, self._alignments, self._compare.table
+        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
+
+    def _add_copy(self) -> None:
+        copy = QAction("Copy as text", self)
+        copy.setShortcut(QKeySequence.StandardKey.Copy)
+        copy.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        copy.triggered.connect(lambda: QGuiApplication.clipboard().setText(self.as_text()))
+        self.addAction(copy)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+
+    def _lay_out(self) -> None:
+        empty = QLabel(_EMPTY)
+        empty.setWordWrap(True)
+        empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        empty.setContentsMargins(*4 * (2 * SPACING_PX,))
+        tabs = QTabWidget()
+        tabs.setObjectName("results-tabs")
+        tabs.setDocumentMode(True)
+        tabs.addTab(self._numbers_tab(), "Numbers")
+        tabs.addTab(self._convergence, "Convergence")
+        tabs.addTab(self._residuals, "Residuals")
+        tabs.addTab(self._alignments_tab(), "Alignments")
+        tabs.addTab(self._compare, "Compare")
+        self._stack = QStackedLayout(self)
+        self._stack.addWidget(empty)
+        self._stack.addWidget(tabs)
+
+    def _numbers_tab(self) -> QWidget:
+        cards = QHBoxLayout()
+        cards.setSpacing(SPACING_PX)
+        for card in self._cards.values():
+            cards.addWidget(card, 1)
+        tab = QWidget()
+        layout = QVBoxLayout(tab)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(cards)
+        layout.addWidget(self._numbers, 1)
+        return tab
+
+    def _alignments_tab(self) -> QWidget:
+        tab = QWidget()
+        layout = QVBoxLayout(tab)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._alignments, 1)
+        layout.addWidget(self._another)
+        return tab

@@ -1,0 +1,137 @@
+"""The rotation panel: how far the hand is turned against the cursor, and which way to turn it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from handcal.calibrate import Observation, PlacedHand, State
+from handcal.register.guard import turn_advice
+from handcal.snapshot import Procedure, Snapshot
+from handcal.types import Float64
+from handcal_gui.dial import RotationDial
+from handcal_gui.plots import Plot
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.turning_hand import TurningHand
+
+_HISTORY_S = 10.0
+_HISTORY_LIMITS = 2.0
+"""The history's scale ends at so many limits, as the dial's does."""
+_STRAIGHT_RAD = np.radians(2.0)
+"""Hardly more than the guard's own error: nothing to turn."""
+_NO_CURSOR = "Make a cursor: then this shows how far the hand is turned against it."
+_TAKEN = "The alignment is taken."
+_NO_HAND = "Hold the hand in view of the camera."
+_STRAIGHT = "Turned as the cursor is."
+
+
+class RotationPanel(QWidget):
+    """A dial with the angle against its limit, the way to turn, the last seconds, the refusals."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("rotation-panel")
+        self.setAccessibleName("Rotation")
+        self._cursor: PlacedHand | None = None
+        self._history: deque[tuple[float, float]] = deque()
+        self._dial = RotationDial()
+        self._hand = TurningHand()
+        self._advice = _text_label("rotation-advice", scale=1.2)
+        self._advice.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._refusals = _text_label("rotation-refusals")
+        self._plot = Plot("Rotation history", f"Last {_HISTORY_S:g} s", "")
+        self._plot.item.setXRange(-_HISTORY_S, 0.0, padding=0.0)
+        self._plot.item.getAxis("bottom").setStyle(showValues=False, tickLength=0)
+        self._limit_line = self._plot.add_line("red", dashed=True)
+        self._angle_line = self._plot.add_line("live")
+        self._limit_rad = 0.0
+        self._lay_out()
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the rotation seen in a snapshot; one without a new frame changes no angle."""
+        procedure, observation = snapshot.procedure, snapshot.observation
+        self._show_refusals(procedure)
+        self._show_limit(procedure.guard_limit_rad)
+        if procedure.cursor is not self._cursor:
+            self._cursor = procedure.cursor
+            self._history.clear()
+            self._angle_line.clear()
+        if procedure.cursor is None or procedure.state is not State.ALIGN:
+            self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
+        elif observation is not None:
+            self._show_observation(observation)
+            self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
+
+    def _show_observation(self, observation: Observation) -> None:
+        if observation.rotation_rad is None:
+            problem = observation.problem
+            self._show_nothing("? No hand", problem[:1].upper() + problem[1:] or _NO_HAND)
+            return
+        angle_rad = float(np.linalg.norm(observation.rotation_rad))
+        if angle_rad < _STRAIGHT_RAD:
+            self._dial.show_angle(angle_rad, self._limit_rad, "✓ Hold still")
+            self._hand.show_turn("")
+            self._advice.setText(_STRAIGHT)
+            return
+        word = "▲ Turn back" if observation.is_red else "✓ Near enough"
+        advice = turn_advice(observation.rotation_rad)
+        self._dial.show_angle(angle_rad, self._limit_rad, word)
+        self._hand.show_turn(advice.axis, positive=advice.angle_rad > 0)
+        self._advice.setText(f"{advice.text} by {abs(np.degrees(advice.angle_rad)):.0f}°.")
+
+    def _show_nothing(self, word: str, text: str) -> None:
+        self._dial.show_angle(None, self._limit_rad, word)
+        self._hand.show_turn("")
+        self._advice.setText(text)
+
+    def _show_history(self, now_s: float, rotation_rad: Float64 | None) -> None:
+        angle_rad = np.nan if rotation_rad is None else np.linalg.norm(rotation_rad)
+        self._history.append((now_s, float(np.degrees(angle_rad))))
+        while self._history[0][0] < now_s - _HISTORY_S:
+            self._history.popleft()
+        times_s, angles_deg = np.array(self._history).T
+        self._angle_line.setData(times_s - now_s, angles_deg)
+
+    def _show_limit(self, limit_rad: float) -> None:
+        if limit_rad == self._limit_rad:
+            return
+        self._limit_rad = limit_rad
+        limit_deg = float(np.degrees(limit_rad))
+        self._plot.item.setYRange(0.0, _HISTORY_LIMITS * limit_deg, padding=0.0)
+        self._plot.item.getAxis("left").setTicks([[(0.0, "0°"), (limit_deg, f"{limit_deg:g}°")]])
+        self._limit_line.setData([-_HISTORY_S, 0.0], [limit_deg, limit_deg])
+
+    def _show_refusals(self, procedure: Procedure) -> None:
+        if not procedure.refused and not procedure.refusal:
+            self._refusals.setText("No confirmation refused.")
+        else:
+            self._refusals.setText(f"Refused: {procedure.refused}. {procedure.refusal}")
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.setSpacing(SPACING_PX)
+        top.addWidget(self._dial, 3)
+        top.addWidget(self._hand, 2)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (SPACING_PX,))
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addLayout(top, 3)
+        layout.addWidget(self._advice)
+        layout.addWidget(self._plot, 1)
+        layout.addWidget(self._refusals)
+
+
+def _text_label(name: str, scale: float = 1.0) -> QLabel:
+    """Return a label that takes the room of two lines however much of it is filled."""
+    label = QLabel()
+    label.setObjectName(name)
+    label.setWordWrap(True)
+    label.setAlignment(Qt.AlignmentFlag.AlignTop)
+    font = label.font()
+    font.setPointSizeF(scale * font.pointSizeF())
+    label.setFont(font)
+    label.setMinimumHeight(2 * label.fontMetrics().lineSpacing())
+    return label

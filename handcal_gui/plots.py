@@ -1,0 +1,132 @@
+"""Plots: the one place that sets up pyqtgraph."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from handcal_gui.theme import SPACING_PX, colors
+
+pg.setConfigOptions(antialias=True)
+
+_LINE_PX = 2
+_SYMBOL_PX = 6
+
+
+class Plot(QWidget):
+    """Axes in the program's colours, to be looked at: neither mouse nor menu changes them.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers and, in lower case with dashes, as object name.
+    x_label, y_label : str
+        With their units.
+    parent : QWidget or None
+
+    Attributes
+    ----------
+    item : pyqtgraph.PlotItem
+        For ranges, and for what is not a line.
+    """
+
+    def __init__(
+        self, name: str, x_label: str, y_label: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName(name.lower().replace(" ", "-"))
+        self.setAccessibleName(name)
+        self._lines: list[tuple[pg.PlotDataItem, str, bool]] = []
+        self._texts: list[pg.TextItem] = []
+        self._view = pg.PlotWidget()
+        self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._view.setMinimumSize(100, 44)
+        self.item = self._view.getPlotItem()
+        self.item.setMenuEnabled(False)
+        self.item.hideButtons()
+        self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
+        self.item.setMouseEnabled(x=False, y=False)
+        for side, label in (("bottom", x_label), ("left", y_label)):
+            self.item.getAxis(side).enableAutoSIPrefix(False)
+            self.item.setLabel(side, label)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._view)
+        self._recolor()
+
+    def sizeHint(self) -> QSize:
+        """Prefer a size that leaves the axes room."""
+        return QSize(300, 200)
+
+    def show_legend(self) -> None:
+        """Name the lines, each name once, in the upper right corner."""
+        self.item.addLegend(offset=(-1, 1))
+        self._recolor()
+
+    def add_line(
+        self, role: str, *, name: str | None = None, dashed: bool = False, symbol: str | None = None
+    ) -> Any:
+        """Add a line without data yet, and return pyqtgraph's `PlotDataItem`.
+
+        Parameters
+        ----------
+        role : str
+            A field of `handcal_gui.theme.Colors`.
+        name : str or None
+            In the legend.
+        dashed : bool
+            With larger hollow symbols: told from another line without colour, and before it.
+        symbol : str or None
+            pyqtgraph's sign at each point, such as ``"o"``.
+        """
+        named = {line.name() for line, _, _ in self._lines}
+        line = self.item.plot(
+            name=None if name in named else name,
+            symbol=symbol,
+            symbolSize=_SYMBOL_PX * (1.8 if dashed else 1.0),
+            connect="finite",
+        )
+        self._lines.append((line, role, dashed))
+        self._recolor()
+        return line
+
+    def add_text(self, text: str, x: float, y: float) -> None:
+        """Write to the right of a point."""
+        written = pg.TextItem(text, anchor=(-0.5, 0.5))
+        written.setPos(x, y)
+        self.item.addItem(written)
+        self._texts.append(written)
+        self._recolor()
+
+    def clear(self) -> None:
+        """Remove all lines and texts."""
+        for item in (*(line for line, _, _ in self._lines), *self._texts):
+            self.item.removeItem(item)
+        self._lines.clear()
+        self._texts.clear()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow a change between light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._recolor()
+
+    def _recolor(self) -> None:
+        now, text = colors(), self.palette().windowText().color()
+        self._view.setBackground(now.canvas)
+        for side in ("bottom", "left"):
+            self.item.getAxis(side).setPen(now.muted)
+            self.item.getAxis(side).setTextPen(text)
+        if self.item.legend is not None:
+            self.item.legend.setLabelTextColor(text)
+        for written in self._texts:
+            written.setColor(text)
+        for line, role, is_dashed in self._lines:
+            color = getattr(now, role)
+            style = Qt.PenStyle.DashLine if is_dashed else Qt.PenStyle.SolidLine
+            line.setPen(pg.mkPen(color, width=_LINE_PX, style=style))
+            line.setSymbolPen(color)
+            line.setSymbolBrush(None if is_dashed else color)

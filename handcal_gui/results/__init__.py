@@ -1,0 +1,1 @@
+"""What the results panel is made of."""

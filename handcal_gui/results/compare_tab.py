@@ -1,0 +1,136 @@
+"""The same alignments solved by another method, side by side."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.results import Results
+from handcal.types import METHODS, Rig
+from handcal_gui.number_table import NumberTable
+from handcal_gui.results.rows import comparison_rows
+from handcal_gui.theme import SPACING_PX
+
+_METHOD_MEANINGS = {
+    "paper": "as published by Hu et al. 2021; slow",
+    "linear": "the paper's model, all three rows of each pair",
+    "consistent": "exact model, robust to cuts and a turned hand; the default",
+    "icp": "rigid, the paper's baseline",
+}
+_IDLE = "Choose a method and press Compare."
+
+
+class CompareTab(QWidget):
+    """Asks for another method's results and shows them beside the present ones.
+
+    Attributes
+    ----------
+    table : NumberTable
+    requested : Signal(str)
+        The method to solve the same alignments with.
+    cancelled : Signal()
+        The results asked for are not wanted any more.
+    """
+
+    requested = Signal(str)
+    cancelled = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("comparison")
+        self._results: Results | None = None
+        self._rig: Rig | None = None
+        self.table = NumberTable("Comparison of methods")
+        self._methods = QComboBox()
+        self._methods.setObjectName("comparison-method")
+        self._methods.setAccessibleName("Compare with method")
+        self._compare = QPushButton("&Compare")
+        self._compare.setObjectName("comparison-start")
+        self._compare.clicked.connect(self._ask)
+        self._cancel = QPushButton("Cance&l")
+        self._cancel.setObjectName("comparison-cancel")
+        self._cancel.clicked.connect(self._give_up)
+        self._progress = QProgressBar()
+        self._progress.setRange(0, 0)
+        self._progress.setTextVisible(False)
+        policy = self._progress.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self._progress.setSizePolicy(policy)
+        self._progress.setMaximumHeight(SPACING_PX)
+        self._status = QLabel()
+        self._status.setWordWrap(True)
+        self._lay_out()
+        self._set_busy(False)
+
+    def show_results(self, results: Results, rig: Rig) -> None:
+        """Take new results to compare with; a comparison with earlier ones is taken away."""
+        self._results, self._rig = results, rig
+        self._methods.clear()
+        for method in METHODS:
+            if method != results.method:
+                self._methods.addItem(f"{method}: {_METHOD_MEANINGS[method]}", method)
+        self.table.show_rows((), ())
+        self._status.setText(_IDLE)
+        self._set_busy(False)
+
+    def show_comparison(self, other: Results) -> None:
+        """Show another method's results of the same alignments."""
+        self._set_busy(False)
+        if self._results is None or self._rig is None:
+            return
+        columns = self._results.method, other.method, "Difference"
+        self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
+        self._status.setText(f"Difference: {other.method} less {self._results.method}.")
+
+    def show_failure(self, text: str) -> None:
+        """Say why there is no comparison."""
+        self._set_busy(False)
+        self._status.setText(text)
+
+    def _ask(self) -> None:
+        method = self._methods.currentData()
+        self._set_busy(True)
+        self._status.setText(f"Solving with {method} …")
+        self.requested.emit(method)
+
+    def _give_up(self) -> None:
+        self._set_busy(False)
+        self._status.setText("Cancelled.")
+        self.cancelled.emit()
+
+    def _set_busy(self, is_busy: bool) -> None:
+        self._progress.setVisible(is_busy)
+        self._cancel.setEnabled(is_busy)
+        self._compare.setEnabled(not is_busy)
+        self._methods.setEnabled(not is_busy)
+
+    def _lay_out(self) -> None:
+        label = QLabel("Compare &with")
+        label.setBuddy(self._methods)
+        self._methods.setMinimumContentsLength(12)
+        self._methods.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        row = QHBoxLayout()
+        row.setSpacing(SPACING_PX)
+        row.addWidget(label)
+        row.addWidget(self._methods, 1)
+        row.addWidget(self._compare)
+        busy_row = QHBoxLayout()
+        busy_row.setSpacing(SPACING_PX)
+        busy_row.addWidget(self._progress, 1)
+        busy_row.addWidget(self._cancel)
+        layout = QVBoxLayout(self)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(row)
+        layout.addLayout(busy_row)
+        layout.addWidget(self.table, 1)
+        layout.addWidget(self._status)

@@ -1,0 +1,42 @@
+"""How each alignment's registration came to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtWidgets import QWidget
+
+from handcal.results import Results
+from handcal_gui.plots import Plot
+from handcal_gui.results.rows import EYE_NAMES
+
+_SYMBOLS = {"left": "o", "right": "s"}
+_MAX_SYMBOLS = 60
+
+
+class ConvergencePlot(Plot):
+    """Distance between hand and cursor at each iteration, a line for each alignment and eye."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Convergence", "Iteration", "RMS distance (mm)", parent)
+        self.setToolTip(
+            "Distance of the pairs of hand and cursor at each iteration \n"
+            "of each alignment (1, 2, …).\n"
+            "The last steps of “consistent” measure it to the nearest point, not to the surface, "
+            "which is farther."
+        )
+        self.show_legend()
+
+    def show_results(self, results: Results) -> None:
+        """Replace the lines."""
+        self.clear()
+        for number, shifts in enumerate(results.alignments, 1):
+            for eye, shift in shifts.items():
+                rms_mm = 1e3 * np.sqrt(shift.history_m2)
+                line = self.add_line(
+                    eye,
+                    name=EYE_NAMES[eye],
+                    dashed=eye == "right",
+                    symbol=_SYMBOLS[eye] if len(rms_mm) <= _MAX_SYMBOLS else None,
+                )
+                line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
+                self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))

@@ -1,0 +1,76 @@
+"""The hand seen from the front, each point coloured by how far it lies from its partner."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QWidget
+
+from handcal.register.verdict import VerdictSettings
+from handcal.types import Float64
+from handcal_gui.plots import Plot
+from handcal_gui.theme import colors, is_dark
+
+_LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
+"""The colours end where the verdict would refuse such an rms, so that maps can be compared."""
+_SHADES = 32
+
+
+class ResidualMap(Plot):
+    """Residuals in colour; points without a partner are grey crosses."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Residual map", "Right (mm)", "Down (mm)", parent)
+        self._shown = np.empty((0, 2)), np.empty(0)
+        self._outliers = pg.ScatterPlotItem(size=5, symbol="x")
+        self._inliers = pg.ScatterPlotItem(size=4, pen=None)
+        self._bar = pg.ColorBarItem(
+            values=(0.0, _LARGEST_MM), width=14, interactive=False, label="Residual (mm)"
+        )
+        item = self.item
+        item.setAspectLocked()
+        item.invertY()
+        item.addItem(self._outliers)
+        item.addItem(self._inliers)
+        item.layout.addItem(self._bar, 2, 5)
+        self._redraw()
+
+    def show_residuals(self, places_m: Float64, residuals_m: Float64) -> None:
+        """Show points.
+
+        Parameters
+        ----------
+        places_m : (N, 2) float64
+            To the right and down, as the eye sees them.
+        residuals_m : (N,) float64
+            NaN where a point has no partner.
+        """
+        self._shown = places_m, residuals_m
+        self._redraw()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow a change between light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._redraw()
+
+    def _redraw(self) -> None:
+        places_m, residuals_m = self._shown
+        is_outlier = np.isnan(residuals_m)
+        palette = _palette()
+        self._bar.setColorMap(palette)
+        for side in ("left", "right"):
+            self._bar.getAxis(side).setTextPen(self.palette().windowText().color())
+        shades = [pg.mkBrush(c) for c in palette.getLookupTable(0.0, 1.0, _SHADES)]
+        shade = (_SHADES / _LARGEST_MM * 1e3 * residuals_m[~is_outlier]).astype(int)
+        self._inliers.setData(
+            pos=1e3 * places_m[~is_outlier], brush=[shades[min(i, _SHADES - 1)] for i in shade]
+        )
+        self._outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
+
+
+def _palette() -> pg.ColorMap:
+    """Return colours from faint to strong before the present canvas, none of them too faint."""
+    viridis = pg.colormap.get("viridis")
+    return viridis.getSubset(0.15, 0.85) if is_dark() else viridis.getSubset(0.85, -0.85)

@@ -1,0 +1,58 @@
+"""The residuals tab: which alignment's map to see, and the map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
+
+from handcal.geometry import transform
+from handcal.results import Results
+from handcal.types import Alignment
+from handcal_gui.results.residual_map import ResidualMap
+from handcal_gui.results.rows import EYE_NAMES
+from handcal_gui.theme import SPACING_PX
+
+
+class ResidualsTab(QWidget):
+    """Shows the residual map of one alignment and eye at a time."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("residuals")
+        self._results: Results | None = None
+        self._alignments: Sequence[Alignment] = ()
+        self._choice = QComboBox()
+        self._choice.setObjectName("residuals-choice")
+        self._choice.setAccessibleName("Alignment and eye")
+        self._choice.currentIndexChanged.connect(self._show_chosen)
+        self._map = ResidualMap()
+        note = QLabel("The hand as the eye sees it; × marks points without a partner (outliers).")
+        note.setWordWrap(True)
+        layout = QVBoxLayout(self)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._choice)
+        layout.addWidget(self._map, 1)
+        layout.addWidget(note)
+
+    def show_results(self, results: Results, alignments: Sequence[Alignment]) -> None:
+        """Show the first alignment's map and offer the others, as far as their clouds are known."""
+        self._results, self._alignments = results, alignments
+        self._choice.blockSignals(True)
+        self._choice.clear()
+        for index, (_, shifts) in enumerate(zip(alignments, results.alignments, strict=False)):
+            for eye in shifts:
+                name = f"Alignment {index + 1}, {EYE_NAMES[eye].lower()}"
+                self._choice.addItem(name, (index, eye))
+        self._choice.blockSignals(False)
+        self._show_chosen()
+
+    def _show_chosen(self) -> None:
+        chosen = self._choice.currentData()
+        if self._results is None or chosen is None:
+            return
+        index, eye = chosen
+        alignment = self._alignments[index]
+        hand_E_m = transform(alignment.T_E_W[eye], alignment.hand_m)
+        residuals_m = self._results.alignments[index][eye].residuals_m
+        self._map.show_residuals(hand_E_m[:, :2], residuals_m)

@@ -1,0 +1,181 @@
+"""The numbers of results as people read them, in rows of text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from handcal.register.verdict import expected_error_arcmin
+from handcal.results import Results
+from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
+from handcal_gui.number_table import Row
+
+EYE_NAMES: Mapping[Eye, str] = {"left": "Left eye", "right": "Right eye"}
+VERDICT_WORDS: Mapping[VerdictName, str] = {
+    "accept": "✓ Accept",
+    "repeat": "↻ Repeat",
+    "implausible": "✕ Implausible",
+}
+NOTHING = "–"
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One number of an eye shift.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+    value : callable
+        From the shift and the eye's display to the number in `unit`.
+    decimals : int
+    sigma : callable or None
+        From the shift to the number's standard deviation.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    value: Callable[[EyeShift, EyeDisplay], float]
+    decimals: int
+    sigma: Callable[[EyeShift], float] | None = None
+
+    def text(self, shift: EyeShift, display: EyeDisplay) -> str:
+        """Return the number, with its standard deviation if it has one."""
+        value = self.value(shift, display)
+        if self.sigma is None:
+            return f"{value:.{self.decimals}f}{self.unit}"
+        return f"{_signed(value, self.decimals)} ± {self.sigma(shift):.{self.decimals}f}{self.unit}"
+
+    def difference(self, shift: EyeShift, other: EyeShift, display: EyeDisplay) -> str:
+        """Return by how much the other's number is larger."""
+        apart = self.value(other, display) - self.value(shift, display)
+        return f"{_signed(apart, self.decimals)}{self.unit}"
+
+
+def _phi(index: int, direction: str) -> Quantity:
+    return Quantity(
+        f"φ{index + 1}",
+        " mm",
+        f"How far the eye lies {direction} of the rig's viewpoint, in millimetres,\n"
+        "± one standard deviation (σ)",
+        lambda shift, _: 1e3 * float(shift.shift_m[index]),
+        2,
+        lambda shift: 1e3 * float(shift.covariance_m2[index, index]) ** 0.5,
+    )
+
+
+PHI = (_phi(0, "to the right"), _phi(1, "below"), _phi(2, "in front"))
+EXPECTED_ERROR = Quantity(
+    "Expected error",
+    "′",
+    "Between real and drawn, at 0.5 m, as far as φ's uncertainty makes it, in arcminutes.\n"
+    "1′ is 0.15 mm at 0.5 m.",
+    lambda shift, display: expected_error_arcmin(display, shift),
+    1,
+)
+QUANTITIES = (
+    *PHI,
+    EXPECTED_ERROR,
+    Quantity(
+        "RMS",
+        " mm",
+        "Distance between hand and cursor after registration, root mean square over the inliers",
+        lambda shift, _: 1e3 * shift.rms_m,
+        2,
+    ),
+    Quantity(
+        "Inliers",
+        " %",
+        "Points of the hand that found a partner on the cursor",
+        lambda shift, _: 100 * shift.inlier_ratio,
+        0,
+    ),
+    Quantity("Iterations", "", "Of all alignments together", lambda s, _: float(s.iterations), 0),
+)
+_ANOTHER = "The error to expect if one more alignment like these were added"
+_EYE_DISTANCE = "Between the two solved eyes, in millimetres"
+
+
+def result_rows(
+    results: Results, rig: Rig, expected_after_another_arcmin: Mapping[Eye, float]
+) -> list[Row]:
+    """Return what is known of each eye, in a column each, and then of both together."""
+    rows = [
+        Row(q.name, tuple(_cell(q, results.shifts.get(eye), rig, eye) for eye in EYES), q.meaning)
+        for q in QUANTITIES
+    ]
+    another = tuple(
+        f"{expected_after_another_arcmin[eye]:.{EXPECTED_ERROR.decimals}f}{EXPECTED_ERROR.unit}"
+        if eye in expected_after_another_arcmin
+        else NOTHING
+        for eye in EYES
+    )
+    rows.insert(QUANTITIES.index(EXPECTED_ERROR) + 1, Row("With one more", another, _ANOTHER))
+    return [
+        *rows,
+        Row("Eye distance", (eye_distance_text(results),), _EYE_DISTANCE),
+        Row("Alignments", (str(len(results.alignments)),), "Fused into these results"),
+        Row("Method", (results.method,), "The solver"),
+    ]
+
+
+def verdict_rows(results: Results) -> list[Row]:
+    """Return each solved eye's verdict and its reason."""
+    return [
+        Row(EYE_NAMES[eye], (VERDICT_WORDS[verdict.name], verdict.reason))
+        for eye, verdict in results.verdicts.items()
+    ]
+
+
+def another_text(
+    results: Results, rig: Rig, expected_after_another_arcmin: Mapping[Eye, float]
+) -> str:
+    """Return what one more alignment would buy; empty if that is not known."""
+    parts = [
+        f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.shifts[eye], rig.eyes[eye])} → "
+        f"{arcmin:.{EXPECTED_ERROR.decimals}f}{EXPECTED_ERROR.unit}"
+        for eye, arcmin in expected_after_another_arcmin.items()
+        if eye in results.shifts
+    ]
+    return f"One more alignment: expected error {', '.join(parts)}." if parts else ""
+
+
+def eye_distance_text(results: Results) -> str:
+    """Return the implied distance between the eyes."""
+    distance_m = results.eye_distance_m
+    return NOTHING if distance_m is None else f"{1e3 * distance_m:.1f} mm"
+
+
+def alignment_rows(results: Results, rig: Rig) -> list[Row]:
+    """Return each alignment's φ by itself, one row for each eye."""
+    return [
+        Row(f"{number} {eye}", tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
+        for number, shifts in enumerate(results.alignments, 1)
+        for eye, shift in shifts.items()
+    ]
+
+
+def comparison_rows(results: Results, other: Results, rig: Rig) -> list[Row]:
+    """Return both results and how far the other's numbers are larger, eye after eye."""
+    rows = []
+    for eye in EYES:
+        if eye in results.shifts and eye in other.shifts:
+            rows.append(Row(EYE_NAMES[eye], ("", "", "")))
+            one, two, display = results.shifts[eye], other.shifts[eye], rig.eyes[eye]
+            for q in QUANTITIES:
+                both = q.text(one, display), q.text(two, display)
+                rows.append(Row(q.name, (*both, q.difference(one, two, display)), q.meaning))
+    if results.eye_distance_m is not None and other.eye_distance_m is not None:
+        apart_mm = 1e3 * (other.eye_distance_m - results.eye_distance_m)
+        texts = (*map(eye_distance_text, (results, other)), f"{_signed(apart_mm, 1)} mm")
+        rows.append(Row("Eye distance", texts, _EYE_DISTANCE))
+    return rows
+
+
+def _cell(quantity: Quantity, shift: EyeShift | None, rig: Rig, eye: Eye) -> str:
+    return NOTHING if shift is None else quantity.text(shift, rig.eyes[eye])
+
+
+def _signed(value: float, decimals: int) -> str:
+    return f"{value:+.{decimals}f}".replace("-", "−")

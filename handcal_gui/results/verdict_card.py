@@ -1,0 +1,65 @@
+"""One eye's verdict: a sign, a word and the reason."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
+
+from handcal.types import Eye, Verdict
+from handcal_gui.results.rows import EYE_NAMES, NOTHING, VERDICT_WORDS
+from handcal_gui.theme import SPACING_PX, colors
+
+_ROLES = {"accept": "good", "repeat": "warning", "implausible": "red"}
+_REASON_LINES = 4
+
+
+class VerdictCard(QFrame):
+    """Shows the verdict on one eye, at a height that does not depend on it."""
+
+    def __init__(self, eye: Eye, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(f"verdict-{eye}")
+        self.setFrameShape(QFrame.Shape.StyledPanel)
+        self._verdict: Verdict | None = None
+        self._word = QLabel()
+        font = self._word.font()
+        font.setBold(True)
+        font.setPointSizeF(1.25 * font.pointSizeF())
+        self._word.setFont(font)
+        self._reason = QLabel()
+        self._reason.setWordWrap(True)
+        self._reason.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        self._reason.setMinimumHeight(_REASON_LINES * self._reason.fontMetrics().lineSpacing())
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(QLabel(EYE_NAMES[eye]))
+        layout.addWidget(self._word)
+        layout.addWidget(self._reason, 1)
+        self.show_verdict(None)
+
+    def show_verdict(self, verdict: Verdict | None) -> None:
+        """Show a verdict, or that the eye has taken no part in any alignment."""
+        self._verdict = verdict
+        if verdict is None:
+            self._word.setText(f"{NOTHING} Not solved")
+            self._reason.setText("Took no part in any alignment")
+        else:
+            self._word.setText(VERDICT_WORDS[verdict.name])
+            self._reason.setText(verdict.reason[:1].upper() + verdict.reason[1:])
+        self._reason.setToolTip(self._reason.text())
+        self._recolor()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow a change between light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._recolor()
+
+    def _recolor(self) -> None:
+        palette = QPalette(self.palette())
+        if self._verdict is not None:
+            color = QColor(getattr(colors(), _ROLES[self._verdict.name]))
+            palette.setColor(QPalette.ColorRole.WindowText, color)
+        self._word.setPalette(palette)
