@@ -7,10 +7,6 @@ fact, to judge the result.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -19,33 +15,23 @@ from typing import Any, Literal
 
 import numpy as np
 
-from handcal.calibrate import Calibration, CalibrationSettings, Observation, State
-from handcal.camera.synthetic import SyntheticCamera
-from handcal.config import settings_json
+from handcal.calibrate import Calibration, Observation, State
 from handcal.display import (
     TARGET_DEPTHS_M,
     arcmin_from_px,
     reprojection_error_px,
     target_corners_m,
 )
-from handcal.errors import CameraTimeoutError, HandcalError, LinkError
-from handcal.link.pairing import KEY_VARIABLE, new_pairing_key
-from handcal.link.server import HeadsetServer
+from handcal.errors import HandcalError
 from handcal.register.solve import solve_alignment
-from handcal.rig.rig_file import read_rig
-from handcal.session import Session
-from handcal.sim.hand import make_hand
-from handcal.sim.render import World
-from handcal.sim.room import make_room
-from handcal.sim.scene import SceneReceiver
 from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.station import Station
+from handcal.station_settings import StationSettings
 from handcal.types import EYES, Eye, Float64, Rig
 
 EyePlan = Literal["both", "each"]
 Report = Callable[[str, float], None]
 
-CALIBRATION = CalibrationSettings()
-_CONNECT_S = 20.0
 _STEP_S = 60.0
 
 
@@ -95,32 +81,23 @@ def run_demo(
     HandcalError
         If the headset does not answer, the wearer does not get on, or the disk is full.
     """
-    rig = read_rig(rig_path)
-    world = World(make_hand(settings.seed), make_room(settings.seed))
-    key = new_pairing_key()
-    stored = {"calibration": settings_json(CALIBRATION), "demo": settings_json(settings)}
-    with (
-        Session.create(output, rig, stored) as session,
-        HeadsetServer(key.encode()) as server,
-        SceneReceiver() as scene,
-        SyntheticCamera(
-            world, scene.latest, depth_intrinsics=rig.depth_intrinsics, seed=settings.seed
-        ) as camera,
-        _Headset(settings, rig_path, server.address[1], scene.port, key) as headset,
-    ):
+    station_settings = StationSettings(
+        rig=str(rig_path),
+        seed=settings.seed,
+        loss=settings.loss,
+        reorder=settings.reorder,
+        sessions=str(output),
+    )
+    with Station(station_settings) as station:
         report("Connecting to the virtual headset", 0.0)
-        try:
-            server.wait_connected(_CONNECT_S)
-        except LinkError as error:
-            raise LinkError(f"{error} {headset.last_words()}".strip()) from error
-        calibration = Calibration(rig, server, session, CALIBRATION)
-        observations = _follow_plan(calibration, camera, headset, settings, report)
-        statistics = server.statistics()
-        session.record("link", **asdict(statistics))
-        session.finish()
+        observations = _follow_plan(station, settings, report)
+        statistics = station.step().link
+        station.session.record("link", **asdict(statistics))
+        station.session.finish()
+    calibration, rig = station.calibration, station.rig
     return {
         "seed": settings.seed,
-        "session": str(session.path),
+        "session": str(station.session.path),
         **_judge(calibration, rig, settings),
         "guard": {
             "rejected": calibration.refused,
@@ -154,14 +131,9 @@ def reprojection_arcmin(
     return float(np.mean(errors))
 
 
-def _follow_plan(
-    calibration: Calibration,
-    camera: SyntheticCamera,
-    headset: _Headset,
-    settings: DemoSettings,
-    report: Report,
-) -> list[Observation]:
+def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> list[Observation]:
     """Do every planned alignment, solving and applying after each."""
+    calibration = station.calibration
     each: tuple[tuple[Eye, ...], ...] = (
         (EYES,) if settings.eyes == "both" else (("left",), ("right",))
     )
@@ -171,13 +143,14 @@ def _follow_plan(
     def watch(until: Callable[[Observation], bool], complaint: str) -> None:
         deadline_s = time.monotonic() + _STEP_S
         while time.monotonic() < deadline_s:
-            try:
-                observations.append(calibration.step(camera.read()))
-            except CameraTimeoutError:
-                headset.require_running()
-                continue
-            if until(observations[-1]):
-                return
+            station.require_headset()
+            snapshot = station.step()
+            if snapshot.problem:
+                raise HandcalError(snapshot.problem)
+            if snapshot.observation is not None:
+                observations.append(snapshot.observation)
+                if until(snapshot.observation):
+                    return
         raise HandcalError(f"{complaint} within {_STEP_S:.0f} s")
 
     for number, eyes in enumerate(plan):
@@ -241,49 +214,3 @@ def _timing(
         "guard": float(np.median(np.array(guard_ms, dtype=float))),
         "solve_both_eyes": float(np.median(solve_ms)),
     }
-
-
-class _Headset:
-    """The virtual headset's process, ended when left."""
-
-    def __init__(
-        self, settings: DemoSettings, rig_path: Path, port: int, scene_port: int, key: str
-    ) -> None:
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
-        command = [sys.executable, "-m", "handcal", "headset"]
-        options = {
-            "--port": port,
-            "--scene-port": scene_port,
-            "--rig": rig_path,
-            "--seed": settings.seed,
-            "--loss": settings.loss,
-            "--reorder": settings.reorder,
-        }
-        command += [str(part) for option in options.items() for part in option]
-        self._process = subprocess.Popen(  # noqa: S603 (our own program)
-            command, env=os.environ | {KEY_VARIABLE: key}, stderr=self._errors
-        )
-
-    def require_running(self) -> None:
-        """Raise LinkError if the process has ended."""
-        if self._process.poll() is not None:
-            raise LinkError(f"the virtual headset has ended. {self.last_words()}".strip())
-
-    def last_words(self) -> str:
-        """Return what the process complained of, if it has ended."""
-        if self._process.poll() is None:
-            return ""
-        self._errors.seek(0)
-        return self._errors.read(1000).decode(errors="replace").strip()
-
-    def __enter__(self) -> _Headset:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._errors.close()

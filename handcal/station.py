@@ -6,13 +6,12 @@ One thread owns a station: it calls `step` for ever, and whatever else is wanted
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 
-from handcal.calibrate import Calibration, PlacedHand, State
+from handcal.calibrate import Calibration, PlacedHand, ProcedureError, State
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
 from handcal.camera.realsense import RealSenseCamera
@@ -25,8 +24,6 @@ from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
 from handcal.link.pairing import new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
-from handcal.register.verdict import expected_after_another
-from handcal.results import Results
 from handcal.rig.rig_file import read_rig
 from handcal.session import Session, SessionRecord
 from handcal.sim.eyes import TrueEyes
@@ -34,6 +31,7 @@ from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
 from handcal.snapshot import Procedure, Snapshot
 from handcal.station_settings import StationSettings
+from handcal.trial import make_trial
 from handcal.types import Eye, Float64
 from handcal.wearer_view import EyeView, see
 
@@ -101,9 +99,8 @@ class Station(Closable):
         self._number = 0
         self._problem = ""
         self._revision = self.session.revision
-        self._judged: Results | None = None
-        self._expected_arcmin: Mapping[Eye, float] = {}
         self._views: dict[Eye, EyeView] = {}
+        self._viewed: Eye = "right"
         self._next_view_s = 0.0
 
     @property
@@ -139,6 +136,33 @@ class Station(Closable):
             record=self._newest_record(),
             views=dict(self._views),
         )
+
+    def save_trial(self, eye: Eye, depth_m: float) -> int:
+        """Store a trial: the solved φ judged by the one set by hand, for a target at a distance.
+
+        Raises
+        ------
+        ProcedureError
+            If the eye is not solved.
+        FileError
+            If the session cannot be written.
+        """
+        results = self.calibration.results
+        if results is None or eye not in results.shifts:
+            raise ProcedureError(f"solve the {eye} eye first")
+        trial = make_trial(
+            self.rig.eyes[eye],
+            eye,
+            depth_m,
+            results.shifts[eye].shift_m,
+            self.calibration.applied_shift_m[eye],
+        )
+        return self.session.save_trial(trial)
+
+    def require_headset(self) -> None:
+        """Raise LinkError if the virtual headset has ended."""
+        if self._simulation is not None:
+            self._simulation.require_running()
 
     def restart_headset(self) -> None:
         """Start the virtual headset again; a network headset connects by itself."""
@@ -180,11 +204,14 @@ class Station(Closable):
         if self.calibration.state is State.APPLIED:
             # The wearer judges the calibration by this outline on the own hand.
             self._link.send_live_hand(hand.points_W_m, False)
-        now_s = time.monotonic()
-        if self.watch_views and now_s >= self._next_view_s:
-            self._next_view_s = now_s + _VIEW_PERIOD_S
-            eye: Eye = "right" if self._number % 2 else "left"
+        started_s = time.monotonic()
+        if self.watch_views and started_s >= self._next_view_s:
+            eye: Eye = "left" if self._viewed == "right" else "right"
             self._views[eye] = self._see(eye, hand)
+            self._viewed = eye
+            ended_s = time.monotonic()
+            # On a busy computer the frames come first.
+            self._next_view_s = ended_s + max(_VIEW_PERIOD_S, 3.0 * (ended_s - started_s))
 
     def _see(self, eye: Eye, hand: PlacedHand) -> EyeView:
         calibration, display = self.calibration, self.rig.eyes[eye]
@@ -215,11 +242,10 @@ class Station(Closable):
         )
 
     def _link_problem(self) -> str:
-        if self._simulation is not None:
-            try:
-                self._simulation.require_running()
-            except LinkError as error:
-                return str(error)
+        try:
+            self.require_headset()
+        except LinkError as error:
+            return str(error)
         if self._link.connected:
             return ""
         if self._simulation is not None:
@@ -233,13 +259,6 @@ class Station(Closable):
     def _procedure(self) -> Procedure:
         calibration = self.calibration
         results = calibration.results
-        if results is not self._judged:
-            self._judged = results
-            self._expected_arcmin = (
-                expected_after_another(results, self.rig, self.settings.calibration.solve)
-                if results
-                else {}
-            )
         return Procedure(
             state=calibration.state,
             eyes=calibration.eyes,
@@ -248,7 +267,7 @@ class Station(Closable):
             refused=calibration.refused,
             guard_limit_rad=self.settings.calibration.guard.limit_rad,
             results=results,
-            expected_after_another_arcmin=self._expected_arcmin,
+            expected_after_another_arcmin=results.expected_after_another_arcmin if results else {},
             applied_shift_m=calibration.applied_shift_m,
             is_applied=calibration.is_applied,
         )
