@@ -6,10 +6,8 @@ from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from handcal.results import SolveSettings
 from handcal.snapshot import Snapshot
 from handcal.station import Station
-from handcal.trial import make_trial
 from handcal.types import Eye, Float64
 from handcal_gui.compare import Comparison
 from handcal_gui.stream import Command, Stream
@@ -118,7 +116,11 @@ class Live(QObject):
         panels.fine_tune.shift_settled.connect(
             lambda: self._ask("record φ", lambda station: station.calibration.record_shift())
         )
-        panels.trials.trial_requested.connect(self._save_trial)
+        panels.trials.trial_requested.connect(
+            lambda eye, depth_m: self._ask(
+                "record the trial", lambda station: station.save_trial(eye, depth_m)
+            )
+        )
         panels.link.restart_headset_requested.connect(
             lambda: self._ask("restart the headset", lambda station: station.restart_headset())
         )
@@ -152,20 +154,6 @@ class Live(QObject):
 
     def _set_shift(self, shifts_m: Mapping[Eye, Float64]) -> None:
         self._ask("set φ", lambda station: station.calibration.set_shift(shifts_m))
-
-    def _save_trial(self, eye: Eye, depth_m: float) -> None:
-        def save(station: Station) -> int:
-            calibration = station.calibration
-            trial = make_trial(
-                station.rig.eyes[eye],
-                eye,
-                depth_m,
-                calibration.solved_shift_m[eye],
-                calibration.applied_shift_m[eye],
-            )
-            return station.session.save_trial(trial)
-
-        self._ask("record the trial", save)
 
     def _poll(self) -> None:
         snapshot = self._stream.newest() if self._stream is not None else None

@@ -196,12 +196,15 @@ class Wizard:
         )
 
     def _show_hand(self, snapshot: Snapshot) -> View:
+        back = Offer(Action.BACK, "Back")
+        if snapshot.procedure.state is State.SHOW_HAND and snapshot.record.alignments:
+            back = Offer(Action.SOLVE, "Keep the alignments so far")
         return View(
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
             (_hand_check(snapshot),),
             Offer(Action.NEXT, "Next", _hand_check(snapshot).holds),
-            (Offer(Action.BACK, "Back"),),
+            (back,),
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> View:
@@ -262,6 +265,14 @@ class Wizard:
 
     def _verify(self, snapshot: Snapshot) -> View:
         checks = _verdict_checks(snapshot)
+        if snapshot.procedure.results is None and snapshot.record.alignments:
+            return View(
+                Step.VERIFY,
+                "The alignments have changed. Solve again.",
+                checks,
+                Offer(Action.SOLVE, "Solve"),
+                (Offer(Action.ANOTHER, "Add alignment"),),
+            )
         if not is_complete(snapshot.record.alignments):
             eyes = _names(self.eyes(snapshot))
             return View(
