@@ -133,13 +133,13 @@ def make_trial(
     ValueError
         If a shift is not three finite numbers, or the target does not stand before the eye.
     """
+    if not 0.0 < depth_m < np.inf:
+        raise ValueError(f"a target at {depth_m:g} m does not stand before the eye")
     corners_E_m = target_corners_m(depth_m)
     drawn_px, truth_px = (
         project(eye_projection(display, shift_m), corners_E_m)
         for shift_m in (calibrated_shift_m, adjusted_shift_m)
     )
-    if not (np.isfinite(drawn_px).all() and np.isfinite(truth_px).all()):
-        raise ValueError(f"a target at {depth_m:g} m does not stand before the eye")
     error_px = np.linalg.norm(drawn_px - truth_px, axis=1)
     return Trial(
         eye=eye,

@@ -18,23 +18,37 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handcal.errors import FileError
+from handcal.history import MAX_ALIGNMENTS, MAX_TRIALS, SessionEvent
+from handcal.journal import JOURNAL_VERSION
 from handcal.rig.example import example_rig
-from handcal.session import MAX_ALIGNMENT_BYTES, Session, SessionRecord
+from handcal.session import (
+    MAX_ALIGNMENT_BYTES,
+    MAX_NOTES_CHARACTERS,
+    Session,
+    SessionRecord,
+)
+from handcal.trial import Trial, make_trial, trial_json
 from handcal.types import Alignment
 
 SETTINGS = {"method": "consistent", "gate_m": [0.35, 0.7], "third": 1 / 3}
+VERSION_1 = Path(__file__).parent / "data" / "session-v1"
+SHIFT_M = np.array([0.001, -0.002, 1e-17])
 RESULTS = {"left": {"shift_m": [0.1 + 0.2, -1e-17, 3.0]}}
 
-# Writes alignments that tell their own number, and says when each is safe.
+# Writes alignments that tell their own number, deletes and restores them, and says when each round
+# is safe.
 WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
 from handcal.session import Session
+from handcal.trial import make_trial
 from handcal.types import Alignment
 
 path = Path(sys.argv[1])
-number = len(Session.open(path).alignments)
+record = Session.open(path)
+number = len(record.alignments) + len(record.deleted)
+trial = make_trial(record.rig.eyes["left"], "left", 0.5, np.zeros(3), np.full(3, 0.001))
 with Session(path) as session:
     while True:
         cloud_m = np.full((2000, 3), number)
@@ -42,7 +56,12 @@ with Session(path) as session:
         number = session.save_alignment(
             Alignment(cloud_m, cloud_m, cut, cut, {"left": np.eye(4)}, ("left",), np.zeros(3), 0, 1)
         )
+        session.delete_alignment(number)
+        session.save_trial(trial)
+        session.save_notes("x" * number)
+        session.restore_alignment(number)
         session.save_results({"number": number})
+        session.save_fine_tuned({"left": np.full(3, 1e-3 * number)})
         session.record("ready", text="x" * 1000)
         print(number, flush=True)
 """
@@ -55,23 +74,38 @@ def session(tmp_path: Path) -> Iterator[Session]:
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory, alignment: Alignment) -> SessionRecord:
+def trial() -> Trial:
+    return make_trial(example_rig().eyes["right"], "right", 0.4, np.zeros(3), np.full(3, 0.001))
+
+
+@pytest.fixture(scope="module")
+def finished(
+    tmp_path_factory: pytest.TempPathFactory, alignment: Alignment, trial: Trial
+) -> SessionRecord:
     parent = tmp_path_factory.mktemp("sessions")
-    with Session.create(parent, example_rig(), SETTINGS) as session:
+    with Session.create(parent, example_rig(), SETTINGS, wearer="Ana") as session:
         session.record("cursor_made", points=5000)
         session.save_alignment(alignment)
         session.record("refused", angle_rad=0.2)
         session.save_alignment(alignment)
+        session.delete_alignment(1)
+        session.restore_alignment(1)
         session.save_results(RESULTS)
+        session.save_applied({"left": SHIFT_M})
+        session.save_trial(trial)
+        session.save_fine_tuned({"right": 2 * SHIFT_M})
+        session.finish()
     return Session.open(session.path)
 
 
 def test_everything_comes_back(finished: SessionRecord, alignment: Alignment) -> None:
     names = [event.name for event in finished.events]
     assert names == [
-        "created", "cursor_made", "alignment_saved", "refused", "alignment_saved", "solved",
+        "created", "cursor_made", "alignment_saved", "refused", "alignment_saved",
+        "alignment_deleted", "alignment_restored", "solved", "applied", "trial_saved",
+        "fine_tuned", "finished",
     ]  # fmt: skip
-    assert [event.number for event in finished.events] == [1, 2, 3, 4, 5, 6]
+    assert [event.number for event in finished.events] == list(range(1, 13))
     assert finished.events[1].data == {"points": 5000}
     assert finished.settings == SETTINGS
     assert finished.results == RESULTS
@@ -183,7 +217,7 @@ def test_a_session_survives_kill_9(tmp_path: Path, seed: int) -> None:
     Session.create(tmp_path, example_rig(), SETTINGS, name="killed").close()
     path = tmp_path / "killed"
     for _ in range(1 + seed // 3):  # some are resumed after the kill, and killed again
-        before = len(Session.open(path).alignments)
+        before = Session.open(path)
         command = [sys.executable, "-c", WRITER, str(path)]
         with subprocess.Popen(command, stdout=subprocess.PIPE) as writer:
             assert writer.stdout is not None
@@ -191,15 +225,21 @@ def test_a_session_survives_kill_9(tmp_path: Path, seed: int) -> None:
             time.sleep(random.Random(seed).uniform(0.0, 0.04))
             os.kill(writer.pid, signal.SIGKILL)
             said += writer.stdout.read()
-        safe = int(said.split()[-1])
+        rounds, safe = len(said.split()), int(said.split()[-1])
         record = Session.open(path)
-        assert safe > before
-        assert safe <= len(record.alignments) <= safe + 1
-        for index, alignment in enumerate(record.alignments):
-            assert (alignment.hand_m == index).all()
+        stored = dict(zip(record.alignment_numbers, record.alignments, strict=True))
+        stored |= record.deleted
+        assert safe <= len(stored) <= safe + 1
+        assert set(record.deleted) <= {safe + 1, *before.deleted}
+        for number, alignment in stored.items():
+            assert (alignment.hand_m == number - 1).all()
             assert alignment.hand_m.shape == (2000, 3)
-        assert record.results is not None
-        assert safe <= record.results["number"] <= safe + 1
+        assert rounds <= len(record.trials) - len(before.trials) <= rounds + 1
+        assert safe <= len(record.notes) <= safe + 1
+        if len(stored) == safe:
+            assert record.results == {"number": safe}
+            assert record.is_solved
+        assert record.applied_shift_m["left"][0] in (1e-3 * safe, 1e-3 * (safe + 1))
 
 
 FILES = [
@@ -311,3 +351,228 @@ def test_a_dropped_alignment_is_left_out_with_its_results(
         with pytest.raises(ValueError, match="alignment_dropped"):
             again.record("alignment_dropped")
     assert Session.open(session.path).alignments == ()
+
+
+def numbers(record: SessionRecord) -> tuple[list[int], list[int]]:
+    """Return those kept and those deleted, after checking that they are what was saved so."""
+    stored = list(zip(record.alignment_numbers, record.alignments, strict=True))
+    for number, alignment in [*stored, *record.deleted.items()]:
+        assert alignment.t_b_ns == number
+    return list(record.alignment_numbers), list(record.deleted)
+
+
+def test_any_alignment_can_be_deleted_and_restored_at_its_place(
+    session: Session, alignment: Alignment
+) -> None:
+    for number in (1, 2, 3):
+        assert session.save_alignment(replace(alignment, t_b_ns=number)) == number
+    for change, number in (
+        (session.delete_alignment, 1),
+        (session.delete_alignment, 2),
+        (session.restore_alignment, 1),
+    ):
+        session.save_results(RESULTS)
+        assert Session.open(session.path).is_solved
+        change(number)
+        record = Session.open(session.path)
+        assert record.results is None
+        assert not record.is_solved
+    assert numbers(record) == ([1, 3], [2])
+    session.close()
+    with Session(session.path) as again:
+        again.drop_alignment()
+        assert again.save_alignment(replace(alignment, t_b_ns=4)) == 4
+        assert numbers(Session.open(session.path)) == ([1, 4], [2, 3])
+        again.restore_alignment(3)
+        again.restore_alignment(2)
+        for call, number in (
+            (again.restore_alignment, 2),
+            (again.delete_alignment, 5),
+            (again.restore_alignment, 5),
+        ):
+            with pytest.raises(ValueError, match=rf"there is no (deleted )?alignment {number}"):
+                call(number)
+    assert numbers(Session.open(session.path)) == ([1, 2, 3, 4], [])
+
+
+def test_a_session_of_many_alignments_is_full(session: Session, alignment: Alignment) -> None:
+    for _ in range(MAX_ALIGNMENTS):
+        session.save_alignment(alignment)
+        session.drop_alignment()
+    with pytest.raises(FileError, match="full: no room for more than 100 alignments"):
+        session.save_alignment(alignment)
+
+
+def test_trials_come_back_can_be_deleted_and_are_limited(session: Session, trial: Trial) -> None:
+    assert [session.save_trial(trial) for _ in range(3)] == [1, 2, 3]
+    session.delete_trial(1)
+    session.delete_trial(2)
+    session.restore_trial(1)
+    record = Session.open(session.path)
+    assert (record.trial_numbers, list(record.deleted_trials)) == ((1, 3), [2])
+    for stored in (*record.trials, record.deleted_trials[2]):
+        assert trial_json(stored) == trial_json(trial)
+    assert [stored.time for stored in record.trials] == [
+        record.events[1].time,
+        record.events[3].time,
+    ]
+    with pytest.raises(ValueError, match="there is no trial 2"):
+        session.delete_trial(2)
+    with pytest.raises(ValueError, match="there is no deleted trial 3"):
+        session.restore_trial(3)
+    for _ in range(MAX_TRIALS - 3):
+        session.save_trial(trial)
+    with pytest.raises(FileError, match="full: no room for more than 1000 trials"):
+        session.save_trial(trial)
+
+
+def test_it_is_told_whether_it_is_solved_and_applied(
+    session: Session, alignment: Alignment
+) -> None:
+    def now() -> tuple[bool, bool]:
+        record = Session.open(session.path)
+        return record.is_solved, record.is_applied
+
+    assert now() == (False, False)
+    session.save_alignment(alignment)
+    session.save_results(RESULTS)
+    assert now() == (True, False)
+    session.save_applied({"left": SHIFT_M})
+    assert now() == (True, True)
+    session.save_alignment(alignment)
+    assert now() == (False, False)
+    assert Session.open(session.path).results == RESULTS  # of the first
+    session.save_results(RESULTS)
+    assert now() == (True, False)
+
+
+def test_a_shift_set_by_hand_is_kept_until_the_next_results(session: Session) -> None:
+    session.save_applied({"left": SHIFT_M, "right": SHIFT_M})
+    assert Session.open(session.path).fine_tuned is None
+    session.save_fine_tuned({"right": 2 * SHIFT_M})
+    session.save_fine_tuned({"right": 3 * SHIFT_M})
+    record = Session.open(session.path)
+    assert record.fine_tuned is not None
+    assert set(record.fine_tuned) == {"right"}
+    assert (record.fine_tuned["right"] == 3 * SHIFT_M).all()
+    session.save_results(RESULTS)
+    record = Session.open(session.path)
+    assert record.fine_tuned is None
+    assert (record.applied_shift_m["left"] == SHIFT_M).all()
+    assert (record.applied_shift_m["right"] == 3 * SHIFT_M).all()
+    for wrong in ({"middle": SHIFT_M}, {"left": SHIFT_M[:2]}, {"left": [0.0, 0.0, np.inf]}):
+        with pytest.raises(ValueError, match=r"middle|shape|finite"):
+            session.save_fine_tuned(wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("wearer", ["", "P07", "  Ana María Öz\t", "x" * 100])
+def test_the_wearer_comes_back(tmp_path: Path, wearer: str) -> None:
+    with Session.create(tmp_path, example_rig(), {}, name="one", wearer=wearer) as session:
+        assert Session.open(session.path).wearer == wearer.strip()
+
+
+@pytest.mark.parametrize(
+    "wearer", ["x" * 101, "two\nlines", "bell\x07", "\ud800", "two\u2028lines"]
+)
+def test_what_is_no_name_is_refused_and_leaves_nothing(tmp_path: Path, wearer: str) -> None:
+    with pytest.raises(ValueError, match="a wearer's name may"):
+        Session.create(tmp_path, example_rig(), {}, name="one", wearer=wearer)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_notes_are_kept_beside_the_journal(session: Session) -> None:
+    before = Session.open(session.path)
+    assert before.notes == ""
+    text = "Größe passt.\r\nLinks nochmal – φ?\n" + "ü" * (MAX_NOTES_CHARACTERS - 100)
+    session.save_notes("first")
+    session.save_notes(text)
+    record = Session.open(session.path)
+    assert record.notes == text
+    assert record.events == before.events
+    with pytest.raises(ValueError, match="20,000 characters"):
+        session.save_notes("x" * (MAX_NOTES_CHARACTERS + 1))
+    assert Session.open(session.path).notes == text
+    session.save_notes("half a pair \ud800")
+    assert Session.open(session.path).notes == "half a pair ?"
+
+
+def test_it_is_finished_until_something_happens(session: Session) -> None:
+    assert not Session.open(session.path).is_finished
+    session.finish()
+    session.save_notes("later")
+    assert Session.open(session.path).is_finished
+    session.record("went_on")
+    assert not Session.open(session.path).is_finished
+
+
+def test_whatever_is_written_shows_in_the_revision(
+    session: Session, alignment: Alignment, trial: Trial
+) -> None:
+    for write in (
+        lambda: session.record("something"),
+        lambda: session.save_alignment(alignment),
+        lambda: session.delete_alignment(1),
+        lambda: session.save_trial(trial),
+        lambda: session.save_results(RESULTS),
+        lambda: session.save_notes("x"),
+        lambda: session.finish(),
+    ):
+        before = session.revision
+        write()
+        assert session.revision > before
+
+
+def test_a_session_of_version_1_opens_and_goes_on(tmp_path: Path, alignment: Alignment) -> None:
+    path = tmp_path / "old"
+    shutil.copytree(VERSION_1, path)
+    record = Session.open(path)
+    # It saved t_a = 10 and 20, dropped the last, and saved 30 as number 2 again.
+    assert [old.t_a_ns for old in record.alignments] == [10, 30]
+    assert record.alignment_numbers == (1, 2)
+    assert not record.deleted
+    assert (record.wearer, record.notes, record.trials) == ("", "", ())
+    assert record.results == {"number": 3}
+    assert record.settings == {"calibration": {"steady_s": 0.5}}
+    assert not record.is_applied
+    assert record.applied_shift_m == {}
+    with Session(path) as session:
+        assert session.save_alignment(alignment) == 3
+        session.delete_alignment(1)
+    again = Session.open(path)
+    assert [old.t_a_ns for old in again.alignments] == [30, alignment.t_a_ns]
+    assert again.deleted[1].t_a_ns == 10
+    lines = (path / "journal.jsonl").read_text().splitlines()
+    versions = [json.loads(line)["version"] for line in lines]
+    assert versions == [1] * 7 + [JOURNAL_VERSION] * 2
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda part: (
+        st.lists(part, max_size=4) | st.dictionaries(st.text(max_size=5), part, max_size=3)
+    ),
+    max_leaves=8,
+)
+FIELDS = ["number", "sha256", "rig_sha256", "wearer", "trial", "shift_m"]
+
+
+@given(st.sampled_from(list(SessionEvent)), st.dictionaries(st.sampled_from(FIELDS), JSON))
+@settings(deadline=None)
+def test_a_strange_event_is_refused_or_harmless(
+    tmp_path_factory: pytest.TempPathFactory,
+    finished: SessionRecord,
+    event: SessionEvent,
+    data: dict[str, object],
+) -> None:
+    path = tmp_path_factory.mktemp("copy") / "session"
+    shutil.copytree(finished.path, path)
+    line = {"version": 2, "number": 13, "time": "", "event": event, "data": data}
+    with (path / "journal.jsonl").open("a") as journal:
+        journal.write(json.dumps(line) + "\n")
+    try:
+        record = Session.open(path)
+    except FileError as error:
+        assert "line 13" in str(error) or "damaged" in str(error)  # noqa: PT017
+        return
+    assert set(record.alignment_numbers) | set(record.deleted) <= {1, 2}
+    assert record.trials

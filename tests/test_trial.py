@@ -1,0 +1,118 @@
+import json
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, update_matrix
+from handcal.rig.example import example_rig
+from handcal.trial import Trial, make_trial, read_trial, summarise, trial_json
+from handcal.types import EYES, Float64
+
+RIG = example_rig()
+CALIBRATED_M = np.array([0.003, -0.002, 0.004])
+ADJUSTED_M = np.array([0.0035, -0.001, 0.002])
+
+
+def trial(depth_m: float = 0.5, adjusted_m: Float64 = ADJUSTED_M) -> Trial:
+    return make_trial(RIG.eyes["left"], "left", depth_m, CALIBRATED_M, adjusted_m)
+
+
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("depth_m", TARGET_DEPTHS_M)
+def test_errors_are_what_the_model_says(eye: Any, depth_m: float) -> None:
+    display = RIG.eyes[eye]
+    made = make_trial(display, eye, depth_m, CALIBRATED_M, ADJUSTED_M)
+    assert (made.eye, made.target_depth_m, made.time) == (eye, depth_m, "")
+    assert {tuple(corner) for corner in made.corners_E_m} == {
+        (x, y, depth_m) for x in (-0.04, 0.04) for y in (-0.04, 0.04)
+    }
+    for number, corner_m in enumerate(made.corners_E_m):
+        pixels = []
+        for shift_m in (CALIBRATED_M, ADJUSTED_M):
+            UQ = update_matrix(shift_m, display.z_C0_S_m)
+            image = display.K @ display.H0 @ UQ[:3] @ [*corner_m, 1.0]
+            pixels.append(image[:2] / image[2])
+        np.testing.assert_allclose([made.drawn_px[number], made.truth_px[number]], pixels)
+        error_px = np.hypot(*(pixels[0] - pixels[1]))
+        assert made.error_px[number] == pytest.approx(error_px)
+        assert made.error_arcmin[number] == pytest.approx(float(arcmin_from_px(display, error_px)))
+
+
+def test_no_adjustment_is_no_error() -> None:
+    made = trial(adjusted_m=CALIBRATED_M)
+    assert (made.error_px == 0.0).all()
+    assert (made.error_arcmin == 0.0).all()
+
+
+def test_a_shift_aside_by_hand() -> None:
+    # An eye 1 mm aside sees a point at 0.4 m against the display at 2 m off by 4 mm there.
+    made = make_trial(RIG.eyes["left"], "left", 0.4, np.zeros(3), [0.001, 0.0, 0.0])
+    np.testing.assert_allclose(made.error_arcmin, 60 * np.degrees(0.004 / 2.0), rtol=0.02)
+
+
+@pytest.mark.parametrize("depth_m", [0.0, -0.5, np.nan, np.inf])
+def test_a_target_that_does_not_stand_before_the_eye(depth_m: float) -> None:
+    with pytest.raises(ValueError, match="stand before the eye"):
+        trial(depth_m)
+
+
+def test_it_comes_back_from_json_bit_for_bit() -> None:
+    made = trial(0.6)
+    back = read_trial(json.loads(json.dumps(trial_json(made))), "noon")
+    assert back.time == "noon"
+    for name, value in trial_json(made).items():
+        assert trial_json(back)[name] == value
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"eye": "middle"}, "left or right"),
+        ({"eye": ["left"]}, "left or right"),
+        ({"target_depth_m": "far"}, "something else than numbers"),
+        ({"truth_px": [[1.0, 2.0]]}, "truth_px: expected an array of shape 4×2, got 1×2"),
+        ({"error_px": [1.0, 2.0, 3.0, None]}, "error_px"),
+        ({"error_px": [1.0, 2.0, 3.0, float("nan")]}, "error_px: must be finite"),
+        ({"error_px": {"a": 1}}, "something else than numbers"),
+        ({"adjusted_shift_m": [0, 0, 10**400]}, "something else than numbers"),
+    ],
+)
+def test_what_is_no_trial_is_refused(change: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        read_trial(trial_json(trial()) | change, "")
+
+
+def test_what_lacks_something_is_refused() -> None:
+    data = trial_json(trial())
+    del data["truth_px"]
+    with pytest.raises(ValueError, match="no 'truth_px'"):
+        read_trial(data, "")
+
+
+def test_statistics_are_of_all_corners() -> None:
+    trials = [trial(depth_m, ADJUSTED_M * factor) for depth_m in (0.6, 0.4) for factor in (1, 2)]
+    trials.append(replace(trials[0], eye="right"))
+    statistics = summarise(trials)
+    assert statistics.total is not None
+    px = np.concatenate([made.error_px for made in trials])
+    arcmin = np.concatenate([made.error_arcmin for made in trials])
+    assert (statistics.total.trials, statistics.total.corners) == (5, 20)
+    for spread, values in ((statistics.total.px, px), (statistics.total.arcmin, arcmin)):
+        assert spread.mean == pytest.approx(np.mean(values))
+        assert spread.sd == pytest.approx(np.sqrt(np.sum((values - values.mean()) ** 2) / 19))
+        assert spread.median == pytest.approx((np.sort(values)[9] + np.sort(values)[10]) / 2)
+        assert (spread.min, spread.max) == (values.min(), values.max())
+    assert list(statistics.by_eye) == ["left", "right"]
+    assert statistics.by_eye["right"].px.mean == pytest.approx(trials[0].error_px.mean())
+    assert list(statistics.by_depth_m) == [0.4, 0.6]
+    assert statistics.by_depth_m[0.6].trials == 3
+    json.dumps(asdict(statistics), allow_nan=False)
+
+
+def test_no_trials_have_no_statistics() -> None:
+    statistics = summarise([])
+    assert statistics.total is None
+    assert not statistics.by_eye
+    assert not statistics.by_depth_m

@@ -1,0 +1,56 @@
+import json
+from pathlib import Path
+
+from handcal.rig.example import example_rig
+from handcal.session import Session
+from handcal.types import Alignment
+from handcal.unfinished import unfinished_sessions
+
+
+def make(parent: Path, name: str, wearer: str = "") -> Session:
+    return Session.create(parent, example_rig(), {}, name=name, wearer=wearer)
+
+
+def test_only_those_not_finished_are_listed_the_newest_first(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    with make(tmp_path, "b-first", "P7") as first:
+        first.save_alignment(alignment)
+        first.save_alignment(alignment)
+        first.delete_alignment(1)
+        first.finish()
+        first.record("went_on")
+    with make(tmp_path, "c-done") as done:
+        done.finish()
+        done.save_notes("notes do not begin it again")
+    make(tmp_path, "a-second").close()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "file").write_text("not a folder")
+
+    newest, oldest = unfinished_sessions(tmp_path)
+    assert (newest.path, oldest.path) == (tmp_path / "a-second", tmp_path / "b-first")
+    assert (oldest.wearer, oldest.alignments, oldest.trials, oldest.problem) == ("P7", 1, 0, "")
+    assert oldest.started == Session.open(oldest.path).events[0].time
+    with Session(oldest.path):  # it can be gone on with
+        pass
+
+
+def test_what_cannot_be_gone_on_with_says_why(tmp_path: Path, alignment: Alignment) -> None:
+    for name in ("damaged", "foreign", "empty"):
+        with make(tmp_path, name) as session:
+            session.save_alignment(alignment)
+    (tmp_path / "damaged" / "alignments" / "1.npz").write_bytes(b"nothing")
+    event = json.dumps({"version": 9})
+    (tmp_path / "foreign" / "journal.jsonl").write_text(event + "\n")
+    (tmp_path / "empty" / "journal.jsonl").write_text("")
+    with make(tmp_path, "running"):
+        problems = {one.path.name: one.problem for one in unfinished_sessions(tmp_path)}
+    assert set(problems) == {"damaged", "foreign", "empty", "running"}
+    assert "1.npz is damaged" in problems["damaged"]
+    assert "not an event" in problems["foreign"]
+    assert "does not begin" in problems["empty"]
+    assert "in use by process" in problems["running"]
+
+
+def test_a_folder_that_is_not_there_has_none(tmp_path: Path) -> None:
+    assert unfinished_sessions(tmp_path / "missing") == []
