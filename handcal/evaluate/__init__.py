@@ -1,0 +1,1 @@
+"""Comparison of handcal's parts with annotated data."""

@@ -1,0 +1,91 @@
+"""Average precision of a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.hand.detect import overlaps
+from handcal.types import Bool, Float64
+
+_OVERLAP = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageResult:
+    """What was found in one image, and what is there.
+
+    Attributes
+    ----------
+    boxes : (N, 4) float64
+        Found: x0, y0, x1, y1 in pixels.
+    scores : (N,) float64
+    hands : (M, 4) float64
+        True boxes.
+    """
+
+    boxes: Float64
+    scores: Float64
+    hands: Float64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PrecisionRecall:
+    """A detector's curve over falling score.
+
+    Attributes
+    ----------
+    scores, precision, recall : (K,) float64
+    average_precision : float
+        Area under the curve with precision made monotonic (all-point interpolation, Everingham et
+        al. 2010); NaN where there are no hands.
+    """
+
+    scores: Float64
+    precision: Float64
+    recall: Float64
+    average_precision: float
+
+
+def precision_recall(results: Iterable[tuple[ImageResult, Bool]]) -> PrecisionRecall:
+    """Match what was found with what is there, at an intersection over union of 0.5.
+
+    Parameters
+    ----------
+    results : iterable of (ImageResult, (M,) bool)
+        With each image which of its hands count; finding another is neither right nor wrong.
+    """
+    scores, hits, hands = [], [], 0
+    for result, counted in results:
+        hit = _matches(result, counted)
+        judged = ~np.isnan(hit)
+        scores.append(result.scores[judged])
+        hits.append(hit[judged])
+        hands += int(np.count_nonzero(counted))
+    if not hands:
+        return PrecisionRecall(np.empty(0), np.empty(0), np.empty(0), float("nan"))
+    score, hit = np.concatenate(scores), np.concatenate(hits)
+    order = np.argsort(-score, kind="stable")
+    right = np.cumsum(hit[order])
+    precision = right / np.arange(1, len(right) + 1)
+    recall = right / hands
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    area = float(np.sum(np.diff(recall, prepend=0.0) * envelope))
+    return PrecisionRecall(score[order], precision, recall, area)
+
+
+def _matches(result: ImageResult, counted: Bool) -> Float64:
+    """Return for each box 1 if it is a hand's best, 0 if false, NaN if on one that counts not."""
+    overlap = overlaps(result.boxes, result.hands)
+    free = counted.copy()
+    hit = np.zeros(len(result.boxes))
+    for box in np.argsort(-result.scores, kind="stable"):
+        candidates = np.where(free, overlap[box], 0.0)
+        if candidates.size and candidates.max() >= _OVERLAP:
+            free[np.argmax(candidates)] = False
+            hit[box] = 1.0
+        elif (overlap[box][~counted] >= _OVERLAP).any():
+            hit[box] = np.nan
+    return hit

@@ -1,0 +1,194 @@
+"""Find hands in a colour image: a network run by onnxruntime, and what its output means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnxruntime
+
+from handcal.errors import FileError
+from handcal.types import Float32, Float64, UInt8, freeze
+
+STRIDES = (8, 16, 32)
+"""Pixels between the network's points on its three levels."""
+
+_GRAY = 127  # what the network's zero padding looks like
+
+
+@dataclass(frozen=True, slots=True)
+class DetectSettings:
+    """How hands are detected.
+
+    Attributes
+    ----------
+    pixels : int
+        The network sees the image shrunk or grown to at most so many pixels.
+    score_min : float
+        Candidates with a lower score are dropped.
+    overlap_max : float
+        Of two candidates whose intersection over union is larger, the one with the lower score is
+        dropped.
+    hands : int
+        At most so many hands are returned.
+    """
+
+    pixels: int = 92_160
+    score_min: float = 0.3
+    overlap_max: float = 0.5
+    hands: int = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detections:
+    """Hands found in an image, the surest first.
+
+    Attributes
+    ----------
+    boxes_px : (N, 4) float64
+        x0, y0, x1, y1.
+    scores : (N,) float64
+        0 to 1: the overlap with the true box that the network expects.
+    """
+
+    boxes_px: Float64
+    scores: Float64
+
+    def __post_init__(self) -> None:
+        freeze(self, "boxes_px", np.float64, None, 4)
+        freeze(self, "scores", np.float64, None)
+
+
+class HandDetector:
+    """The network, ready to run on one thread.
+
+    Parameters
+    ----------
+    model : Path
+        ONNX, as `handcal.train` exports it.
+    settings : DetectSettings, optional
+
+    Raises
+    ------
+    FileError
+        If the model cannot be loaded.
+    """
+
+    def __init__(self, model: Path, settings: DetectSettings | None = None) -> None:
+        self._settings = settings or DetectSettings()
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.log_severity_level = 3
+        try:
+            self._session = onnxruntime.InferenceSession(
+                model, options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # onnxruntime's exceptions have no common base
+            raise FileError(f"cannot load the hand detector {model}: {error}") from error
+
+    def detect(self, color: UInt8) -> Detections:
+        """Find the hands in an image.
+
+        Parameters
+        ----------
+        color : (H, W, 3) uint8
+            RGB.
+        """
+        canvas, scale = letterbox(color, self._settings.pixels)
+        [raw] = self._session.run(["raw"], {"image": canvas[None]})
+        boxes, scores = decode(raw, canvas.shape[:2], self._settings)
+        return Detections(boxes / scale, scores)
+
+
+def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
+    """Fit an image into the upper left of a canvas whose sides are multiples of the last stride.
+
+    Parameters
+    ----------
+    color : (h, w, 3) uint8
+    pixels : int
+        At most so many has the canvas, chosen to show the image as large as possible.
+
+    Returns
+    -------
+    canvas : (H, W, 3) uint8
+        Gray beside the image.
+    scale : float
+        Of the image in the canvas.
+    """
+    height, width = color.shape[:2]
+    cell = STRIDES[-1]
+    scale, canvas_width, canvas_height = max(
+        (min(columns * cell / width, rows * cell / height), columns * cell, rows * cell)
+        for columns in range(1, pixels // cell**2 + 1)
+        for rows in [pixels // cell**2 // columns]
+    )
+    # The image may need fewer cells than the largest canvas has.
+    size = (
+        min(max(1, round(scale * width)), canvas_width),
+        min(max(1, round(scale * height)), canvas_height),
+    )
+    canvas_shape = tuple(-(-side // cell) * cell for side in size[::-1])
+    canvas = np.full((*canvas_shape, 3), _GRAY, np.uint8)
+    while color.shape[0] >= 2 * size[1] and color.shape[1] >= 2 * size[0]:  # against aliasing
+        color = _halved(color)
+    cv2.resize(color, size, dst=canvas[: size[1], : size[0]])
+    return canvas, scale
+
+
+def _halved(color: UInt8) -> UInt8:
+    height, width = (side // 2 for side in color.shape[:2])
+    even = color[: 2 * height, : 2 * width]  # or OpenCV takes ten times as long
+    return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def points(height: int, width: int) -> tuple[Float32, Float32]:
+    """Return the network's points for a canvas: x and y in pixels (N, 2), and strides (N,)."""
+    places, strides = [], []
+    for stride in STRIDES:
+        y, x = np.mgrid[0:height:stride, 0:width:stride]
+        places.append(np.column_stack([x.ravel(), y.ravel()]))
+        strides.append(np.full(x.size, stride))
+    return np.concatenate(places).astype(np.float32), np.concatenate(strides).astype(np.float32)
+
+
+def decode(
+    raw: Float32, canvas_shape: tuple[int, int], settings: DetectSettings
+) -> tuple[Float64, Float64]:
+    """Return the boxes (N, 4) in the canvas and scores (N,) of raw predictions (5, P).
+
+    Sorted by score, the best first, after non-maximum suppression.
+    """
+    logit_min = np.log(settings.score_min / (1.0 - settings.score_min))
+    kept = np.flatnonzero(raw[0] > logit_min)
+    kept = kept[np.argsort(-raw[0, kept], kind="stable")][:1000]
+    at, strides = (values[kept] for values in points(*canvas_shape))
+    left, top, right, bottom = np.exp(raw[1:, kept].astype(np.float64).clip(-6.0, 6.0)) * strides
+    boxes = np.stack([at[:, 0] - left, at[:, 1] - top, at[:, 0] + right, at[:, 1] + bottom], axis=1)
+    chosen = _suppress(boxes, settings.overlap_max, settings.hands)
+    return boxes[chosen], 1.0 / (1.0 + np.exp(-raw[0, kept][chosen].astype(np.float64)))
+
+
+def overlaps(boxes: Float64, others: Float64) -> Float64:
+    """Return the intersection over union of boxes (N, 4) with others (M, 4), as (N, M)."""
+    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    shared = np.prod((high - low).clip(0.0), axis=2)
+    areas, other_areas = (np.prod(b[:, 2:] - b[:, :2], axis=1) for b in (boxes, others))
+    union = areas[:, None] + other_areas[None] - shared
+    result: Float64 = shared / np.maximum(union, 1e-9)
+    return result
+
+
+def _suppress(boxes: Float64, overlap_max: float, most: int) -> list[int]:
+    """Return the indices of boxes, best first, that overlap no better one."""
+    chosen: list[int] = []
+    remaining = np.arange(len(boxes))
+    while len(remaining) and len(chosen) < most:
+        best, remaining = remaining[0], remaining[1:]
+        chosen.append(int(best))
+        apart = overlaps(boxes[best : best + 1], boxes[remaining])[0] <= overlap_max
+        remaining = remaining[apart]
+    return chosen

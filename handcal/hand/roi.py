@@ -1,0 +1,218 @@
+"""Where to look for the wearer's hand: a detector's box, followed through the depth images."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeAlias
+
+import cv2
+import numpy as np
+
+from handcal.geometry import camera_matrix, image_points, invert, transform
+from handcal.hand.detect import Detections, overlaps
+from handcal.hand.settings import SegmentSettings
+from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
+from handcal.types import Bool, Float64, Frame, UInt8
+
+Wanted: TypeAlias = Literal["nearest", "left", "right"]
+
+_STEP_PX = 8  # of the depth image: fine enough to tell where a hand is
+_PIXELS_MIN = 6
+_DEPTH_SPREAD_M = 0.10  # of one hand
+_SAME_OVERLAP = 0.3
+_SHIFTS = 3
+
+
+class Detector(Protocol):
+    """Finds hands in a colour image."""
+
+    def detect(self, color: UInt8) -> Detections:
+        """Return the hands in an (H, W, 3) RGB image."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class RoiSettings:
+    """How the hand is chosen and followed.
+
+    Attributes
+    ----------
+    wanted : {"nearest", "left", "right"}
+        Which of several hands, as seen in the image.
+    check_s : float
+        The detector looks again at a hand that has been followed for so long.
+    search_s : float
+        While there is none, the detector looks this often.
+    misses : int
+        A followed hand that the detector does not see in so many looks in a row is dropped.
+    side_min_m, side_max_m : float
+        Range of the square root of a hand's box's area, at its depth.
+    """
+
+    wanted: Wanted = "nearest"
+    check_s: float = 0.15
+    search_s: float = 0.06
+    misses: int = 2
+    side_min_m: float = 0.05
+    side_max_m: float = 0.30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Track:
+    """A hand in the depth image: its box, its depth, and its mass's place and size in the box."""
+
+    box: Float64
+    depth_m: float
+    offset: Float64
+    pixels: int
+
+
+class RoiFinder:
+    """Finds one hand and follows it from frame to frame.
+
+    Between looks of the detector the box moves with what is in it at the hand's depth.
+
+    Parameters
+    ----------
+    detector : Detector
+    segmenting : SegmentSettings
+        Its depth gate is where hands are.
+    settings : RoiSettings, optional
+    """
+
+    def __init__(
+        self,
+        detector: Detector,
+        segmenting: SegmentSettings,
+        settings: RoiSettings | None = None,
+    ) -> None:
+        self._detector = detector
+        self._gate_m = segmenting.depth_min_m, segmenting.depth_max_m
+        self._settings = settings or RoiSettings()
+        self._track: _Track | None = None
+        self._misses = 0
+        self._looked_ns: int | None = None
+
+    def find(self, frame: Frame) -> Box | None:
+        """Return the hand's box in the depth image; None if none is in sight or without colour."""
+        if frame.color is None:
+            return None
+        cloud = _CoarseCloud(frame, self._gate_m)
+        self._track = self._track and cloud.follow(self._track)
+        wait_s = self._settings.search_s
+        if self._track is not None and not self._misses:
+            wait_s = self._settings.check_s
+        if self._looked_ns is None or frame.t_camera_ns - self._looked_ns >= wait_s * 1e9:
+            self._looked_ns = frame.t_camera_ns
+            self._look(frame.color, cloud)
+        return None if self._track is None else cloud.clip(self._track.box)
+
+    def _look(self, color: UInt8, cloud: _CoarseCloud) -> None:
+        """Let the detector confirm the track, drop it, or begin one."""
+        hands = [
+            track
+            for box in self._detector.detect(color).boxes_px
+            if (track := cloud.track(box)) is not None and self._is_hand_sized(track, cloud)
+        ]
+        if self._track is not None:
+            same = [hand for hand in hands if _overlap(hand, self._track) >= _SAME_OVERLAP]
+            self._misses = 0 if same else self._misses + 1
+            if same:
+                self._track = same[0]
+            elif self._misses >= self._settings.misses:
+                self._track = None
+        if self._track is None:
+            self._misses = 0
+            self._track = min(hands, key=self._order, default=None)
+
+    def _is_hand_sized(self, track: _Track, cloud: _CoarseCloud) -> bool:
+        side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
+        side_m = side_px * track.depth_m / cloud.camera.fx
+        return bool(self._settings.side_min_m <= side_m <= self._settings.side_max_m)
+
+    def _order(self, track: _Track) -> float:
+        if self._settings.wanted == "nearest":
+            return track.depth_m
+        return float(track.box[0] if self._settings.wanted == "left" else -track.box[2])
+
+
+class _CoarseCloud:
+    """The pixels of a frame's coarse depth image that lie within the depth gate."""
+
+    def __init__(self, frame: Frame, gate_m: tuple[float, float]) -> None:
+        assert frame.color_intrinsics is not None
+        self.camera = frame.depth_intrinsics
+        self._color_camera = frame.color_intrinsics
+        self._T_C_D = frame.T_C_D
+        self._aligned = self.camera == self._color_camera and bool((np.eye(4) == self._T_C_D).all())
+        whole = 0, 0, self.camera.width, self.camera.height
+        self._view = view_depth(frame, whole, _STEP_PX)
+        self._rows, self._columns = pixels_of(between(self._view, *gate_m))
+        self._px = _STEP_PX * np.column_stack([self._columns, self._rows]).astype(np.float64)
+        self._depth_m = self._view.depth[self._rows, self._columns] * self._view.scale_m
+
+    def track(self, color_box: Float64) -> _Track | None:
+        """Return the nearest thing in a box of the colour image."""
+        inside = _inside(self._color_px(), color_box)
+        if np.count_nonzero(inside) < _PIXELS_MIN:
+            return None
+        nearest_m = np.quantile(self._depth_m[inside], 0.1)
+        inside &= self._depth_m < nearest_m + _DEPTH_SPREAD_M
+        depth_m = float(np.median(self._depth_m[inside]))
+        box = self._depth_box(color_box, depth_m)
+        offset = self._px[inside].mean(0) - _center(box)
+        return _Track(box, depth_m, offset, int(np.count_nonzero(inside)))
+
+    def follow(self, track: _Track) -> _Track | None:
+        """Move a track's box with the mass in it; None if most of that is gone."""
+        near = np.abs(self._depth_m - track.depth_m) < _DEPTH_SPREAD_M
+        px, depth_m = self._px[near], self._depth_m[near]
+        box = track.box
+        for _ in range(_SHIFTS):  # mean shift
+            inside = _inside(px, box)
+            if np.count_nonzero(inside) < max(_PIXELS_MIN, track.pixels / 2):
+                return None
+            shift = px[inside].mean(0) - track.offset - _center(box)
+            box = box + np.tile(shift, 2)
+        return _Track(box, float(np.median(depth_m[inside])), track.offset, track.pixels)
+
+    def clip(self, box: Float64) -> Box | None:
+        """Return a box in whole pixels within the depth image, None if it is outside."""
+        x0, y0 = np.floor(box[:2].clip(0)).astype(int).tolist()
+        x1, y1 = np.ceil(box[2:].clip(0)).astype(int).tolist()
+        x1, y1 = min(x1, self.camera.width), min(y1, self.camera.height)
+        return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
+
+    def _color_px(self) -> Float64:
+        """Return where the colour image shows the pixels, (N, 2)."""
+        if self._aligned:
+            return self._px
+        points_m = deproject(self._view, self._rows, self._columns).T
+        return image_points(transform(self._T_C_D, points_m), self._color_camera)
+
+    def _depth_box(self, color_box: Float64, depth_m: float) -> Float64:
+        """Return a box of the colour image in the depth image, for things at a depth."""
+        if self._aligned:
+            return color_box
+        rays = cv2.undistortPoints(
+            color_box.reshape(2, 1, 2),
+            camera_matrix(self._color_camera),
+            np.array(self._color_camera.distortion),
+        )
+        corners_m = np.column_stack([rays.reshape(2, 2), np.ones(2)]) * depth_m
+        return image_points(transform(invert(self._T_C_D), corners_m), self.camera).ravel()
+
+
+def _inside(px: Float64, box: Float64) -> Bool:
+    x, y = px.T
+    inside: Bool = (x >= box[0]) & (y >= box[1]) & (x < box[2]) & (y < box[3])
+    return inside
+
+
+def _center(box: Float64) -> Float64:
+    center: Float64 = (box[:2] + box[2:]) / 2.0
+    return center
+
+
+def _overlap(track: _Track, other: _Track) -> float:
+    return float(overlaps(track.box[None], other.box[None])[0, 0])

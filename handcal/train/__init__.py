@@ -1,0 +1,1 @@
+"""Training and export of the hand detector; the only room that needs PyTorch."""

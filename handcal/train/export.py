@@ -1,0 +1,90 @@
+"""The trained network as ONNX: in 32-bit floats, and quantised to 8-bit integers."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from onnxruntime.quantization import (
+    CalibrationDataReader,
+    QuantFormat,
+    QuantType,
+    quantize_static,
+)
+from onnxruntime.quantization.shape_inference import quant_pre_process
+from torch import Tensor, nn
+
+from handcal.evaluate.annotations import Photo, read_image
+from handcal.hand.detect import DetectSettings, letterbox
+from handcal.train.model import HandNet
+
+_OPSET = 17
+
+
+class _Camera(nn.Module):
+    """The network fed with a camera's own images: (1, H, W, 3) uint8."""
+
+    def __init__(self, net: HandNet) -> None:
+        super().__init__()
+        self._net = net
+
+    def forward(self, image: Tensor) -> Tensor:
+        raw: Tensor = self._net(image.permute(0, 3, 1, 2).float())
+        return raw[0]
+
+
+def export_float(net: HandNet, path: Path) -> None:
+    """Write the network with input ``image`` (1, H, W, 3) uint8 and output ``raw`` (5, N)."""
+    torch.onnx.export(
+        _Camera(net).eval().cpu(),
+        (torch.zeros(1, 256, 320, 3, dtype=torch.uint8),),
+        str(path),
+        input_names=["image"],
+        output_names=["raw"],
+        dynamic_axes={"image": {1: "height", 2: "width"}, "raw": {1: "points"}},
+        opset_version=_OPSET,
+        dynamo=False,
+    )
+
+
+def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> None:
+    """Quantise an exported network: static, QDQ, one scale per channel of the weights.
+
+    Parameters
+    ----------
+    float_path, path : Path
+    photos : sequence of Photo
+        From which the ranges of all values between the layers are taken.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        prepared = Path(folder) / "prepared.onnx"
+        quant_pre_process(str(float_path), str(prepared), skip_symbolic_shape=True)
+        quantize_static(
+            str(prepared),
+            str(path),
+            _Calibration(photos),
+            quant_format=QuantFormat.QDQ,
+            per_channel=True,
+            activation_type=QuantType.QUInt8,
+            weight_type=QuantType.QInt8,
+            reduce_range=True,
+            op_types_to_quantize=["Conv", "Add", "Resize"],
+        )
+
+
+class _Calibration(CalibrationDataReader):  # type: ignore[misc]
+    def __init__(self, photos: Sequence[Photo]) -> None:
+        self._inputs = self._read(photos)
+
+    def get_next(self) -> dict[str, Any] | None:
+        return next(self._inputs, None)
+
+    @staticmethod
+    def _read(photos: Sequence[Photo]) -> Iterator[dict[str, Any]]:
+        for photo in photos:
+            canvas, _ = letterbox(read_image(photo.path), DetectSettings().pixels)
+            yield {"image": np.ascontiguousarray(canvas[None])}

@@ -1,0 +1,267 @@
+"""The training itself: resumable, and the same on every run of one machine."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.utils.data import DataLoader
+
+from handcal.evaluate.annotations import Photo, read_image
+from handcal.evaluate.detector import summary
+from handcal.evaluate.precision import ImageResult
+from handcal.hand.detect import DetectSettings, decode, letterbox, points
+from handcal.train.loss import Grid, detection_loss
+from handcal.train.model import HandNet
+from handcal.train.samples import Samples, SampleSettings, collate
+
+_SCORE_MIN = 0.02  # a precision/recall curve wants the doubtful ones too
+
+
+@dataclass(frozen=True, slots=True)
+class TrainSettings:
+    """How the network is trained.
+
+    Attributes
+    ----------
+    seed : int
+    steps, batch : int
+    rate, backbone_rate : float
+        Highest learning rates of AdamW, of the new layers and of the pretrained ones; rising over
+        the first `rise` of the steps, falling linearly to 0 over the last `fall`.
+    rise, fall : float
+    weight_decay : float
+    gradient_max : float
+        Longer gradients are shortened to this norm.
+    average : float
+        Decay per step of the running mean of the weights, which is what is evaluated.
+    validated : float
+        Share of the photographs kept aside to judge progress by.
+    samples : SampleSettings
+    """
+
+    seed: int = 1
+    steps: int = 6000
+    batch: int = 8
+    rate: float = 1e-3
+    backbone_rate: float = 3e-4
+    rise: float = 0.03
+    fall: float = 0.5
+    weight_decay: float = 0.03
+    gradient_max: float = 10.0
+    average: float = 0.998
+    validated: float = 0.1
+    samples: SampleSettings = field(default_factory=SampleSettings)
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How often progress is written, and what computes it.
+
+    Attributes
+    ----------
+    checkpoint_s : float
+    validate_steps : int
+    threads, workers : int
+        Of the network, and processes that prepare samples.
+    """
+
+    checkpoint_s: float = 180.0
+    validate_steps: int = 1000
+    threads: int = 1
+    workers: int = 1
+
+
+class Training:
+    """A network in training, and all it takes to go on after an interruption.
+
+    Parameters
+    ----------
+    net : HandNet
+        With its backbone loaded.
+    folder : Path
+        Holds ``checkpoint.pt`` and ``log.jsonl``; training resumes from there.
+    settings : TrainSettings
+    pace : Pace
+    """
+
+    def __init__(self, net: HandNet, folder: Path, settings: TrainSettings, pace: Pace) -> None:
+        torch.set_num_threads(pace.threads)
+        torch.manual_seed(settings.seed)
+        self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self._net = net.to(self._device)
+        self._net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self._average = torch.optim.swa_utils.AveragedModel(
+            self._net, multi_avg_fn=_ema(settings.average), use_buffers=True
+        )
+        self._optimizer = torch.optim.AdamW(
+            _groups(self._net, settings), weight_decay=settings.weight_decay
+        )
+        self._step = 0
+        self._folder = folder
+        self._settings = settings
+        self._pace = pace
+        self._checkpoint = folder / "checkpoint.pt"
+        if self._checkpoint.exists():
+            self._restore()
+
+    def run(self, photos: Sequence[Photo], hands: Path) -> nn.Module:
+        """Train to the end and return the averaged network.
+
+        Parameters
+        ----------
+        photos : sequence of Photo
+        hands : Path
+            Folder written by `render_hands`.
+        """
+        trained, validated = split(photos, self._settings.validated)
+        saved_s = time.monotonic()
+        losses: list[list[float]] = []
+        for images, targets in self._batches(
+            Samples(trained, hands, self._settings.samples, self._settings.seed)
+        ):
+            losses.append(self._learn(images, targets))
+            if self._step % 50 == 0:
+                self._log(losses=np.mean(losses, 0).round(4).tolist())
+                losses.clear()
+            if time.monotonic() - saved_s > self._pace.checkpoint_s:
+                self._save()
+                saved_s = time.monotonic()
+            if self._step % self._pace.validate_steps == 0:
+                self._log(**self.validate(validated))
+        self._save()
+        self._log(**self.validate(validated))
+        return self._average.module
+
+    def validate(self, photos: Sequence[Photo]) -> dict[str, float]:
+        """Return the averaged network's average precisions on whole photographs."""
+        net = self._average.module.eval()
+        settings = DetectSettings(score_min=_SCORE_MIN)
+        results = []
+        for photo in photos:
+            canvas, scale = letterbox(read_image(photo.path), settings.pixels)
+            image = torch.from_numpy(canvas).to(self._device).permute(2, 0, 1)[None].float()
+            with torch.inference_mode():
+                raw = net(image)[0].float().cpu().numpy()
+            boxes, scores = decode(raw, canvas.shape[:2], settings)
+            results.append(ImageResult(boxes / scale, scores, photo.boxes))
+        return summary(photos, results)
+
+    def _batches(self, samples: Samples) -> Iterator[tuple[Tensor, list[Tensor]]]:
+        batch = self._settings.batch
+        loader = DataLoader(
+            samples,
+            batch_size=batch,
+            sampler=range(self._step * batch, self._settings.steps * batch),
+            num_workers=self._pace.workers,
+            collate_fn=collate,
+            worker_init_fn=_quiet_worker,
+        )
+        yield from loader
+
+    def _learn(self, images: Tensor, targets: list[Tensor]) -> list[float]:
+        """Take one step; return the losses of scores and boxes."""
+        self._set_rates()
+        self._net.train()
+        images = images.to(self._device).float()
+        with torch.autocast("cuda", torch.bfloat16, enabled=self._device.type == "cuda"):
+            raw = self._net(images)
+        grid = _grid(images.shape[2], images.shape[3], self._device)
+        hands = [target.to(self._device) for target in targets]
+        score_loss, box_loss = detection_loss(raw.float(), hands, grid)
+        self._optimizer.zero_grad()
+        (score_loss + box_loss).backward()  # type: ignore[no-untyped-call]
+        nn.utils.clip_grad_norm_(self._net.parameters(), self._settings.gradient_max)
+        self._optimizer.step()
+        self._average.update_parameters(self._net)
+        self._step += 1
+        return [score_loss.item(), box_loss.item()]
+
+    def _set_rates(self) -> None:
+        settings = self._settings
+        done = (self._step + 1) / settings.steps
+        factor = min(1.0, done / settings.rise, (1.0 - done) / settings.fall + 1e-3)
+        for group in self._optimizer.param_groups:
+            group["lr"] = factor * group["highest"]
+
+    def _save(self) -> None:
+        state = {
+            "step": self._step,
+            "net": self._net.state_dict(),
+            "average": self._average.state_dict(),
+            "optimizer": self._optimizer.state_dict(),
+        }
+        temporary = self._checkpoint.with_suffix(".new")
+        torch.save(state, temporary)
+        temporary.replace(self._checkpoint)
+
+    def _restore(self) -> None:
+        state = torch.load(self._checkpoint, map_location=self._device, weights_only=True)
+        self._step = state["step"]
+        self._net.load_state_dict(state["net"])
+        self._average.load_state_dict(state["average"])
+        self._optimizer.load_state_dict(state["optimizer"])
+
+    def _log(self, **values: Any) -> None:
+        line = json.dumps({"step": self._step, "time": time.strftime("%H:%M:%S"), **values})
+        with (self._folder / "log.jsonl").open("a") as file:
+            file.write(line + "\n")
+
+
+def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[Photo]]:
+    """Return the photographs to train on, and those kept aside."""
+    order = np.random.default_rng(0).permutation(len(photos))
+    aside = set(order[: round(validated * len(photos))].tolist())
+    return (
+        [photo for i, photo in enumerate(photos) if i not in aside],
+        [photo for i, photo in enumerate(photos) if i in aside],
+    )
+
+
+def _groups(net: HandNet, settings: TrainSettings) -> list[dict[str, Any]]:
+    """Return the trained parameters with their highest rates; biases and scales do not decay."""
+    groups = []
+    for pretrained, rate in ((True, settings.backbone_rate), (False, settings.rate)):
+        named = [
+            parameter
+            for name, parameter in net.named_parameters()
+            if parameter.requires_grad and name.startswith("blocks.") == pretrained
+        ]
+        groups += [
+            {"params": [p for p in named if p.ndim > 1], "highest": rate},
+            {"params": [p for p in named if p.ndim == 1], "highest": rate, "weight_decay": 0.0},
+        ]
+    return groups
+
+
+def _ema(decay: float) -> Any:
+    """Return the averaging of `AveragedModel`, quicker over the first steps."""
+
+    def update(averages: list[Tensor], values: list[Tensor], averaged: Tensor) -> None:
+        weight = 1.0 - min(decay, (1.0 + float(averaged)) / (10.0 + float(averaged)))
+        for average, value in zip(averages, values, strict=True):
+            if average.is_floating_point():
+                average.lerp_(value, weight)
+            else:
+                average.copy_(value)
+
+    return update
+
+
+def _grid(height: int, width: int, device: torch.device) -> Grid:
+    places, strides = points(height, width)
+    return Grid(torch.from_numpy(places).to(device), torch.from_numpy(strides).to(device))
+
+
+def _quiet_worker(_: int) -> None:
+    import cv2
+
+    cv2.setNumThreads(0)
+    torch.set_num_threads(1)

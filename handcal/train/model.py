@@ -1,0 +1,103 @@
+"""The detector's network: MobileNetV1, a small feature pyramid, one anchor-free head.
+
+Howard et al. 2017 (MobileNet), Lin et al. 2017 (FPN), Tian et al. 2019 (FCOS).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from handcal.hand.detect import STRIDES
+
+# Channels in, channels out and stride of the thirteen separable convolutions.
+_BLOCKS = (
+    (32, 64, 1),
+    (64, 128, 2),
+    (128, 128, 1),
+    (128, 256, 2),
+    (256, 256, 1),
+    (256, 512, 2),
+    *((512, 512, 1),) * 5,
+    (512, 1024, 2),
+    (1024, 1024, 1),
+)
+# The blocks whose outputs have the strides 8, 16 and 32.
+_TAPS = (5, 11, 13)
+_WIDTH = 96
+_PRIOR = 0.01
+
+
+def _separable(inputs: int, outputs: int, stride: int) -> nn.Sequential:
+    """Return a depthwise and a pointwise convolution, batch normalisation folded into both."""
+    return nn.Sequential(
+        OrderedDict(
+            depthwise=nn.Conv2d(inputs, inputs, 3, stride, 1, groups=inputs),
+            depthwise_act=nn.ReLU6(inplace=True),
+            pointwise=nn.Conv2d(inputs, outputs, 1),
+            pointwise_act=nn.ReLU6(inplace=True),
+        )
+    )
+
+
+def _normalised(inputs: int, outputs: int, size: int = 1, groups: int = 1) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Conv2d(inputs, outputs, size, padding=size // 2, groups=groups, bias=False),
+        nn.BatchNorm2d(outputs, momentum=0.03),
+        nn.ReLU6(inplace=True),
+    )
+
+
+class HandNet(nn.Module):
+    """Maps (B, 3, H, W) RGB of 0 to 255, H and W multiples of 32, to (B, 5, N) raw predictions.
+
+    N counts the points of all strides, rows first; the five are the logit of the score and the
+    logarithms of the distances, in strides, from the point to the box's left, top, right, bottom.
+
+    Parameters
+    ----------
+    frozen_blocks : int
+        That many of the first blocks, and the convolution before them, are not trained.
+    """
+
+    def __init__(self, frozen_blocks: int = 3) -> None:
+        super().__init__()
+        self.stem = nn.Sequential(nn.Conv2d(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
+        self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)
+        self.lateral = nn.ModuleList(_normalised(_BLOCKS[tap - 1][1], _WIDTH) for tap in _TAPS)
+        self.tower = nn.Sequential(
+            *(
+                layer
+                for _ in range(2)
+                for layer in (_normalised(_WIDTH, _WIDTH, 5, _WIDTH), _normalised(_WIDTH, _WIDTH))
+            )
+        )
+        self.predict = nn.Conv2d(_WIDTH, 5, 1)
+        nn.init.normal_(self.predict.weight, std=0.01)
+        # At first a point is rarely a hand, and boxes are four strides wide.
+        first_bias = [-math.log(1.0 / _PRIOR - 1.0)] + [math.log(2.0)] * 4
+        self.predict.bias = nn.Parameter(torch.tensor(first_bias))
+        for part in (self.stem, *self.blocks[:frozen_blocks]):
+            part.requires_grad_(False)
+
+    def forward(self, images: Tensor) -> Tensor:
+        """Return the raw predictions."""
+        features = self.stem(images * (1.0 / 127.5) - 1.0)
+        taps = []
+        for number, block in enumerate(self.blocks, 1):
+            features = block(features)
+            if number in _TAPS:
+                taps.append(features)
+        pyramid = [lateral(tap) for lateral, tap in zip(self.lateral, taps, strict=True)]
+        for level in (1, 0):
+            pyramid[level] = pyramid[level] + functional.interpolate(
+                pyramid[level + 1], scale_factor=2.0, mode="nearest"
+            )
+        return torch.cat([self.predict(self.tower(level)).flatten(2) for level in pyramid], 2)
+
+
+assert len(_TAPS) == len(STRIDES)

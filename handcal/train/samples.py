@@ -1,0 +1,172 @@
+"""What the network is shown: crops of photographs, and simulated hands alone or pasted on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from handcal.evaluate.annotations import Photo, read_image
+from handcal.files import read_json
+from handcal.train.augment import (
+    blemish,
+    box_corners,
+    clipped,
+    random_warp,
+    relight,
+    transform_corners,
+)
+from handcal.types import Float32, Float64, UInt8
+
+_SHOWN_MIN = 0.35
+_SMALLEST_PX = 9.0
+_GRAY = (127, 127, 127)
+
+
+@dataclass(frozen=True, slots=True)
+class SampleSettings:
+    """How samples are drawn.
+
+    Attributes
+    ----------
+    side_px : int
+        Of the square crops; a multiple of the largest stride.
+    whole_px : float
+        Side of a square with as many pixels as the detector will shrink a whole image to.
+    zoomed : float
+        Share of the crops in which one hand is zoomed to fill 12–85 % of the side, as a wearer's
+        does; the others show the photograph about as large as the detector will see it.
+    zoom_max : float
+        A photograph is enlarged no further.
+    large_weight : float
+        How much likelier a photograph is chosen if a hand fills 15 % of it or more.
+    simulated, pasted : float
+        Shares of samples that are simulated pictures, and photographs with a simulated hand.
+    """
+
+    side_px: int = 224
+    whole_px: float = 300.0
+    zoomed: float = 0.5
+    zoom_max: float = 4.0
+    large_weight: float = 2.0
+    simulated: float = 0.06
+    pasted: float = 0.06
+
+
+class Samples(Dataset[tuple[UInt8, Float32]]):
+    """Sample i is a pure function of the seed and i, so that training can resume anywhere.
+
+    Parameters
+    ----------
+    photos : sequence of Photo
+    hands : Path
+        Folder written by `render_hands`.
+    settings : SampleSettings
+    seed : int
+    """
+
+    def __init__(
+        self, photos: Sequence[Photo], hands: Path, settings: SampleSettings, seed: int
+    ) -> None:
+        self._photos = photos
+        self._hands = [
+            (hands / name, np.array([box], np.float64))
+            for name, box in read_json(hands / "boxes.json").items()
+        ]
+        self._settings = settings
+        self._seed = seed
+        weights = np.array(
+            [
+                settings.large_weight if photo.relative_sizes.max(initial=0.0) >= 0.15 else 1.0
+                for photo in photos
+            ]
+        )
+        self._bounds = np.cumsum(weights) / weights.sum()
+
+    def __getitem__(self, index: int) -> tuple[UInt8, Float32]:
+        """Return a crop (side, side, 3) and its boxes (M, 5) as `clipped` gives them."""
+        rng = np.random.default_rng((self._seed, index))
+        kind = rng.random() - self._settings.simulated
+        if kind < 0.0:
+            image, boxes = self._simulated(rng)
+        else:
+            image, boxes = self._photographed(rng)
+            if kind < self._settings.pasted:
+                image, boxes = self._paste(rng, image, boxes)
+        return blemish(rng, relight(rng, image)).astype(np.uint8, copy=False), boxes
+
+    def _photographed(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
+        photo = self._photos[int(np.searchsorted(self._bounds, rng.random()))]
+        warp = self._view(rng, photo)
+        image = self._warped(read_image(photo.path), warp)
+        return image, self._clipped(transform_corners(warp, photo.quads))
+
+    def _view(self, rng: np.random.Generator, photo: Photo) -> Float64:
+        """Choose a part of a photograph: about one of its hands, or anywhere."""
+        settings = self._settings
+        image_px = np.sqrt(photo.width * photo.height)
+        scale = settings.whole_px / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
+        center = rng.uniform(0.0, 1.0, 2) * (photo.width, photo.height)
+        if len(photo.boxes) and rng.random() < 0.85:
+            sizes = photo.relative_sizes
+            hand = rng.choice(len(sizes), p=sizes / sizes.sum())
+            center = (photo.boxes[hand, :2] + photo.boxes[hand, 2:]) / 2
+            if rng.random() < settings.zoomed:
+                wanted_px = settings.side_px * np.exp(rng.uniform(np.log(0.12), np.log(0.85)))
+                scale = min(wanted_px / (sizes[hand] * image_px), settings.zoom_max)
+        size_px = photo.width, photo.height
+        return random_warp(rng, size_px, center, scale, settings.side_px)
+
+    def _simulated(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
+        picture, boxes, warp = self._raised(rng)
+        return self._warped(picture[..., :3], warp), boxes
+
+    def _paste(
+        self, rng: np.random.Generator, image: UInt8, boxes: Float32
+    ) -> tuple[UInt8, Float32]:
+        """Hold a simulated hand before a picture; hands that it covers are left out."""
+        picture, pasted, warp = self._raised(rng)
+        cut = self._warped(np.ascontiguousarray(picture), warp, border=0)
+        opaque = cv2.GaussianBlur(cut[..., 3:], (3, 3), 0.7)[..., None] / np.float32(255.0)
+        blended = cut[..., :3] * opaque + image * (1.0 - opaque)
+        for box in boxes:
+            x0, y0, x1, y1 = box[:4].astype(int)
+            box[4] = max(box[4], opaque[y0 : y1 + 1, x0 : x1 + 1].mean() > 0.3)
+        return blended.astype(np.uint8), np.concatenate([boxes, pasted])
+
+    def _raised(self, rng: np.random.Generator) -> tuple[UInt8, Float32, Float64]:
+        """Return a simulated picture (RGBA), and the box and map of a view of it."""
+        path, box = self._hands[rng.integers(len(self._hands))]
+        picture = read_image(path, cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]]
+        hand_px = float(np.sqrt(np.prod(box[0, 2:] - box[0, :2])))
+        wanted_px = self._settings.side_px * np.exp(rng.uniform(np.log(0.2), np.log(0.8)))
+        center = (box[0, :2] + box[0, 2:]) / 2
+        warp = random_warp(
+            rng, picture.shape[1::-1], center, wanted_px / hand_px, self._settings.side_px
+        )
+        boxes = self._clipped(transform_corners(warp, box_corners(box)))
+        return picture, boxes, warp
+
+    def _warped(self, image: UInt8, warp: Float64, border: int | None = None) -> UInt8:
+        """Return the square that the map takes an image to."""
+        side = self._settings.side_px
+        scale = np.sqrt(abs(np.linalg.det(warp[:, :2])))
+        smooth = cv2.GaussianBlur(image, (0, 0), 0.35 / scale) if scale < 0.6 else image
+        fill = _GRAY if border is None else (border,) * 4
+        square = cv2.warpAffine(smooth, warp, (side, side), borderValue=fill)
+        return square.astype(np.uint8, copy=False)
+
+    def _clipped(self, boxes: Float64) -> Float32:
+        return clipped(boxes, self._settings.side_px, _SHOWN_MIN, _SMALLEST_PX)
+
+
+def collate(samples: list[tuple[UInt8, Float32]]) -> tuple[Tensor, list[Tensor]]:
+    """Return images (B, 3, side, side) uint8, channels last in memory, and each one's boxes."""
+    images = torch.from_numpy(np.stack([image for image, _ in samples]))
+    return images.permute(0, 3, 1, 2), [torch.from_numpy(boxes) for _, boxes in samples]

@@ -1,0 +1,71 @@
+"""Simulated hands to train on: of all skin tones, raised before a wearer's camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from handcal.files import make_folder, read_json, write_json
+from handcal.geometry import rigid, transform
+from handcal.sim.hand import HandModel, HandSettings, make_hand
+from handcal.sim.raster import draw_hand
+from handcal.sim.render import World, render
+from handcal.sim.room import make_room
+from handcal.types import Float64, Intrinsics
+
+# A third of the colour image of an Intel RealSense D415, 69° across.
+CAMERA = Intrinsics(width=424, height=240, fx=306.0, fy=306.0, cx=211.5, cy=119.5)
+_FIRST_SEED = 1_000_000  # tests and benchmarks count from 0
+_HANDS_PER_ROOM = 25
+_GRID_M = 0.003
+
+
+def render_hands(folder: Path, count: int) -> None:
+    """Write `count` pictures as PNG, opaque where the hand and its arm are, and their boxes.
+
+    Does nothing where they are already there.
+    """
+    listing = make_folder(folder) / "boxes.json"
+    if listing.exists() and len(read_json(listing)) == count:
+        return
+    boxes = {}
+    for number in range(count):
+        seed = _FIRST_SEED + number
+        if number % _HANDS_PER_ROOM == 0:
+            room = make_room(seed)
+        rng = np.random.default_rng(seed)
+        hand = make_hand(seed, HandSettings(grid_m=_GRID_M))
+        T_W_D = rigid([rng.normal(0.0, 0.2), rng.uniform(-3.1, 3.1), 0.0])
+        T_D_hand = _raised(rng)
+        _, color = render(World(hand, room), T_W_D, T_W_D @ T_D_hand, CAMERA)
+        drawn = draw_hand(hand, T_D_hand, CAMERA)
+        rows, columns = drawn.depth_m.shape
+        alpha = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
+        alpha[drawn.y0 : drawn.y0 + rows, drawn.x0 : drawn.x0 + columns][
+            np.isfinite(drawn.depth_m)
+        ] = 255
+        name = f"{number:05}.png"
+        boxes[name] = hand_box(hand, T_D_hand, CAMERA).tolist()
+        cv2.imwrite(str(folder / name), np.dstack([color[..., ::-1], alpha]))
+    write_json(listing, boxes)
+
+
+def hand_box(hand: HandModel, T_D_hand: Float64, camera: Intrinsics) -> Float64:
+    """Return x0, y0, x1, y1 about the hand, its forearm left out, in pixels; (4,) float64."""
+    beyond_wrist = (hand.vertices_m - hand.wrist_m) @ hand.arm_axis < 0.0
+    x, y, z = transform(T_D_hand, hand.vertices_m[beyond_wrist].astype(np.float64)).T
+    u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+    return np.array([u.min(), v.min(), u.max(), v.max()]).round(1)
+
+
+def _raised(rng: np.random.Generator) -> Float64:
+    """Return the pose of a hand in view, within arm's reach, palm or back to the camera."""
+    z = rng.uniform(0.3, 0.7)
+    x = z * rng.uniform(0.15, 0.85) * CAMERA.width / CAMERA.fx - z * CAMERA.cx / CAMERA.fx
+    y = z * rng.uniform(0.3, 0.75) * CAMERA.height / CAMERA.fy - z * CAMERA.cy / CAMERA.fy
+    facing = rigid([0.0, np.pi * rng.integers(2), 0.0])
+    tilted = rigid([rng.normal(0.0, 0.35), rng.normal(0.0, 0.4), 0.0])
+    rolled = rigid([0.0, 0.0, rng.normal(0.0, 0.6)])
+    return rigid(translation_m=[x, y, z]) @ rolled @ tilted @ facing
