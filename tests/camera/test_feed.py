@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from handcal.camera.feed import CameraFeed, FeedSettings
+from handcal.closable import Closable
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.types import Frame, Intrinsics
+
+CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)
+SETTINGS = FeedSettings(read_s=0.01, silent_s=0.03, reopen_s=0.05)
+UNPLUGGED = CameraError("the camera was unplugged; plug it in again")
+SILENT = CameraTimeoutError("nothing came")
+
+
+class Scripted(Closable):
+    """Gives what its script says, a frame for a number."""
+
+    name = "Scripted camera"
+    depth_intrinsics = CAMERA
+
+    def __init__(self, script: Sequence[int | Exception]) -> None:
+        self.script = list(script)
+        self.is_closed = False
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        step = self.script.pop(0) if self.script else SILENT
+        if isinstance(step, Exception):
+            time.sleep(timeout_s if isinstance(step, CameraTimeoutError) else 0.0)
+            raise step
+        return Frame(step, step, step, np.zeros((6, 8), np.uint16), 1e-3, CAMERA)
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def opener(*scripts: Sequence[int | Exception]) -> tuple[Callable[[], Scripted], list[Scripted]]:
+    """Return what opens one scripted camera after the other, and those opened."""
+    waiting, opened = list(scripts), list[Scripted]()
+
+    def open_camera() -> Scripted:
+        if not waiting:
+            raise CameraError("no camera is connected; plug one in")
+        opened.append(Scripted(waiting.pop(0)))
+        return opened[-1]
+
+    return open_camera, opened
+
+
+def read_frame(feed: CameraFeed, timeout_s: float = 5.0) -> Frame:
+    deadline_s = time.monotonic() + timeout_s
+    while time.monotonic() < deadline_s:
+        if (frame := feed.read()) is not None:
+            return frame
+    raise AssertionError("no frame came")
+
+
+def test_frames_come_and_gaps_in_their_count_are_dropped_frames() -> None:
+    open_camera, opened = opener([1, 2, 5, 6])
+    with CameraFeed(open_camera, SETTINGS) as feed:
+        frames = [feed.read() for _ in range(4)]
+        status = feed.status
+    assert [frame.index for frame in frames if frame is not None] == [1, 2, 5, 6]
+    assert (status.name, status.problem, status.dropped) == ("Scripted camera", "", 2)
+    assert status.rate_hz == pytest.approx(4.0)
+    assert opened[0].is_closed
+
+
+def test_a_camera_unplugged_and_plugged_in_again_goes_on() -> None:
+    open_camera, opened = opener([7, UNPLUGGED], [1])
+    with CameraFeed(open_camera, SETTINGS) as feed:
+        assert feed.read() is not None
+        assert feed.read() is None
+        assert feed.status.problem == str(UNPLUGGED)
+        assert read_frame(feed).index == 1
+        assert feed.status.problem == ""
+        assert feed.status.dropped == 0  # it counts anew
+    assert [camera.is_closed for camera in opened] == [True, True]
+
+
+def test_it_says_why_no_camera_can_be_opened_and_keeps_trying() -> None:
+    open_camera, _ = opener()
+    attempts: list[float] = []
+
+    def attempt() -> Scripted:
+        attempts.append(time.monotonic())
+        return open_camera()
+
+    with CameraFeed(attempt, SETTINGS) as feed:
+        started_s = time.monotonic()
+        while len(attempts) < 3:
+            assert feed.read() is None
+            assert feed.status.problem == "no camera is connected; plug one in"
+            assert time.monotonic() - started_s < 5.0
+    assert np.diff(attempts).min() > 0.9 * SETTINGS.reopen_s
+
+
+def test_only_a_camera_silent_for_a_while_has_a_problem() -> None:
+    open_camera, _ = opener([1, SILENT, SILENT, SILENT, SILENT, SILENT, 2])
+    with CameraFeed(open_camera, SETTINGS) as feed:
+        assert feed.read() is not None
+        problems = []
+        for _ in range(5):
+            assert feed.read() is None
+            problems.append(feed.status.problem)
+        assert problems[0] == ""
+        assert problems[-1] == str(SILENT)
+        assert feed.read() is not None
+        assert feed.status.problem == ""
+
+
+def test_a_recording_begins_again() -> None:
+    open_camera, opened = opener([1, CameraEndError("the recording has ended")], [1])
+    with CameraFeed(open_camera, SETTINGS) as feed:
+        assert feed.read() is not None
+        assert feed.read() is None
+        assert feed.status.problem == ""
+        assert read_frame(feed).index == 1
+    assert len(opened) == 2
