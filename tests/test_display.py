@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from handcal.display import (
     arcmin_from_px,
+    effect_at,
     eye_projection,
     projection_matrix,
     reprojection_error_px,
@@ -120,3 +121,24 @@ def test_reprojection_error_by_hand() -> None:
 def test_update_matrix_refuses(shift: Sequence[float], distance_m: float, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         update_matrix(shift, distance_m)
+
+
+@pytest.mark.parametrize(
+    ("shift_m", "right_px", "up_px", "size_ratio"),
+    [
+        # f φ1 (z/z_S - 1)/z = 2456 · 0.001 · (0.25 - 1)/0.5
+        ((0.001, 0.0, 0.0), -3.684, 0.0, 1.0),
+        ((0.0, 0.001, 0.0), 0.0, 3.684, 1.0),
+        # (1 - φ3/z_S) z/(z - φ3) = 0.995 · 0.5/0.49
+        ((0.0, 0.0, 0.01), 0.0, 0.0, 0.995 / 0.98),
+    ],
+)
+def test_effect_of_a_shift_by_hand(
+    shift_m: tuple[float, float, float], right_px: float, up_px: float, size_ratio: float
+) -> None:
+    effect = effect_at(_on_axis(), (0.0, 0.0, 0.0), shift_m, 0.5)
+    assert effect.right_px == pytest.approx(right_px, abs=1e-9)
+    assert effect.up_px == pytest.approx(up_px, abs=1e-9)
+    assert effect.size_ratio == pytest.approx(size_ratio)
+    arcmin = 60 * np.degrees(np.arctan(np.array([right_px, up_px]) / 2456))
+    np.testing.assert_allclose((effect.right_arcmin, effect.up_arcmin), arcmin, atol=1e-9)

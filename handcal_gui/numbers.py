@@ -1,0 +1,9 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+
+def signed(value: float, decimals: int) -> str:
+    """Return a number with its sign; zero, also by rounding, has a plus."""
+    rounded = round(value, decimals) + 0.0  # makes −0 a 0
+    return f"{rounded:+.{decimals}f}".replace("-", "−")

@@ -1,0 +1,349 @@
+"""The fine-tune panel: φ of each eye by hand, live in the headset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.calibrate import MAX_HAND_SET_SHIFT_M, State
+from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Eye, Rig
+from handcal_gui.eye_shift_editor import EyeShiftEditor
+from handcal_gui.results.rows import EYE_NAMES
+from handcal_gui.shift_history import ShiftHistory, Shifts, moved, same_shifts
+from handcal_gui.shift_stream import Arrival, ShiftStream
+from handcal_gui.theme import SPACING_PX, icon
+
+_OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
+_STEPS_MM = (0.1, 0.5, 1.0)
+_MOVES: dict[int, tuple[int, int]] = {
+    Qt.Key.Key_Left: (0, -1),
+    Qt.Key.Key_Right: (0, 1),
+    Qt.Key.Key_Up: (1, -1),
+    Qt.Key.Key_Down: (1, 1),
+    Qt.Key.Key_PageDown: (2, -1),
+    Qt.Key.Key_PageUp: (2, 1),
+}
+_KEYS = (
+    "The eye moves by arrow keys: ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3. "
+    "Click here first; E changes the eye."
+)
+_WHY_NOT = {
+    State.ALIGN: "Confirm the alignment, solve and apply it first.",
+    State.ALIGNED: "Solve and apply the alignment first.",
+    State.SOLVED: "Apply the solved projections first.",
+    State.APPLYING: "The headset is taking the solved projections.",
+}
+_ARRIVALS = {
+    Arrival.SENDING: ("wait", "Sending to the headset…"),
+    Arrival.ARRIVED: ("check", "In the headset"),
+    Arrival.LATE: ("warning", "The headset has not acknowledged; see Link"),
+}
+
+
+class FineTunePanel(QWidget):
+    """Lets φ be set by hand while the wearer looks.
+
+    Attributes
+    ----------
+    shift_changed : Signal(object)
+        φ of both eyes, a mapping of eye to (3,) metres, for the headset; at most 30 times a second.
+    shift_settled : Signal()
+        The last φ sent has stood for 0.7 s and is to be kept.
+    """
+
+    shift_changed = Signal(object)
+    shift_settled = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("fineTune")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._rig: Rig | None = None
+        self._solved: Shifts = {}
+        self._why_not = "Fine-tuning starts with a session."
+        self._history = ShiftHistory(_OFFLINE)
+        self._burst: object = None
+        self._sign_name = "wait"
+        self._stream = ShiftStream(self)
+        self._stream.sent.connect(self.shift_changed)
+        self._stream.settled.connect(self._settle)
+        self._make_editors()
+        self._make_actions()
+        self._make_depths()
+        self._lay_out()
+        self._draw_icons()
+        self._steps.actions()[0].trigger()
+        self._say("wait", self._why_not)
+        self._refresh()
+
+    def set_rig(self, rig: Rig) -> None:
+        """Take the offline calibration whose displays draw."""
+        self._rig = rig
+        self._refresh()
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show what the headset renders with, unless it was set here, and whether it has it."""
+        results = snapshot.procedure.results
+        solved = {eye: shift.shift_m for eye, shift in results.shifts.items()} if results else {}
+        why_not = _why_not(snapshot)
+        is_new = self._stream.see(snapshot)
+        if is_new:
+            self._history = ShiftHistory(snapshot.procedure.applied_shift_m)
+            self._burst = None
+            self._stop_showing()
+        if is_new or why_not != self._why_not or not same_shifts(solved, self._solved):
+            self._why_not, self._solved = why_not, solved
+            self._refresh()
+        self._say(*(("wait", why_not) if why_not else _ARRIVALS[self._stream.arrival]))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move the chosen eye by arrow keys."""
+        move = _MOVES.get(event.key())
+        if move is None or event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
+            super().keyPressEvent(event)
+        elif self._is_editable():
+            axis, direction = move
+            eye = next(eye for eye in EYES if self._editors[eye].chosen.isChecked())
+            self._move(eye, axis, 1e-3 * direction * self._step_mm())
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Leave the headset with φ as set."""
+        super().hideEvent(event)
+        if self._shown() is not None:
+            self._stop_showing()
+            self._stream.preview(self._history.present)
+            self._refresh()
+        self._stream.flush()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw the icons when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._draw_icons()
+
+    def _draw_icons(self) -> None:
+        for action, name in ((self._undo, "undo"), (self._redo, "redo")):
+            action.setIcon(icon(name))
+        self._sign.setPixmap(icon(self._sign_name).pixmap(2 * SPACING_PX))
+
+    def _edit(self, eye: Eye, axis: int, value_m: float) -> None:
+        self._move(eye, axis, value_m - float(self._history.present[eye][axis]))
+
+    def _move(self, eye: Eye, axis: int, by_m: float) -> None:
+        eyes = EYES if self._both.isChecked() else (eye,)
+        shifts_m = moved(self._history.present, eyes, axis, by_m, MAX_HAND_SET_SHIFT_M)
+        burst = (eyes, axis)
+        self._history.change(shifts_m, goes_on=burst == self._burst)
+        self._burst = burst
+        self._put()
+
+    def _reset(self, shifts_m: Shifts) -> None:
+        self._burst = None
+        self._history.change({**self._history.present, **shifts_m})
+        self._put()
+
+    def _go(self, step: Callable[[], None]) -> None:
+        self._burst = None
+        step()
+        self._put()
+
+    def _put(self) -> None:
+        self._stream.put(self._history.present)
+        self._refresh()
+
+    def _settle(self) -> None:
+        self._burst = None
+        self.shift_settled.emit()
+
+    def _show(self) -> None:
+        self._stream.flush()
+        shown = self._shown()
+        self._stream.preview(
+            self._history.present if shown is None else {**self._history.present, **shown}
+        )
+        self._refresh()
+
+    def _shown(self) -> Shifts | None:
+        """Return what is shown in place of φ as set, if anything."""
+        if self._show_solved.isChecked():
+            return self._solved
+        return _OFFLINE if self._show_offline.isChecked() else None
+
+    def _stop_showing(self) -> None:
+        for action in (self._show_solved, self._show_offline):
+            action.setChecked(False)
+
+    def _step_mm(self) -> float:
+        step_mm: float = self._steps.checkedAction().data()
+        return step_mm
+
+    def _is_editable(self) -> bool:
+        return not self._why_not and self._shown() is None
+
+    def _refresh(self) -> None:
+        is_editable, is_ready = self._is_editable(), not self._why_not
+        for eye, editor in self._editors.items():
+            editor.setEnabled(is_editable)
+            editor.show_shift(self._history.present[eye])
+            editor.show_effect(self._effect(eye))
+        self._undo.setEnabled(is_editable and self._history.can_undo)
+        self._redo.setEnabled(is_editable and self._history.can_redo)
+        self._reset_offline.setEnabled(is_editable)
+        self._reset_solved.setEnabled(is_editable and bool(self._solved))
+        self._show_offline.setEnabled(is_ready)
+        self._show_solved.setEnabled(is_ready and bool(self._solved))
+        self._against.setText(f"against the {'solved' if self._solved else 'offline'} φ")
+
+    def _effect(self, eye: Eye) -> DrawnMove | None:
+        if self._rig is None:
+            return None
+        before_m = self._solved.get(eye, _OFFLINE[eye])
+        after_m, depth_m = self._history.present[eye], self._depth.currentData()
+        return effect_at(self._rig.eyes[eye], before_m, after_m, depth_m)
+
+    def _say(self, icon_name: str, text: str) -> None:
+        if (icon_name, text) != (self._sign_name, self._status.text()):
+            self._sign_name = icon_name
+            self._sign.setPixmap(icon(icon_name).pixmap(2 * SPACING_PX))
+            self._status.setText(text)
+
+    def _make_editors(self) -> None:
+        self._editors = {eye: EyeShiftEditor(EYE_NAMES[eye], MAX_HAND_SET_SHIFT_M) for eye in EYES}
+        self._eye_choice = QButtonGroup(self)
+        for eye, editor in self._editors.items():
+            editor.setObjectName(f"{eye}Editor")
+            editor.edited.connect(partial(self._edit, eye))
+            self._eye_choice.addButton(editor.chosen)
+        self._editors["left"].chosen.setChecked(True)
+
+    def _change_eye(self) -> None:
+        next(e.chosen for e in self._editors.values() if not e.chosen.isChecked()).setChecked(True)
+
+    def _make_actions(self) -> None:
+        add = self._add_action
+        self._undo = add("Undo", "Ctrl+Z", "Undo the last change")
+        self._undo.triggered.connect(lambda: self._go(self._history.undo))
+        self._redo = add("Redo", "Ctrl+Shift+Z", "Redo the change")
+        self._redo.triggered.connect(lambda: self._go(self._history.redo))
+        self._both = add("Both eyes", "L", "Move both eyes by the same amount")
+        self._both.setCheckable(True)
+        self._reset_solved = add("Reset to solved", "", "Set φ as solved from the alignments")
+        self._reset_solved.triggered.connect(lambda: self._reset(self._solved))
+        self._reset_offline = add("Reset to offline", "", "Set φ to 0, the offline calibration")
+        self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
+        looks = QActionGroup(self)
+        looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
+        looks.triggered.connect(self._show)
+        self._show_solved = add("Show solved", "S", "Let the headset show the solved φ meanwhile")
+        self._show_offline = add("Show offline", "B", "Let the headset show φ = 0 meanwhile")
+        for action in (self._show_solved, self._show_offline):
+            action.setCheckable(True)
+            looks.addAction(action)
+        self._steps = QActionGroup(self)
+        self._steps.triggered.connect(self._set_step)
+        for key, step_mm in enumerate(_STEPS_MM, 1):
+            step = add(f"{step_mm:g}", str(key), f"Arrows move by {step_mm:g} mm")
+            step.setCheckable(True)
+            step.setData(step_mm)
+            self._steps.addAction(step)
+        add("Other eye", "E", "").triggered.connect(self._change_eye)
+
+    def _add_action(self, text: str, keys: str, tooltip: str) -> QAction:
+        action = QAction(text, self)
+        action.setShortcut(QKeySequence(keys))
+        action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        action.setToolTip(f"{tooltip} ({keys})" if keys else tooltip)
+        self.addAction(action)
+        return action
+
+    def _set_step(self) -> None:
+        for editor in self._editors.values():
+            editor.set_step_mm(self._step_mm())
+
+    def _make_depths(self) -> None:
+        self._depth = QComboBox()
+        self._depth.setAccessibleName("Distance of the target")
+        self._depth.setToolTip("Distance of the target from the eye, in metres")
+        for depth_m in TARGET_DEPTHS_M:
+            self._depth.addItem(f"{depth_m:g} m", depth_m)
+        self._depth.setCurrentIndex(len(TARGET_DEPTHS_M) // 2)
+        self._depth.currentIndexChanged.connect(self._refresh)
+
+    def _lay_out(self) -> None:
+        self._against = QLabel()
+        self._sign, self._status = QLabel(), QLabel(wordWrap=True)
+        self._status.setObjectName("status")
+        self._status.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        hint = QLabel(text=_KEYS, wordWrap=True)
+        body = QWidget()
+        layout = QVBoxLayout(body)
+        steps = self._steps.actions()
+        layout.addLayout(
+            _row(QLabel("Step"), *steps, QLabel("mm"), None, self._both, self._undo, self._redo)
+        )
+        layout.addLayout(_row(self._editors["left"], self._editors["right"]))
+        layout.addLayout(_row(QLabel("Effect at"), self._depth, self._against, None))
+        layout.addLayout(_row(self._show_solved, self._reset_solved, None))
+        layout.addLayout(_row(self._show_offline, self._reset_offline, None))
+        layout.addWidget(hint)
+        layout.addStretch(1)
+        area = _QuietScrollArea(widgetResizable=True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        area.setWidget(body)
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        outer.addWidget(area, 1)
+        status = _row(self._sign, self._status)
+        status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX)
+        outer.addLayout(status)
+
+
+class _QuietScrollArea(QScrollArea):
+    """Leaves the arrow keys to the panel around it."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        event.ignore()
+
+
+def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
+    """Return widgets and actions' buttons side by side; None leaves room."""
+    row = QHBoxLayout()
+    row.setSpacing(SPACING_PX)
+    for item in items:
+        if item is None:
+            row.addStretch(1)
+        elif isinstance(item, QAction):
+            button = QToolButton()
+            button.setDefaultAction(item)
+            if not item.icon().isNull():
+                button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
+            row.addWidget(button)
+        else:
+            row.addWidget(item)
+    return row
+
+
+def _why_not(snapshot: Snapshot) -> str:
+    """Return why φ cannot be set by hand now; empty if it can."""
+    if not snapshot.link.connected:
+        return snapshot.link_problem or "The headset is not connected; see Link."
+    return _WHY_NOT.get(snapshot.procedure.state, "")

@@ -1,0 +1,375 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QAction, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QDoubleSpinBox,
+    QLabel,
+    QRadioButton,
+    QSlider,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import MAX_HAND_SET_SHIFT_M, State
+from handcal.display import effect_at
+from handcal.results import Results
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Eye, Rig
+from handcal_gui.panels.fine_tune import FineTunePanel
+from handcal_gui.shift_history import Shifts, same_shifts
+from handcal_gui.shift_stream import PERIOD_MS, SETTLE_MS
+
+OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
+Show = Callable[..., None]
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, rig: Rig) -> FineTunePanel:
+    panel = FineTunePanel()
+    qtbot.addWidget(panel)
+    panel.set_rig(rig)
+    panel.resize(430, 450)
+    panel.show()
+    return panel
+
+
+@pytest.fixture
+def show(panel: FineTunePanel, snapshot: Callable[..., Snapshot]) -> Show:
+    """Show the panel, twice, what the headset renders with: by default as solved."""
+
+    def show(
+        state: State = State.APPLIED, procedure: Mapping[str, Any] = {}, **changes: Any
+    ) -> None:
+        for _ in range(2):
+            now_ns = time.monotonic_ns()
+            panel.show_snapshot(snapshot(state, procedure=procedure, t_host_ns=now_ns, **changes))
+
+    return show
+
+
+@pytest.fixture
+def sent(panel: FineTunePanel) -> list[Shifts]:
+    """Return what is sent, as it comes."""
+    sent: list[Shifts] = []
+    panel.shift_changed.connect(sent.append)
+    return sent
+
+
+def editor(panel: FineTunePanel, eye: Eye) -> QWidget:
+    [editor] = panel.findChildren(QWidget, f"{eye}Editor")
+    return editor
+
+
+def field(panel: FineTunePanel, eye: Eye, component: int) -> QDoubleSpinBox:
+    [field] = editor(panel, eye).findChildren(QDoubleSpinBox, f"phi{component}")
+    return field
+
+
+def fields_mm(panel: FineTunePanel, eye: Eye) -> list[float]:
+    return [field(panel, eye, component).value() for component in (1, 2, 3)]
+
+
+def status(panel: FineTunePanel) -> str:
+    [status] = panel.findChildren(QLabel, "status")
+    return status.text()
+
+
+def action(panel: FineTunePanel, text: str) -> QAction:
+    return next(action for action in panel.actions() if action.text() == text)
+
+
+def texts(widget: QWidget) -> list[str]:
+    return [label.text() for label in widget.findChildren(QLabel)]
+
+
+def test_empty_says_how_to_begin(panel: FineTunePanel) -> None:
+    assert "starts with a session" in status(panel)
+    assert not field(panel, "left", 1).isEnabled()
+
+
+def test_shows_what_the_headset_renders_with(
+    panel: FineTunePanel, show: Show, results: Results
+) -> None:
+    show()
+    for eye in EYES:
+        solved_mm = 1e3 * results.shifts[eye].shift_m
+        np.testing.assert_allclose(fields_mm(panel, eye), solved_mm, atol=0.005)
+    assert status(panel) == "In the headset"
+    assert field(panel, "left", 1).isEnabled()
+
+
+@pytest.mark.parametrize(
+    ("state", "why"),
+    [
+        (State.ALIGN, "Confirm the alignment"),
+        (State.ALIGNED, "Solve"),
+        (State.SOLVED, "Apply"),
+        (State.APPLYING, "taking"),
+    ],
+)
+def test_cannot_be_used_amid_an_alignment(
+    panel: FineTunePanel, show: Show, sent: list[Shifts], state: State, why: str, qtbot: QtBot
+) -> None:
+    show(state)
+    assert why in status(panel)
+    assert not field(panel, "left", 1).isEnabled()
+    QTest.keyClick(panel, Qt.Key.Key_Right)
+    qtbot.wait(2 * PERIOD_MS)
+    assert sent == []
+
+
+def test_cannot_be_used_without_a_headset(panel: FineTunePanel, show: Show) -> None:
+    show(link={"connected": False}, link_problem="switch the headset on")
+    assert status(panel) == "switch the headset on"
+    assert not field(panel, "left", 1).isEnabled()
+
+
+@pytest.mark.parametrize(
+    ("key", "axis", "sign"),
+    [
+        (Qt.Key.Key_Right, 0, 1),
+        (Qt.Key.Key_Left, 0, -1),
+        (Qt.Key.Key_Down, 1, 1),
+        (Qt.Key.Key_Up, 1, -1),
+        (Qt.Key.Key_PageUp, 2, 1),
+        (Qt.Key.Key_PageDown, 2, -1),
+    ],
+)
+def test_arrow_keys_move_the_chosen_eye(
+    qtbot: QtBot,
+    panel: FineTunePanel,
+    show: Show,
+    results: Results,
+    key: Qt.Key,
+    axis: int,
+    sign: int,
+) -> None:
+    show()
+    QTest.keyClick(panel, Qt.Key.Key_3)
+    QTest.keyClick(panel, Qt.Key.Key_E)
+    with qtbot.waitSignal(panel.shift_changed) as changed:
+        QTest.keyClick(panel, key)
+    expected_m = results.shifts["right"].shift_m.copy()
+    expected_m[axis] += sign * 0.001
+    np.testing.assert_allclose(changed.args[0]["right"], expected_m, atol=1e-12)
+    np.testing.assert_array_equal(changed.args[0]["left"], results.shifts["left"].shift_m)
+
+
+def test_both_eyes_move_together(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, results: Results
+) -> None:
+    show()
+    QTest.keyClick(panel, Qt.Key.Key_L)
+    with qtbot.waitSignal(panel.shift_changed) as changed:
+        field(panel, "left", 2).setValue(5.0)
+    step_m = [changed.args[0][eye] - results.shifts[eye].shift_m for eye in EYES]
+    np.testing.assert_allclose(step_m[0], step_m[1], atol=1e-12)
+    assert changed.args[0]["left"][1] == pytest.approx(0.005)
+
+
+def test_the_slider_moves_the_eye(qtbot: QtBot, panel: FineTunePanel, show: Show) -> None:
+    show()
+    [slider] = editor(panel, "right").findChildren(QSlider, "slider3")
+    with qtbot.waitSignal(panel.shift_changed) as changed:
+        slider.setValue(250)
+    assert changed.args[0]["right"][2] == pytest.approx(0.0025)
+    assert field(panel, "right", 3).value() == 2.5
+
+
+def test_no_eye_passes_the_limit_of_the_engine(
+    panel: FineTunePanel, show: Show, sent: list[Shifts], qtbot: QtBot
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(29.95)
+    QTest.keyClick(panel, Qt.Key.Key_Right)
+    qtbot.waitUntil(lambda: bool(sent))
+    assert sent[-1]["left"][0] == MAX_HAND_SET_SHIFT_M
+
+
+def test_the_step_is_that_of_the_fields_too(qtbot: QtBot, panel: FineTunePanel, show: Show) -> None:
+    show()
+    field(panel, "left", 1).setValue(2.0)
+    action(panel, "0.5").trigger()
+    field(panel, "left", 1).stepUp()
+    assert field(panel, "left", 1).value() == 2.5
+
+
+def test_undo_and_redo(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, results: Results, sent: list[Shifts]
+) -> None:
+    show()
+    before_mm = fields_mm(panel, "left")
+    field(panel, "left", 1).setValue(1.0)
+    field(panel, "left", 3).setValue(3.0)
+    after_mm = fields_mm(panel, "left")
+    focused = field(panel, "left", 3)
+    focused.setFocus()
+    modifier = Qt.KeyboardModifier.ControlModifier
+    for _ in range(2):
+        QTest.keyClick(focused.lineEdit(), Qt.Key.Key_Z, modifier)
+    assert fields_mm(panel, "left") == before_mm
+    qtbot.waitUntil(lambda: bool(sent))
+    assert same_shifts(sent[-1], {eye: results.shifts[eye].shift_m for eye in EYES})
+    for _ in range(2):
+        QTest.keyClick(
+            focused.lineEdit(), Qt.Key.Key_Z, modifier | Qt.KeyboardModifier.ShiftModifier
+        )
+    assert fields_mm(panel, "left") == after_mm
+    assert not action(panel, "Redo").isEnabled()
+
+
+def test_nudges_that_follow_closely_are_undone_together(
+    qtbot: QtBot, panel: FineTunePanel, show: Show
+) -> None:
+    show()
+    before_mm = fields_mm(panel, "left")
+    for _ in range(3):
+        QTest.keyClick(panel, Qt.Key.Key_Right)
+    with qtbot.waitSignal(panel.shift_settled, timeout=5 * SETTLE_MS):
+        pass
+    once_mm = fields_mm(panel, "left")
+    QTest.keyClick(panel, Qt.Key.Key_Right)
+    action(panel, "Undo").trigger()
+    assert fields_mm(panel, "left") == once_mm
+    action(panel, "Undo").trigger()
+    assert fields_mm(panel, "left") == before_mm
+
+
+def test_resets(
+    panel: FineTunePanel, show: Show, sent: list[Shifts], results: Results, qtbot: QtBot
+) -> None:
+    show()
+    action(panel, "Reset to offline").trigger()
+    assert fields_mm(panel, "left") == [0.0, 0.0, 0.0]
+    qtbot.waitUntil(lambda: bool(sent))
+    assert same_shifts(sent[-1], OFFLINE)
+    action(panel, "Reset to solved").trigger()
+    qtbot.waitUntil(lambda: len(sent) > 1)
+    assert same_shifts(sent[-1], {eye: results.shifts[eye].shift_m for eye in EYES})
+
+
+def test_nothing_solved_leaves_the_offline_calibration_to_begin_with(
+    panel: FineTunePanel, show: Show
+) -> None:
+    show(State.SHOW_HAND)
+    assert field(panel, "left", 1).isEnabled()
+    assert not action(panel, "Reset to solved").isEnabled()
+    assert not action(panel, "Show solved").isEnabled()
+    assert any("against the offline φ" in text for text in texts(panel))
+
+
+def test_showing_the_offline_calibration_loses_nothing(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, sent: list[Shifts]
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    set_mm = fields_mm(panel, "left")
+    with qtbot.waitSignal(panel.shift_settled):  # what was set is recorded first
+        QTest.keyClick(panel, Qt.Key.Key_B)
+    assert sent[-1]["left"][0] == pytest.approx(0.004)
+    qtbot.waitUntil(lambda: same_shifts(sent[-1], OFFLINE))
+    show(procedure={"applied_shift_m": sent[-1]})
+    assert fields_mm(panel, "left") == set_mm
+    assert not field(panel, "left", 1).isEnabled()
+    with qtbot.assertNotEmitted(panel.shift_settled, wait=SETTLE_MS + 5 * PERIOD_MS):
+        QTest.keyClick(panel, Qt.Key.Key_B)
+    assert sent[-1]["left"][0] == pytest.approx(0.004)
+    assert field(panel, "left", 1).isEnabled()
+
+
+def test_only_one_is_shown_instead(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, sent: list[Shifts], results: Results
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    QTest.keyClick(panel, Qt.Key.Key_B)
+    QTest.keyClick(panel, Qt.Key.Key_S)
+    assert not action(panel, "Show offline").isChecked()
+    solved_m = {eye: results.shifts[eye].shift_m for eye in EYES}
+    qtbot.waitUntil(lambda: bool(sent) and same_shifts(sent[-1], solved_m))
+
+
+def test_a_hidden_panel_leaves_the_headset_with_what_was_set(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, sent: list[Shifts]
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    QTest.keyClick(panel, Qt.Key.Key_B)
+    qtbot.waitUntil(lambda: bool(sent) and same_shifts(sent[-1], OFFLINE))
+    panel.hide()
+    assert sent[-1]["left"][0] == pytest.approx(0.004)
+    assert not action(panel, "Show offline").isChecked()
+
+
+def test_new_projections_begin_anew(panel: FineTunePanel, show: Show) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    panel.hide()
+    panel.show()
+    applied_m = {eye: np.array([0.001, 0.002, 0.003]) for eye in EYES}
+    show(procedure={"applied_shift_m": applied_m})
+    assert fields_mm(panel, "left") == [1.0, 2.0, 3.0]
+    assert not action(panel, "Undo").isEnabled()
+
+
+def test_tells_what_it_does_at_the_target(panel: FineTunePanel, show: Show, rig: Rig) -> None:
+    show()
+    solved_m = 1e-3 * np.array(fields_mm(panel, "left"))
+    field(panel, "left", 1).setValue(1e3 * solved_m[0] + 1.0)
+    [depth] = panel.findChildren(QComboBox)
+    for index, depth_m in enumerate((0.4, 0.5, 0.6)):
+        depth.setCurrentIndex(index)
+        effect = effect_at(rig.eyes["left"], [0, 0, 0], [0.001, 0, 0], depth_m)
+        shown = next(t for t in texts(editor(panel, "left")) if " px" in t)
+        assert float(shown.split(" px")[0].replace("−", "-")) == pytest.approx(
+            effect.right_px, abs=0.15
+        )
+
+
+def test_the_wheel_scrolls_the_panel_and_changes_nothing(panel: FineTunePanel, show: Show) -> None:
+    show()
+    before_mm = fields_mm(panel, "left")
+    target = field(panel, "left", 1)
+    where = QPointF(5, 5)
+    event = QWheelEvent(
+        where,
+        QPointF(target.mapToGlobal(where)),
+        QPoint(0, 0),
+        QPoint(0, 120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(target, event)
+    assert fields_mm(panel, "left") == before_mm
+
+
+def test_a_silent_headset_is_told(
+    panel: FineTunePanel, snapshot: Callable[..., Snapshot], show: Show
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    late_ns = time.monotonic_ns() + 3_000_000_000
+    panel.show_snapshot(snapshot(State.APPLIED, procedure={"is_applied": False}, t_host_ns=late_ns))
+    assert "not acknowledged" in status(panel)
+
+
+def test_every_field_has_a_name_and_an_explanation(panel: FineTunePanel) -> None:
+    for widget in (*panel.findChildren(QDoubleSpinBox), *panel.findChildren(QSlider)):
+        assert "φ" in widget.accessibleName()
+        assert "viewpoint" in widget.toolTip()
+    assert {radio.text() for radio in panel.findChildren(QRadioButton)} == {
+        "Left eye",
+        "Right eye",
+    }
