@@ -13,6 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handcal.calibrate import CalibrationSettings, Observation, PlacedHand, State
+from handcal.camera.feed import CameraStatus
 from handcal.config import settings_json
 from handcal.display import view_of_eye
 from handcal.geometry import rigid, transform
@@ -27,7 +28,7 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.snapshot import CameraStatus, Procedure, Snapshot
+from handcal.snapshot import Procedure, Snapshot
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig
 from handcal.wearer_view import EyeView, see
 

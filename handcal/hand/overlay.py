@@ -1,0 +1,27 @@
+"""Where a segmented hand lies in its frame's images, for whoever draws it over them."""
+
+from __future__ import annotations
+
+from handcal.geometry import image_points, transform
+from handcal.types import Float64, Frame, HandCloud
+
+
+def contour_px(cloud: HandCloud, frame: Frame) -> tuple[Float64, Float64 | None]:
+    """Project a hand's contour into the depth and the colour image, lens distortion included.
+
+    Parameters
+    ----------
+    cloud : HandCloud
+    frame : Frame
+        The one that it came from, or a later one of the same camera.
+
+    Returns
+    -------
+    depth_px : (M, 2) float64
+    color_px : (M, 2) float64 or None
+        None if the frame has no colour.
+    """
+    depth_px = image_points(cloud.contour_m, frame.depth_intrinsics)
+    if frame.color_intrinsics is None:
+        return depth_px, None
+    return depth_px, image_points(transform(frame.T_C_D, cloud.contour_m), frame.color_intrinsics)

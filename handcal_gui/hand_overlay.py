@@ -1,0 +1,105 @@
+"""The segmented hand drawn over a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QTransform
+
+from handcal.types import Bool, Float64, HandCloud
+from handcal_gui.theme import colors
+
+_MASK_ALPHA = 70
+_LINE_PX = 2.0
+_SMOOTHED_PX = 1.0
+"""By how much, as shown, the line may stray from the contour, most of whose points it spares."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandOverlay:
+    """A hand in one picture.
+
+    Attributes
+    ----------
+    cloud : HandCloud
+    depth_px, image_px : (M, 2) float64
+        Its contour in the depth image and in the picture.
+    is_red : bool
+        Whether it is turned beyond the guard.
+    """
+
+    cloud: HandCloud
+    depth_px: Float64
+    image_px: Float64
+    is_red: bool
+
+    def draw(self, painter: QPainter) -> None:
+        """Draw box, mask and contour in the picture's pixels; dashed where the hand is cut."""
+        if not len(self.image_px):
+            return
+        color = QColor(colors().red if self.is_red else colors().live)
+        self._draw_mask(painter, QColor(color))
+        strays_px = _SMOOTHED_PX / painter.transform().m11()
+        for points_px, is_cut in contour_runs(self.image_px, self.cloud.contour_is_cut):
+            _set_pen(painter, color, Qt.PenStyle.DashLine if is_cut else Qt.PenStyle.SolidLine)
+            line_px = cv2.approxPolyDP(points_px.astype(np.float32), strays_px, closed=False)
+            painter.drawPolyline([QPointF(x, y) for x, y in line_px.reshape(-1, 2).tolist()])
+
+    def _draw_mask(self, painter: QPainter, color: QColor) -> None:
+        x0, y0, x1, y1 = self.cloud.box_px
+        color.setAlpha(_MASK_ALPHA)
+        tint = np.where(np.arange(256) == 255, color.rgba(), 0).astype(np.uint32)
+        pixels = tint.take(self.cloud.mask[y0:y1, x0:x1])
+        size = x1 - x0, y1 - y0
+        mask = QImage(pixels.data, *size, pixels.strides[0], QImage.Format.Format_ARGB32)
+        box = QRectF(x0 - 0.5, y0 - 0.5, *size)
+        painter.save()
+        painter.setTransform(_fit(self.depth_px, self.image_px), combine=True)
+        painter.drawImage(box, mask)
+        _set_pen(painter, QColor(colors().muted), Qt.PenStyle.SolidLine)
+        painter.drawRect(box)
+        painter.restore()
+
+
+def contour_runs(points_px: Float64, is_cut: Bool) -> list[tuple[Float64, bool]]:
+    """Split a closed contour into open lines along the silhouette and along cut edges.
+
+    Parameters
+    ----------
+    points_px : (M, 2) float64
+    is_cut : (M,) bool
+
+    Returns
+    -------
+    list of (points_px, is_cut)
+        In order; each begins where the one before ends.
+    """
+    count = len(points_px)
+    cut_edges = is_cut & np.roll(is_cut, -1)  # edge i runs from point i to the next
+    starts = np.flatnonzero(cut_edges != np.roll(cut_edges, 1))
+    if not len(starts):
+        return [(np.vstack([points_px, points_px[:1]]), bool(cut_edges.any()))]
+    ends = np.append(starts[1:], starts[0] + count)
+    return [
+        (points_px[np.arange(start, end + 1) % count], bool(cut_edges[start]))
+        for start, end in zip(starts, ends, strict=True)
+    ]
+
+
+def _fit(source_px: Float64, target_px: Float64) -> QTransform:
+    """Return the scaling and shift that brings the bounding box of points to that of others."""
+    (x0, y0), (x1, y1) = source_px.min(axis=0), source_px.max(axis=0)
+    (u0, v0), (u1, v1) = target_px.min(axis=0), target_px.max(axis=0)
+    fit = QTransform.fromTranslate(u0, v0)
+    fit.scale((u1 - u0) / max(x1 - x0, 1.0), (v1 - v0) / max(y1 - y0, 1.0))
+    return fit.translate(-x0, -y0)
+
+
+def _set_pen(painter: QPainter, color: QColor, style: Qt.PenStyle) -> None:
+    """Draw with a line as wide on every screen, whatever the size of the picture."""
+    pen = QPen(color, _LINE_PX * painter.device().devicePixelRatio(), style)
+    pen.setCosmetic(True)
+    painter.setPen(pen)

@@ -1,0 +1,259 @@
+"""The camera panel: what the camera sees, where the hand was found in it, and how it does."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QBuffer, QEvent, QIODevice, Qt
+from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QComboBox,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QMessageBox,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.calibrate import Observation
+from handcal.camera.feed import CameraStatus
+from handcal.errors import FileError
+from handcal.files import write_atomic
+from handcal.hand.overlay import contour_px
+from handcal.hand.settings import SegmentSettings
+from handcal.snapshot import Snapshot
+from handcal.types import Frame
+from handcal_gui.depth_scale import DepthColors, DepthLegend
+from handcal_gui.hand_overlay import HandOverlay
+from handcal_gui.image_view import ImageView
+from handcal_gui.theme import SPACING_PX, icon, number_font
+
+_EMPTY = "The camera's picture will appear here. Choose a camera on the start page."
+_NO_COLOR = "This camera gives no colour picture."
+_UNKNOWN = "–"
+
+
+class Mode(StrEnum):
+    """Which pictures are shown."""
+
+    COLOR = "Colour"
+    DEPTH = "Depth"
+    BOTH = "Both"
+
+
+class CameraPanel(QWidget):
+    """Colour and depth with the hand drawn over them, and the camera's rate, age and losses.
+
+    Parameters
+    ----------
+    settings : SegmentSettings
+        Whose depth gate is marked.
+    parent : QWidget or None
+    """
+
+    def __init__(self, settings: SegmentSettings, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("camera-panel")
+        self._frame: Frame | None = None
+        self._caption = ""
+        self._pictures = _Pictures(DepthColors((settings.depth_min_m, settings.depth_max_m)))
+        self._status = _Status()
+        self._freeze = QToolButton()
+        self._freeze.setText("Freeze")
+        self._freeze.setToolTip("Keep the present picture (F)")
+        self._freeze.setShortcut("F")
+        self._freeze.setCheckable(True)
+        self._freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        save = QAction("Save picture…", self._pictures)
+        save.triggered.connect(self._ask_where_to_save)
+        self._pictures.addAction(save)
+
+        self._mode = QComboBox()
+        self._mode.setAccessibleName("Picture shown")
+        self._mode.setToolTip("Show the colour picture, the depth picture or both")
+        self._mode.addItems(list(Mode))
+        self._mode.currentTextChanged.connect(lambda text: self._pictures.set_mode(Mode(text)))
+        top = QHBoxLayout()
+        top.addWidget(self._mode)
+        top.addStretch()
+        top.addWidget(self._freeze)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(top)
+        layout.addWidget(self._pictures, 1)
+        layout.addWidget(self._status)
+        self._pictures.set_mode(Mode.COLOR)
+        self._draw_icons()
+        self._pictures.show_text(message=_EMPTY)
+
+    def set_mode(self, mode: Mode) -> None:
+        """Show the colour picture, the depth picture or both."""
+        self._mode.setCurrentText(mode)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the newest frame, unless frozen, and how the camera does."""
+        if not self._freeze.isChecked() and snapshot.frame is not None:
+            self._show_frame(snapshot.frame, snapshot.observation)
+        problem = snapshot.camera.problem or ("" if self._frame else _EMPTY)
+        caption = "Frozen" if self._freeze.isChecked() else self._caption
+        self._pictures.show_text(message=problem, caption="" if problem else caption)
+        age_ms = (snapshot.t_host_ns - self._frame.t_host_ns) / 1e6 if self._frame else None
+        self._status.show_status(snapshot.camera, age_ms)
+
+    def save_picture(self, path: Path) -> None:
+        """Write what is shown as PNG; FileError if it cannot be written."""
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+        self._pictures.grab().save(buffer, "PNG")
+        write_atomic(path, bytes(buffer.data().data()))
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow a change between light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._draw_icons()
+
+    def _draw_icons(self) -> None:
+        self._freeze.setIcon(icon("pause"))
+
+    def _show_frame(self, frame: Frame, seen: Observation | None) -> None:
+        if frame is not self._frame:
+            self._pictures.show_frame(frame)
+        self._frame = frame
+        if seen is not None:
+            self._pictures.show_hand(frame, seen)
+            self._caption = _caption(seen)
+
+    def _ask_where_to_save(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Save picture", "picture.png", "PNG pictures (*.png)"
+        )
+        if name:
+            try:
+                self.save_picture(Path(name).with_suffix(".png"))
+            except FileError as error:
+                QMessageBox.warning(self, "Save picture", str(error))
+
+
+class _Pictures(QWidget):
+    """The two pictures, beside or below each other, whichever lets them be larger."""
+
+    def __init__(self, depth_colors: DepthColors) -> None:
+        super().__init__()
+        self._depth_colors = depth_colors
+        self._color = ImageView("Colour picture")
+        self._depth = ImageView("Depth picture", depth_colors.colorize)
+        self._depth_side = QWidget()
+        depth_layout = QHBoxLayout(self._depth_side)
+        depth_layout.setContentsMargins(0, 0, 0, 0)
+        depth_layout.setSpacing(SPACING_PX // 2)
+        depth_layout.addWidget(self._depth, 1)
+        depth_layout.addWidget(DepthLegend(depth_colors))
+        self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(SPACING_PX)
+        self._layout.addWidget(self._color, 1)
+        self._layout.addWidget(self._depth_side, 1)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+
+    def set_mode(self, mode: Mode) -> None:
+        self._color.setVisible(mode is not Mode.DEPTH)
+        self._depth_side.setVisible(mode is not Mode.COLOR)
+
+    def show_frame(self, frame: Frame) -> None:
+        self._depth_colors.set_scale(frame.depth_scale_m)
+        self._color.show_image(frame.color)
+        self._depth.show_image(frame.depth)
+
+    def show_hand(self, frame: Frame, seen: Observation) -> None:
+        if seen.hand is None:
+            self._color.show_overlay(None)
+            self._depth.show_overlay(None)
+            return
+        cloud = seen.hand.cloud
+        depth_px, color_px = contour_px(cloud, frame)
+        self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_red).draw)
+        if color_px is not None:
+            self._color.show_overlay(HandOverlay(cloud, depth_px, color_px, seen.is_red).draw)
+
+    def show_text(self, *, message: str, caption: str = "") -> None:
+        self._depth.show_text(message=message, caption=caption)
+        if self._depth.has_image and not self._color.has_image:
+            message = message or _NO_COLOR
+        self._color.show_text(message=message, caption=caption)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Stack the pictures, of 16:9, where there is more room that way."""
+        super().resizeEvent(event)
+        width, height = 9 * self.width(), 16 * self.height()
+        is_stacked = min(width, height / 2) > min(width / 2, height)
+        directions = QBoxLayout.Direction
+        self._layout.setDirection(directions.TopToBottom if is_stacked else directions.LeftToRight)
+
+
+class _Status(QWidget):
+    """One line of numbers that do not jump, below the camera's name."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._name = QLabel()
+        self._name.setObjectName("camera-name")
+        self._name.setWordWrap(True)
+        self._rate = _number("camera-rate", "999.9 fps", "Frames per second over the last second")
+        self._age = _number(
+            "camera-age", "9999.9 ms", "Time since the frame shown arrived, in milliseconds"
+        )
+        self._dropped = _number(
+            "camera-dropped", "99999", "Frames missing in the camera's own count since it started"
+        )
+        row = QHBoxLayout()
+        row.setSpacing(SPACING_PX // 2)
+        row.addWidget(self._rate)
+        row.addStretch()
+        row.addWidget(QLabel("Age"))
+        row.addWidget(self._age)
+        row.addStretch()
+        row.addWidget(QLabel("Dropped"))
+        row.addWidget(self._dropped)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(self._name)
+        layout.addLayout(row)
+        self.show_status(CameraStatus(_UNKNOWN), None)
+
+    def show_status(self, camera: CameraStatus, age_ms: float | None) -> None:
+        self._name.setText(camera.name)
+        self._rate.setText(f"{camera.rate_hz:.1f} fps")
+        self._age.setText(_age(age_ms))
+        self._dropped.setText(str(camera.dropped))
+
+
+def _age(age_ms: float | None) -> str:
+    if age_ms is None:
+        return _UNKNOWN
+    return f"{age_ms:.1f} ms" if age_ms < 10_000 else f"{age_ms / 1e3:.0f} s"
+
+
+def _caption(seen: Observation) -> str:
+    """Return what is to be said of the hand."""
+    if seen.is_red and seen.rotation_rad is not None:
+        return f"Turned by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
+    return seen.problem[:1].upper() + seen.problem[1:]
+
+
+def _number(name: str, widest: str, tooltip: str) -> QLabel:
+    """Return a label for a number, as wide as its widest text."""
+    label = QLabel()
+    label.setObjectName(name)
+    label.setToolTip(tooltip)
+    label.setFont(number_font())
+    label.setMinimumWidth(label.fontMetrics().horizontalAdvance(widest))
+    label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return label
