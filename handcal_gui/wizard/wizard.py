@@ -26,6 +26,9 @@ class WizardPanel(QWidget):
 
     Attributes
     ----------
+    wizard : Wizard
+    shown : View or None
+        What it says now; None before the first snapshot.
     asked : Signal(Action)
         A button was pressed.
     plan_changed : Signal(str)
@@ -34,10 +37,10 @@ class WizardPanel(QWidget):
     asked = Signal(object)
     plan_changed = Signal(str)
 
-    def __init__(self, wizard: Wizard, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("wizard")
-        self.wizard = wizard
+        self.wizard = Wizard()
         self.shown: View | None = None
         self._rail = _Rail()
         self._title = QLabel(objectName="wizardTitle")
@@ -52,6 +55,12 @@ class WizardPanel(QWidget):
         for i, button in enumerate(self._others):
             button.clicked.connect(lambda _checked=False, i=i: self._ask_other(i))
         self._plan.currentIndexChanged.connect(self._choose_plan)
+
+    def start(self, wizard: Wizard) -> None:
+        """Show another wizard from now on."""
+        self.wizard = wizard
+        self._plan.setCurrentText(PLANS[wizard.plan])
+        self.shown = None
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show what the wizard says of a snapshot."""
@@ -91,7 +100,6 @@ class WizardPanel(QWidget):
         self._main.setMinimumWidth(28 * SPACING_PX)
         self._main.setDefault(True)
         self._plan.addItems(list(PLANS.values()))
-        self._plan.setCurrentText(PLANS[self.wizard.plan])
         self._plan.setToolTip(
             "One eye after the other tells each eye's place, and takes two alignments.\n"
             "Both eyes at once is quicker, but cannot tell an eye distance that differs from the "

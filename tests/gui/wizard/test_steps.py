@@ -1,0 +1,265 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from handcal.calibrate import State
+from handcal.errors import FileError
+from handcal.session import SessionRecord
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Alignment, Eye
+from handcal_gui.wizard.steps import (
+    STEPS,
+    Action,
+    EyePlan,
+    Step,
+    View,
+    Wizard,
+    is_complete,
+    next_eyes,
+)
+
+Maker = Callable[..., Snapshot]
+
+
+def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
+    while wizard.step(snapshot) is not step:
+        wizard.move(Action.NEXT, snapshot)
+
+
+def actions(view: View) -> list[Action]:
+    return [offer.action for offer in view.others]
+
+
+def aligned(record: SessionRecord, alignment: Alignment, *eyes: tuple[Eye, ...]) -> SessionRecord:
+    return replace(record, alignments=tuple(replace(alignment, eyes=those) for those in eyes))
+
+
+@pytest.fixture
+def start(snapshot: Maker, record: SessionRecord) -> Snapshot:
+    """Return a station just opened: everything connected, a hand held still, nothing aligned."""
+    return snapshot(State.SHOW_HAND, record=replace(record, alignments=()))
+
+
+@pytest.mark.parametrize(
+    ("state", "step"),
+    [
+        (State.SHOW_HAND, Step.CONNECT),
+        (State.ALIGN, Step.ALIGN),
+        (State.ALIGNED, Step.SOLVE),
+        (State.SOLVED, Step.SOLVE),
+        (State.APPLYING, Step.SOLVE),
+    ],
+)
+def test_the_engine_s_state_says_which_step_it_is(
+    snapshot: Maker, state: State, step: Step
+) -> None:
+    wizard = Wizard()
+    view = wizard.view(snapshot(state))
+    assert view.step is step
+    assert view.sentence.endswith(".")
+
+
+def test_the_whole_way_of_one_eye_after_the_other(
+    start: Snapshot, snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
+) -> None:
+    wizard = Wizard("each")
+    way = []
+    for step in (Step.CONNECT, Step.SHOW_HAND):
+        view = wizard.view(start)
+        way.append(view.main.action)
+        assert (view.step, view.main.is_enabled) == (step, True)
+        wizard.move(view.main.action, start)
+    assert wizard.eyes(start) == ("left",)
+    way.append(wizard.view(start).main.action)
+    one = aligned(record, alignments[0], ("left",))
+    states = (State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLYING, State.APPLIED)
+    way += [wizard.view(snapshot(state, record=one)).main.action for state in states]
+    applied = snapshot(State.APPLIED, record=one)
+    assert wizard.view(applied).main.label == "Align the right eye"
+    wizard.move(Action.ANOTHER, applied)
+    assert wizard.step(applied) is Step.SHOW_HAND
+    assert wizard.eyes(applied) == ("right",)
+    two = aligned(record, alignments[0], ("left",), ("right",))
+    wizard.view(snapshot(State.ALIGN, record=two))
+    applied = snapshot(State.APPLIED, record=two)
+    assert wizard.view(applied).main.label == "It fits"
+    wizard.move(Action.NEXT, applied)
+    way.append(wizard.view(applied).main.action)
+    wizard.move(Action.FINISH, applied)
+    way.append(wizard.view(applied).main.action)
+    assert way == [
+        Action.NEXT,
+        Action.NEXT,
+        Action.MAKE_CURSOR,
+        Action.CONFIRM,
+        Action.SOLVE,
+        Action.APPLY,
+        Action.APPLY,
+        Action.ANOTHER,
+        Action.FINISH,
+        Action.NEXT_WEARER,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"camera": {"problem": "no camera is connected; plug one in"}}, "no camera is connected"),
+        ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "no headset"),
+        ({"link": {"pose_rate_hz": 0.0}}, "No pose"),
+    ],
+)
+def test_connect_waits_for_camera_headset_and_poses(
+    snapshot: Maker, changes: dict[str, Any], complaint: str
+) -> None:
+    view = Wizard().view(snapshot(State.SHOW_HAND, **changes))
+    assert not view.main.is_enabled
+    assert [check for check in view.checks if complaint in check.text and not check.holds]
+
+
+def test_a_hand_is_needed_and_the_engine_s_reason_is_given(start: Snapshot) -> None:
+    wizard = Wizard()
+    reach(wizard, start, Step.SHOW_HAND)
+    assert start.observation is not None
+    lost = replace(start.observation, hand=None, problem="hand cut by the image border")
+    view = wizard.view(replace(start, observation=lost))
+    assert not view.main.is_enabled
+    assert view.checks[0].text == "Hand cut by the image border"
+    assert not wizard.view(replace(start, observation=None)).main.is_enabled
+
+
+def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
+    wizard = Wizard()
+    reach(wizard, start, Step.MAKE_CURSOR)
+    assert start.observation is not None
+    restless = replace(start, observation=replace(start.observation, is_steady=False))
+    assert not wizard.view(restless).main.is_enabled
+    assert wizard.view(start).main.is_enabled
+
+
+def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) -> None:
+    refusal = "Your hand is turned by 14.0°, more than 9°."
+    seen = {"is_red": True}
+    view = Wizard().view(
+        snapshot(procedure={"eyes": ("left",), "refusal": refusal}, observation=seen)
+    )
+    assert view.sentence.startswith("Close the right eye.")
+    assert view.note == refusal
+    assert not view.checks[1].holds
+    assert Wizard().view(snapshot()).checks[1].holds
+
+
+def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
+    view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
+    assert [check.text.split(":")[0] for check in view.checks[1:]] == ["Left eye", "Right eye"]
+    assert view.note == "the disk is full; free some space"
+    assert actions(view) == [Action.REDO]
+    assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
+
+
+def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    applied = snapshot(State.APPLIED)
+    assert actions(wizard.view(applied)) == [
+        Action.ANOTHER,
+        Action.REPEAT_LEFT,
+        Action.REPEAT_RIGHT,
+    ]
+    wizard.move(Action.REPEAT_RIGHT, applied)
+    assert wizard.step(applied) is Step.SHOW_HAND
+    assert wizard.eyes(applied) == ("right",)
+    wizard.move(Action.BACK, applied)
+    assert wizard.step(applied) is Step.VERIFY
+    assert wizard.eyes(applied) == EYES  # the plan again
+
+
+def test_a_repeated_eye_stays_when_its_alignment_is_discarded(
+    snapshot: Maker, start: Snapshot
+) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    wizard.move(Action.REPEAT_LEFT, snapshot(State.APPLIED))
+    wizard.view(snapshot(State.ALIGNED))
+    assert wizard.step(start) is Step.SHOW_HAND  # as after a redo
+    assert wizard.eyes(start) == ("left",)
+
+
+def test_giving_up_a_further_cursor_keeps_what_is_solved(snapshot: Maker) -> None:
+    wizard = Wizard()
+    wizard.view(snapshot(State.ALIGN))
+    view = wizard.view(snapshot(State.SHOW_HAND))
+    assert view.step is Step.SHOW_HAND
+    assert actions(view) == [Action.SOLVE]
+
+
+def test_changed_alignments_are_solved_again(snapshot: Maker) -> None:
+    wizard = Wizard()
+    wizard.view(snapshot(State.SOLVED))
+    view = wizard.view(snapshot(State.APPLIED, procedure={"results": None}))
+    assert view.main.action is Action.SOLVE
+
+
+def test_back_leads_through_every_free_step(start: Snapshot) -> None:
+    wizard = Wizard()
+    reach(wizard, start, Step.MAKE_CURSOR)
+    for step in (Step.SHOW_HAND, Step.CONNECT):
+        wizard.move(Action.BACK, start)
+        assert wizard.step(start) is step
+    assert Action.BACK not in actions(wizard.view(start))
+
+
+def test_after_the_end_one_may_go_back_and_on(snapshot: Maker) -> None:
+    wizard = Wizard()
+    wizard.view(snapshot(State.SOLVED))
+    applied = snapshot(State.APPLIED)
+    wizard.move(Action.NEXT, applied)
+    wizard.move(Action.FINISH, applied)
+    wizard.move(Action.BACK, applied)
+    assert wizard.step(applied) is Step.VERIFY
+    wizard.move(Action.NEXT, applied)
+    assert wizard.view(applied).main.action is Action.FINISH
+
+
+def test_a_full_disk_is_told_where_one_saves(snapshot: Maker) -> None:
+    wizard = Wizard()
+    wizard.view(snapshot(State.SOLVED))
+    full = snapshot(State.APPLIED, problem=str(FileError("the disk is full")))
+    wizard.move(Action.NEXT, full)
+    view = wizard.view(full)
+    assert not view.checks[0].holds
+    assert view.note == "the disk is full"
+
+
+@pytest.mark.parametrize(
+    ("plan", "done", "wanted"),
+    [
+        ("both", [], EYES),
+        ("both", [EYES], EYES),
+        ("each", [], ("left",)),
+        ("each", [("left",)], ("right",)),
+        ("each", [("left",), ("right",)], ("left",)),
+        ("each", [EYES, ("left",)], ("right",)),
+        ("left", [("left",)], ("left",)),
+        ("right", [], ("right",)),
+    ],
+)
+def test_the_plan_says_whose_turn_it_is(
+    plan: EyePlan,
+    done: list[tuple[Eye, ...]],
+    wanted: tuple[Eye, ...],
+    alignments: tuple[Alignment, ...],
+) -> None:
+    made = [replace(alignments[0], eyes=eyes) for eyes in done]
+    assert next_eyes(plan, made) == wanted
+    assert is_complete(made) == all(any(eye in eyes for eyes in done) for eye in EYES)
+
+
+def test_the_engine_s_actions_are_no_moves(start: Snapshot) -> None:
+    with pytest.raises(ValueError, match="engine"):
+        Wizard().move(Action.SOLVE, start)
+    assert len(STEPS) == 7
