@@ -97,7 +97,6 @@ class WizardPanel(QWidget):
         font.setBold(True)
         self._main.setFont(font)
         self._main.setMinimumHeight(5 * SPACING_PX)
-        self._main.setMinimumWidth(28 * SPACING_PX)
         self._main.setDefault(True)
         self._plan.addItems(list(PLANS.values()))
         self._plan.setToolTip(
@@ -112,11 +111,11 @@ class WizardPanel(QWidget):
         plan.addStretch()
         plan.addWidget(plan_label)
         plan.addWidget(self._plan)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self._main)
-        buttons.addStretch()
+        others = QHBoxLayout()
         for button in self._others:
-            buttons.addWidget(button)
+            others.addWidget(button)
+        others.addStretch()
+        others.addStrut(self._others[0].sizeHint().height())
         layout = QVBoxLayout(self)
         layout.setContentsMargins(*4 * (2 * SPACING_PX,))
         layout.setSpacing(SPACING_PX)
@@ -124,11 +123,13 @@ class WizardPanel(QWidget):
         layout.addSpacing(SPACING_PX)
         layout.addLayout(plan)
         layout.addWidget(self._sentence)
+        layout.addSpacing(SPACING_PX // 2)
         for row in self._checks:
             layout.addWidget(row)
         layout.addWidget(self._note)
+        layout.addWidget(self._main)
+        layout.addLayout(others)
         layout.addStretch()
-        layout.addLayout(buttons)
 
     def _refresh(self, view: View) -> None:
         self._rail.show_step(view.step)
@@ -171,7 +172,10 @@ class _Rail(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
         self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
+        font = self.font()
+        font.setPointSizeF(0.85 * font.pointSizeF())
         for label in self._labels.values():
+            label.setFont(font)
             label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             layout.addWidget(label)
 
@@ -185,10 +189,7 @@ class _Rail(QWidget):
                 label.setText(f"▸ {step.value}")
                 color = self.palette().windowText().color().name()
             weight = "bold" if step is present else "normal"
-            line = colors().live if step is present else colors().muted
-            label.setStyleSheet(
-                f"color: {color}; font-weight: {weight}; border-bottom: 3px solid {line};"
-            )
+            label.setStyleSheet(f"color: {color}; font-weight: {weight}")
 
 
 class _CheckRow(QWidget):
