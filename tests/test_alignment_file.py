@@ -48,6 +48,16 @@ def test_numpy_itself_reads_it(alignment: Alignment) -> None:
         assert archive["eyes"].tolist() == ["right"]
 
 
+@pytest.mark.parametrize("eyes", [["left", "left"], ["middle"], []])
+def test_eyes_that_are_not_one_or_both_are_refused(alignment: Alignment, eyes: list[str]) -> None:
+    with np.load(io.BytesIO(encode_alignment(alignment)), allow_pickle=False) as archive:
+        arrays = dict(archive)
+    stream = io.BytesIO()
+    np.savez(stream, allow_pickle=False, **(arrays | {"eyes": np.array(eyes, "<U5")}))
+    with pytest.raises(ValueError, match="one eye, or each of both once"):
+        decode_alignment(stream.getvalue())
+
+
 def archive_with(name: str, content: bytes, compression: int = zipfile.ZIP_STORED) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", compression) as archive:

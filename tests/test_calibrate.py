@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from handcal.link.settings import LinkSettings
 from handcal.register.guard import RotationGuard
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
-from handcal.session import Session
+from handcal.session import Session, SessionRecord
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
@@ -80,9 +81,15 @@ def depth_of(pose: bytes | None) -> UInt16:
 class Stage:
     """A calibration with its wearer and headset, on a timeline of its own that needs no waiting."""
 
-    def __init__(self, server: HeadsetServer, client: HeadsetClient, session: Session | None):
+    def __init__(
+        self,
+        server: HeadsetServer,
+        client: HeadsetClient,
+        session: Session | None,
+        resume: SessionRecord | None = None,
+    ):
         self.server, self.client = server, client
-        self.calibration = Calibration(RIG, server, session, SETTINGS)
+        self.calibration = Calibration(RIG, server, session, SETTINGS, resume)
         self.t_ns = time.monotonic_ns()
         self._frames = 0
 
@@ -295,7 +302,8 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     assert stage.calibration.refused == 1
     assert stage.calibration.alignments == ()
     eventually(lambda: "turned by" in stage.shown().prompt)
-    assert "more than 9°" in stage.shown().prompt
+    assert "more than 9°. Tilt your hand anticlockwise and confirm again." in stage.shown().prompt
+    assert stage.calibration.refusal == stage.shown().prompt
     name, data = events(session)[-1]
     assert (name, data["reason"]) == ("refused", "turned")
     assert data["angle_deg"] == pytest.approx(15.0, abs=1.0)
@@ -304,6 +312,7 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     stage.press()
     assert stage.see(T_D_NEAR).state is State.ALIGNED
     assert stage.calibration.refused == 1
+    assert stage.calibration.refusal == ""
     assert len(stage.calibration.alignments) == 1
 
 
@@ -525,7 +534,11 @@ CALLS: dict[str, Callable[[Calibration], object]] = {
     "solve": lambda calibration: calibration.solve(),
     "apply": lambda calibration: calibration.apply(),
     "wait_applied": lambda calibration: calibration.wait_applied(),
+    "poll_applied": lambda calibration: calibration.poll_applied(),
     "redo": lambda calibration: calibration.redo(),
+    "set_shift": lambda calibration: calibration.set_shift({"left": np.zeros(3)}),
+    "delete_alignment": lambda calibration: calibration.delete_alignment(1),
+    "restore_alignment": lambda calibration: calibration.restore_alignment(1),
 }
 OUT_OF_TURN = {
     State.SHOW_HAND: {
@@ -534,23 +547,29 @@ OUT_OF_TURN = {
         "solve": "align the hand with the cursor first",
         "apply": "solve first",
         "wait_applied": "apply first",
+        "poll_applied": "apply first",
         "redo": "nothing to redo",
     },
     State.ALIGN: {
         "solve": "align the hand with the cursor first",
         "apply": "solve first",
         "wait_applied": "apply first",
+        "set_shift": "cannot be set by hand now",
+        "delete_alignment": "cannot be changed now",
+        "restore_alignment": "cannot be changed now",
     },
     State.ALIGNED: {
         "make_cursor": "solve and apply",
         "confirm": "no cursor to confirm",
         "apply": "solve first",
         "wait_applied": "apply first",
+        "set_shift": "cannot be set by hand now",
     },
     State.SOLVED: {
         "make_cursor": "solve and apply",
         "confirm": "no cursor to confirm",
         "wait_applied": "apply first",
+        "set_shift": "cannot be set by hand now",
     },
     State.APPLYING: {
         "make_cursor": "cannot be made now",
@@ -558,6 +577,9 @@ OUT_OF_TURN = {
         "solve": "wait until the projections are applied",
         "apply": "solve first",
         "redo": "nothing to redo",
+        "set_shift": "cannot be set by hand now",
+        "delete_alignment": "cannot be changed now",
+        "restore_alignment": "cannot be changed now",
     },
     State.APPLIED: {
         "confirm": "no cursor to confirm",
@@ -673,3 +695,232 @@ def test_it_runs_without_a_session(server: HeadsetServer, client: HeadsetClient)
     stage = Stage(server, client, None)
     stage.calibrate()
     assert stage.state() is State.APPLIED
+
+
+def test_polling_never_waits_and_comes_to_the_same(stage: Stage, session: Session) -> None:
+    calibration = stage.calibration
+    stage.align()
+    results = calibration.solve()
+    calibration.apply()
+    eventually(calibration.poll_applied)
+    assert stage.state() is State.APPLIED
+    assert calibration.is_applied
+    record = Session.open(session.path)
+    assert record.is_applied
+    for eye in EYES:
+        solved_m = results.shifts[eye].shift_m
+        np.testing.assert_array_equal(calibration.applied_shift_m[eye], solved_m)
+        np.testing.assert_array_equal(record.applied_shift_m[eye], solved_m)
+    with pytest.raises(ProcedureError, match="apply first"):
+        calibration.poll_applied()
+
+
+def test_polling_gives_up_when_the_time_is_over(
+    server: HeadsetServer, client: HeadsetClient, session: Session
+) -> None:
+    stage = Stage(server, client, session)
+    stage.calibration = Calibration(RIG, server, session, replace(SETTINGS, apply_timeout_s=0.2))
+    stage.align()
+    stage.calibration.solve()
+    client.close()
+    eventually(lambda: not server.connected)
+    stage.calibration.apply()
+    started_s = time.monotonic()
+    assert not stage.calibration.poll_applied()
+    assert time.monotonic() - started_s < 0.1
+    assert not stage.calibration.is_applied
+    with pytest.raises(LinkError, match="not acknowledged"):
+        eventually(stage.calibration.poll_applied)
+    assert stage.state() is State.SOLVED
+    with connect(server):
+        stage.calibration.apply()
+        eventually(stage.calibration.poll_applied)
+
+
+def shows(stage: Stage, eye: Eye, shift_m: Float64) -> bool:
+    P = projection_matrix(RIG.eyes[eye], shift_m)
+    return np.array_equal(stage.shown().projections[eye].P, P)
+
+
+def test_a_shift_set_by_hand_reaches_the_display_and_the_next_cursor(
+    stage: Stage, session: Session
+) -> None:
+    calibration = stage.calibration
+    by_hand_m: dict[Eye, Float64] = {
+        "left": np.array([0.001, 0.002, -0.003]),
+        "right": np.array([0.0, 0.03, 0.0]),
+    }
+    for message in calibration.set_shift({"left": by_hand_m["left"]}):
+        stage.server.wait_acked(message, 5.0)
+    assert shows(stage, "left", by_hand_m["left"])
+    assert shows(stage, "right", np.zeros(3))
+    assert stage.state() is State.SHOW_HAND
+
+    stage.calibrate()
+    assert (calibration.alignments[0].drawn_shift_m["left"] == by_hand_m["left"]).all()
+    for message in calibration.set_shift(by_hand_m):
+        stage.server.wait_acked(message, 5.0)
+    assert calibration.is_applied
+    assert shows(stage, "right", by_hand_m["right"])
+    assert Session.open(session.path).fine_tuned is None
+    calibration.record_shift()
+    fine_tuned = Session.open(session.path).fine_tuned
+    assert fine_tuned is not None
+
+    stage.align()
+    for eye, shift_m in by_hand_m.items():
+        assert (calibration.applied_shift_m[eye] == shift_m).all()
+        assert (fine_tuned[eye] == shift_m).all()
+        assert (calibration.alignments[1].drawn_shift_m[eye] == shift_m).all()
+    calibration.solve()
+    assert Session.open(session.path).fine_tuned is None
+
+
+@pytest.mark.parametrize(
+    ("shift_m", "problem"),
+    [
+        ([0.0, 0.0, 0.0301], "within ±30 mm"),
+        ([0.0, -0.0301, 0.0], "within ±30 mm"),
+        ([0.0, np.nan, 0.0], "finite"),
+        ([0.0, 0.0], "shape 3, got 2"),
+    ],
+)
+def test_a_shift_beyond_reason_is_refused_and_changes_nothing(
+    stage: Stage, shift_m: list[float], problem: str
+) -> None:
+    good_m = np.array([0.001, 0.0, 0.0])
+    with pytest.raises(ValueError, match=problem):
+        stage.calibration.set_shift({"left": good_m, "right": shift_m})
+    assert not any(shift.any() for shift in stage.calibration.applied_shift_m.values())
+
+
+def test_any_alignment_can_be_deleted_and_restored_and_the_rest_solved(
+    stage: Stage, session: Session
+) -> None:
+    calibration = stage.calibration
+    stage.calibrate()
+    stage.calibrate(T_D_HAND, T_D_HAND)
+    assert calibration.alignment_numbers == (1, 2)
+    first, second = calibration.alignments
+
+    calibration.delete_alignment(1)
+    assert list(calibration.alignments) == [second]
+    assert calibration.results is None
+    assert stage.state() is State.APPLIED  # the headset renders as before
+    record = Session.open(session.path)
+    assert (record.alignment_numbers, list(record.deleted)) == ((2,), [1])
+    assert record.results is None
+    alone = results_json(calibration.solve())
+    assert alone == results_json(solve_session([second], RIG, SolveSettings()))
+    assert stage.state() is State.SOLVED
+
+    calibration.restore_alignment(1)
+    assert stage.state() is State.SHOW_HAND
+    assert list(calibration.alignments) == [first, second]
+    with pytest.raises(ValueError, match="there is no deleted alignment 1"):
+        calibration.restore_alignment(1)
+    both = results_json(calibration.solve())
+    assert both == results_json(solve_session([first, second], RIG, SolveSettings()))
+    assert Session.open(session.path).results == both
+
+    calibration.delete_alignment(2)
+    calibration.delete_alignment(1)
+    with pytest.raises(ProcedureError, match="align the hand"):
+        calibration.solve()
+    stage.align()
+    assert list(calibration.alignment_numbers) == [3]
+    assert Session.open(session.path).alignment_numbers == (3,)
+
+
+def test_redo_of_an_alignment_can_be_undone(stage: Stage, session: Session) -> None:
+    stage.align()
+    stage.calibration.redo()
+    stage.calibration.restore_alignment(1)
+    assert len(stage.calibration.alignments) == 1
+    assert Session.open(session.path).alignment_numbers == (1,)
+
+
+def test_what_is_deleted_while_the_disk_is_full_is_deleted_later(
+    stage: Stage, session: Session, tmp_path: Path
+) -> None:
+    calibration, away = stage.calibration, tmp_path / "away"
+    stage.calibrate()
+    session.path.rename(away)
+    with pytest.raises(FileError, match="cannot write"):
+        calibration.delete_alignment(1)
+    with pytest.raises(FileError, match="cannot write"):
+        calibration.record_shift()
+    assert calibration.alignments == ()
+    away.rename(session.path)
+    stage.align()
+    record = Session.open(session.path)
+    assert (record.alignment_numbers, list(record.deleted)) == ((2,), [1])
+    assert record.fine_tuned is not None
+
+
+def resumed(stage: Stage, session: Session) -> tuple[Stage, Session]:
+    """Go on with what a session holds, as after a crash: nothing is told to the old calibration."""
+    session.close()
+    again = Session(session.path)
+    return Stage(stage.server, stage.client, again, Session.open(session.path)), again
+
+
+def test_a_calibration_goes_on_where_its_program_was_killed(stage: Stage, session: Session) -> None:
+    stage, session = resumed(stage, session)
+    assert stage.state() is State.SHOW_HAND
+    eventually(lambda: shows_offline_projections(stage.shown()))
+
+    stage.align()
+    stage.calibration.redo()
+    stage.align()
+    made = stage.calibration.alignments
+    stage, session = resumed(stage, session)
+    assert stage.state() is State.ALIGNED
+    assert stage.calibration.alignment_numbers == (2,)
+    assert stage.calibration.alignments[0].hand_m.tobytes() == made[0].hand_m.tobytes()
+
+    results = results_json(stage.calibration.solve())
+    stage, session = resumed(stage, session)
+    assert stage.state() is State.SOLVED
+    assert stage.calibration.results is not None
+    assert results_json(stage.calibration.results) == results
+
+    stage.calibration.apply()
+    stage.calibration.wait_applied()
+    by_hand_m = np.array([0.004, 0.0, -0.001])
+    stage.calibration.set_shift({"right": by_hand_m})
+    stage.calibration.record_shift()
+    solved_m = stage.calibration.applied_shift_m["left"]
+    Calibration(RIG, stage.server)  # another has used the headset in between
+    stage, session = resumed(stage, session)
+    assert stage.state() is State.APPLIED
+    eventually(lambda: shows(stage, "left", solved_m) and shows(stage, "right", by_hand_m))
+    assert stage.calibration.is_applied
+
+    stage.calibration.restore_alignment(1)
+    stage.align()
+    assert stage.calibration.alignment_numbers == (1, 2, 3)
+    assert (stage.calibration.alignments[2].drawn_shift_m["right"] == by_hand_m).all()
+    record = Session.open(session.path)
+    assert record.alignment_numbers == (1, 2, 3)
+    session.close()
+
+
+def test_a_full_session_says_so_before_the_wearer_aligns(
+    server: HeadsetServer, client: HeadsetClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.calibrate.MAX_ALIGNMENTS", 1)
+    stage = Stage(server, client, None)
+    stage.align()
+    stage.calibration.redo()
+    stage.hold()
+    with pytest.raises(ProcedureError, match="no room for more than 1 alignments in a session"):
+        stage.calibration.make_cursor()
+
+
+@pytest.mark.parametrize("eyes", [(), ("left", "left"), ("middle",)])
+def test_a_cursor_is_for_one_eye_or_both(stage: Stage, eyes: tuple[Eye, ...]) -> None:
+    stage.hold()
+    with pytest.raises(ValueError, match="one eye must be open, or both"):
+        stage.calibration.make_cursor(eyes)
+    assert stage.state() is State.SHOW_HAND

@@ -11,6 +11,7 @@ from handcal.display import (
     eye_projection,
     projection_matrix,
     reprojection_error_px,
+    target_corners_m,
     update_matrix,
     view_of_eye,
 )
@@ -95,6 +96,13 @@ def test_rendering_from_v_and_seeing_from_e_agree(
 def test_arcminutes_of_the_paper() -> None:
     assert float(arcmin_from_px(_on_axis(), 7.71)) == pytest.approx(10.79, abs=0.005)
     np.testing.assert_allclose(arcmin_from_px(_on_axis(100.0), [0.0, 100.0]), [0.0, 45 * 60])
+
+
+def test_the_target_is_a_square_straight_ahead_clockwise_as_seen() -> None:
+    np.testing.assert_allclose(
+        target_corners_m(0.5),
+        [[-0.04, -0.04, 0.5], [0.04, -0.04, 0.5], [0.04, 0.04, 0.5], [-0.04, 0.04, 0.5]],
+    )
 
 
 def test_reprojection_error_by_hand() -> None:

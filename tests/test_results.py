@@ -13,7 +13,7 @@ import pytest
 from handcal.calibrate import CalibrationSettings
 from handcal.config import read_settings, settings_json
 from handcal.files import write_json
-from handcal.register.verdict import VerdictSettings
+from handcal.register.verdict import VerdictSettings, expected_error_arcmin
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session import Session
@@ -72,6 +72,17 @@ def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None
     assert [list(alone) for alone in data["alignments"]] == [["left"], ["left", "right"]]
     assert set(data["alignments"][1]["right"]) == solved
     assert data["eye_distance_m"] == pytest.approx(0.063, abs=0.010)
+
+
+def test_what_another_alignment_would_buy_is_what_it_buys(left: Alignment) -> None:
+    once, twice = (solve_session([left] * count, RIG, SolveSettings()) for count in (1, 2))
+    now, after = (
+        expected_error_arcmin(RIG.eyes["left"], results.shifts["left"]) for results in (once, twice)
+    )
+    assert set(once.expected_after_another_arcmin) == {"left"}
+    predicted = once.expected_after_another_arcmin["left"]
+    assert predicted == pytest.approx(after, rel=0.01)
+    assert predicted < 0.9 * now
 
 
 def test_an_eye_that_took_no_part_has_no_result(left: Alignment) -> None:

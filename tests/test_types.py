@@ -1,11 +1,11 @@
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
 
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
-from handcal.types import Alignment, Frame, Intrinsics, Projection, Rig, readonly
+from handcal.types import Alignment, Eye, Frame, Intrinsics, Projection, Rig, readonly
 
 INTRINSICS = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
 
@@ -49,6 +49,12 @@ def test_values_are_frozen_and_their_arrays_read_only(alignment: Alignment) -> N
             array[0, 0] = 1.0
     with pytest.raises(TypeError):
         alignment.T_E_W["left"] = np.eye(4)  # type: ignore[index]
+
+
+@pytest.mark.parametrize("eyes", [(), ("left", "left"), ("right", "left", "right"), ("middle",)])
+def test_an_alignment_is_of_one_eye_or_of_both(alignment: Alignment, eyes: tuple[Eye, ...]) -> None:
+    with pytest.raises(ValueError, match=r"Alignment\.eyes: one eye, or each of both once"):
+        replace(alignment, eyes=eyes)
 
 
 def test_a_wrong_shape_names_the_field() -> None:

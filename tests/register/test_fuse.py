@@ -6,7 +6,12 @@ import pytest
 from handcal.bench.trials import trial_hand
 from handcal.display import projection_matrix, view_of_eye
 from handcal.geometry import invert, rigid, transform
-from handcal.register.fuse import FuseSettings, fuse_alignments, with_eye_box
+from handcal.register.fuse import (
+    FuseSettings,
+    covariances_after_another,
+    fuse_alignments,
+    with_eye_box,
+)
 from handcal.register.solve import solve_alignment
 from handcal.register.surface import describe_surface
 from handcal.rig.example import example_rig
@@ -147,6 +152,32 @@ def test_disagreement_widens_the_covariance() -> None:
     ratio = np.trace(disagreeing.covariance_m2) / np.trace(agreeing.covariance_m2)
     assert 0.5 * birge < ratio <= birge
     np.testing.assert_allclose(disagreeing.shift_m, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("alignments", [[BOTH], [ONE["left"], ONE["right"]]], ids=["both", "each"])
+@pytest.mark.parametrize("times", [1, 3])
+def test_another_alignment_is_worth_what_a_repetition_brings(
+    alignments: list[Alignment], times: int
+) -> None:
+    """For one eye at a time, another is half for each eye: two of them are one round more."""
+    rng = np.random.default_rng(2)
+    true_m: dict[Eye, Float64] = {"left": np.zeros(3), "right": np.full(3, 0.001)}
+    once = [_align(rng, alignment, true_m) for alignment in alignments]
+    predicted_m2 = covariances_after_another(once * times, RIG, SETTINGS)
+    after_m2 = {
+        eye: shift.covariance_m2
+        for eye, shift in fuse_alignments(once * (times + 1), RIG, SETTINGS).items()
+    }
+    now_m2 = {
+        eye: shift.covariance_m2
+        for eye, shift in fuse_alignments(once * times, RIG, SETTINGS).items()
+    }
+    assert set(predicted_m2) == set(after_m2)
+    for eye, covariance_m2 in predicted_m2.items():
+        if len(alignments) == 1:
+            np.testing.assert_allclose(covariance_m2, after_m2[eye], rtol=1e-9)
+        assert np.trace(after_m2[eye]) <= np.trace(covariance_m2) * (1 + 1e-9)
+        assert np.trace(covariance_m2) < np.trace(now_m2[eye])
 
 
 def test_the_fit_of_all_alignments_is_summed_up() -> None:

@@ -6,8 +6,16 @@ from handcal import rotation_between
 from handcal.bench.trials import trial_alignment
 from handcal.errors import HandError
 from handcal.geometry import rigid, transform
-from handcal.register.guard import GuardSettings, RotationGuard
+from handcal.register.guard import (
+    AXES,
+    Axis,
+    GuardSettings,
+    RotationGuard,
+    TurnAdvice,
+    turn_advice,
+)
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
+from handcal.sim.hand import make_hand
 from handcal.types import Float64
 
 CLEAN = AlignmentSettings(count=3000)
@@ -89,3 +97,46 @@ def test_bad_clouds_are_refused(sensed: SimulatedAlignment) -> None:
     guard = RotationGuard(good)
     with pytest.raises(HandError, match="beside cut edges"):
         guard.rotation(good, np.ones(len(good), dtype=np.bool_))
+
+
+def _extreme_move_m(still_m: Float64, turned_m: Float64, axis: int, sign: int) -> Float64:
+    """Return how the outermost points of a hand in a direction have moved."""
+    outermost = np.argsort(sign * still_m[:, axis])[-50:]
+    return np.asarray((turned_m - still_m)[outermost].mean(axis=0))
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("axis", AXES)
+def test_the_advice_turns_a_hand_back(axis: Axis, sign: int) -> None:
+    """The hand is raised before the camera: x right, y down, z away from the wearer."""
+    index = AXES.index(axis)
+    raised_m = transform(rigid([0.1, -0.1, 0.05], [0.0, 0.0, 0.5]), make_hand(1).vertices_m)
+    middle_m = raised_m.mean(axis=0)
+    turn = np.zeros(3)
+    turn[index] = sign * np.radians(12.0)
+    turned_m = transform(rigid(turn), raised_m - middle_m) + middle_m
+    advice = turn_advice(rotation_between(raised_m[::10], turned_m[::10]))
+    assert advice.axis == axis
+    assert advice.angle_rad == pytest.approx(-turn[index], abs=np.radians(0.5))
+
+    fingers_m = _extreme_move_m(raised_m, turned_m, 1, -1)
+    right_edge_m = _extreme_move_m(raised_m, turned_m, 0, 1)
+    went_away = {"x": fingers_m[2] > 0, "y": right_edge_m[2] > 0, "z": fingers_m[0] > 0}[axis]
+    assert (
+        advice.text
+        == {
+            "x": ("Tip your fingers away from you", "Tip your fingers toward you"),
+            "y": (
+                "Turn the right edge of your hand away from you",
+                "Turn the right edge of your hand toward you",
+            ),
+            # Fingers that went to the right went clockwise.
+            "z": ("Tilt your hand clockwise", "Tilt your hand anticlockwise"),
+        }[axis][bool(went_away)]
+    )
+
+
+def test_the_advice_is_about_the_axis_turned_about_most() -> None:
+    assert turn_advice([0.1, -0.3, 0.2]) == TurnAdvice(
+        "y", 0.3, "Turn the right edge of your hand toward you"
+    )
