@@ -65,10 +65,13 @@ def read_annotations(images: Path, annotations: Path) -> list[Photo]:
 
 def _photo(path: Path, entry: dict[str, Any]) -> Photo:
     hands = entry["hands"]
+    width, height = int(entry["width"]), int(entry["height"])
+    if width < 1 or height < 1:
+        raise ValueError(f"{path.name} is {width}x{height} pixels large")
     return Photo(
         path,
-        int(entry["width"]),
-        int(entry["height"]),
+        width,
+        height,
         np.array([hand["box"] for hand in hands], np.float64).reshape(-1, 4),
         np.array([hand["quad"] for hand in hands], np.float64).reshape(-1, 4, 2),
         np.array([hand["large"] for hand in hands], bool),

@@ -15,14 +15,12 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader
 
 from handcal.evaluate.annotations import Photo, read_image
-from handcal.evaluate.detector import summary
+from handcal.evaluate.detector import SCORE_MIN, summary
 from handcal.evaluate.precision import ImageResult
 from handcal.hand.detect import DetectSettings, decode, letterbox, points
 from handcal.train.loss import Grid, detection_loss
 from handcal.train.model import HandNet
 from handcal.train.samples import Samples, SampleSettings, collate
-
-_SCORE_MIN = 0.02  # a precision/recall curve wants the doubtful ones too
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,10 +138,10 @@ class Training:
         self._log(**self.validate(validated))
         return self._average.module
 
-    def validate(self, photos: Sequence[Photo]) -> dict[str, float]:
+    def validate(self, photos: Sequence[Photo]) -> dict[str, float | None]:
         """Return the averaged network's average precisions on whole photographs."""
         net = self._average.module.eval()
-        settings = DetectSettings(score_min=_SCORE_MIN)
+        settings = DetectSettings(score_min=SCORE_MIN)
         results = []
         for photo in photos:
             canvas, scale = letterbox(read_image(photo.path), settings.pixels)

@@ -1,0 +1,61 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.errors import FileError
+from handcal.evaluate.annotations import read_annotations, read_image
+
+HAND = {"box": [10, 20, 30, 60], "quad": [[10, 20], [30, 20], [30, 60], [10, 60]], "large": True}
+
+
+def write(folder: Path, content: object) -> Path:
+    path = folder / "annotations.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_reads_what_the_data_set_says(tmp_path: Path) -> None:
+    entry = {"width": 100, "height": 80, "hands": [HAND]}
+    [photo] = read_annotations(tmp_path, write(tmp_path, {"a.jpg": entry}))
+    assert photo.path == tmp_path / "a.jpg"
+    assert photo.boxes.tolist() == [HAND["box"]]
+    assert photo.quads.shape == (1, 4, 2)
+    assert photo.large.tolist() == [True]
+    assert photo.relative_sizes == pytest.approx(np.sqrt(20 * 40 / 8000))
+
+
+def test_a_photograph_may_hold_no_hand(tmp_path: Path) -> None:
+    entry = {"width": 100, "height": 80, "hands": []}
+    [photo] = read_annotations(tmp_path, write(tmp_path, {"a.jpg": entry}))
+    assert photo.boxes.shape == (0, 4)
+    assert photo.relative_sizes.shape == (0,)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        [],
+        {"width": 100, "height": 80},
+        {"width": "wide", "height": 80, "hands": []},
+        {"width": 100, "height": 80, "hands": [HAND | {"box": [1, 2, 3]}]},
+        {"width": 0, "height": 80, "hands": []},
+    ],
+)
+def test_refuses_other_files(tmp_path: Path, entry: object) -> None:
+    with pytest.raises(FileError, match="not a file of hand annotations"):
+        read_annotations(tmp_path, write(tmp_path, {"a.jpg": entry}))
+
+
+def test_reads_images_as_rgb(tmp_path: Path) -> None:
+    red = np.zeros((4, 4, 3), np.uint8)
+    red[..., 0] = 255
+    cv2.imwrite(str(tmp_path / "red.png"), red[..., ::-1])
+    assert (read_image(tmp_path / "red.png") == red).all()
+
+
+def test_names_the_image_it_cannot_read(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"no\.jpg"):
+        read_image(tmp_path / "no.jpg")

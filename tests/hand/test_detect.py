@@ -1,0 +1,98 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.errors import FileError
+from handcal.hand.detect import (
+    STRIDES,
+    DetectSettings,
+    HandDetector,
+    decode,
+    letterbox,
+    overlaps,
+    points,
+)
+from handcal.types import Float32, Float64
+
+SHAPE = (64, 96)
+
+
+def predictions(*found: tuple[int, float, list[float]]) -> Float32:
+    """Return raw predictions in which only points given by index, logit and box see something."""
+    places, strides = points(*SHAPE)
+    raw = np.full((5, len(places)), -10.0, np.float32)
+    for index, logit, (x0, y0, x1, y1) in found:
+        x, y = places[index]
+        raw[0, index] = logit
+        raw[1:, index] = np.log(np.array([x - x0, y - y0, x1 - x, y1 - y]) / strides[index])
+    return raw
+
+
+def decoded(*found: tuple[int, float, list[float]]) -> tuple[Float64, Float64]:
+    return decode(predictions(*found), SHAPE, DetectSettings(score_min=0.3, overlap_max=0.5))
+
+
+@pytest.mark.parametrize("shape", [(720, 1280), (480, 640), (512, 300), (33, 47), (4, 3000)])
+def test_the_canvas_holds_the_whole_image_and_suits_the_network(shape: tuple[int, int]) -> None:
+    color = np.full((*shape, 3), 200, np.uint8)
+    canvas, scale = letterbox(color, 92_160)
+    height, width = canvas.shape[:2]
+    assert height % STRIDES[-1] == width % STRIDES[-1] == 0
+    assert height * width <= 92_160
+    shown = (canvas == 200).all(2)
+    assert shown.any(1).sum() == pytest.approx(scale * shape[0], abs=1)
+    assert shown.any(0).sum() == pytest.approx(scale * shape[1], abs=1)
+    assert shown[0, 0]
+
+
+def test_a_wide_image_loses_little_of_the_canvas() -> None:
+    canvas, scale = letterbox(np.zeros((720, 1280, 3), np.uint8), 92_160)
+    assert scale**2 * 720 * 1280 > 0.85 * 92_160
+    assert canvas.size <= 3 * 92_160
+
+
+def test_the_canvas_shows_things_in_their_place() -> None:
+    color = np.zeros((720, 1280, 3), np.uint8)
+    color[400:500, 900:1000] = 255
+    canvas, scale = letterbox(color, 92_160)
+    rows, columns = np.nonzero(canvas[: round(720 * scale), :, 0] > 128)
+    assert np.mean(rows) / scale == pytest.approx(449.5, abs=2.5)
+    assert np.mean(columns) / scale == pytest.approx(949.5, abs=2.5)
+
+
+def test_there_is_a_point_for_every_cell_of_every_level() -> None:
+    places, strides = points(*SHAPE)
+    assert len(places) == sum(64 // stride * (96 // stride) for stride in STRIDES)
+    assert (places[strides == 8][:2] == [[0, 0], [8, 0]]).all()
+
+
+def test_boxes_come_back_the_surest_first() -> None:
+    boxes, scores = decoded((30, 0.0, [1, 2, 90, 40]), (60, 2.0, [-5, 30, 40, 63]))
+    assert boxes == pytest.approx(np.array([[-5, 30, 40, 63], [1, 2, 90, 40]]), abs=1e-3)
+    assert scores == pytest.approx([1 / (1 + np.exp(-2)), 0.5])
+
+
+def test_of_two_boxes_on_one_hand_the_surer_remains() -> None:
+    boxes, scores = decoded((30, 1.0, [0, 5, 50, 40]), (29, 2.0, [0, 5, 52, 40]))
+    assert boxes == pytest.approx(np.array([[0, 5, 52, 40]]), abs=1e-3)
+    assert len(scores) == 1
+
+
+def test_doubtful_points_see_nothing() -> None:
+    boxes, scores = decoded((30, -1.0, [1, 2, 90, 40]))
+    assert boxes.shape == (0, 4)
+    assert scores.shape == (0,)
+
+
+def test_overlap_is_intersection_over_union() -> None:
+    box = np.array([[0.0, 0.0, 2.0, 2.0]])
+    others = np.array([[0.0, 0.0, 2.0, 2.0], [1.0, 0.0, 3.0, 2.0], [5.0, 5.0, 6.0, 6.0]])
+    assert overlaps(box, others) == pytest.approx(np.array([[1.0, 1 / 3, 0.0]]))
+
+
+def test_says_which_model_cannot_be_loaded(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(b"not a model")
+    with pytest.raises(FileError, match=r"broken\.onnx"):
+        HandDetector(broken)
