@@ -20,6 +20,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from handcal.errors import FileError, HandcalError
+from handcal.export.formats import FORMATS
 from handcal.files import make_folder, write_json
 from handcal.types import METHODS
 
@@ -112,6 +113,25 @@ def solve(arguments: argparse.Namespace) -> None:
         console.print(f"{eye}: {verdict.name}: {verdict.reason}")
     if results.eye_distance_m is not None:
         console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
+
+
+def export(arguments: argparse.Namespace) -> None:
+    """Export a session: report, tables, calibration, clouds, and the session as one file."""
+    from handcal.export.export import ExportSettings, export_session
+    from handcal.session import Session
+
+    try:
+        settings = ExportSettings(
+            tuple(arguments.format or FORMATS), arguments.near_m, arguments.far_m
+        )
+    except ValueError as error:
+        raise HandcalError(str(error)) from error
+    record = Session.open(arguments.session)
+    folder = arguments.output or Path("results/export") / record.path.absolute().name
+    with _progress() as report:
+        files = export_session(record, folder, settings, report, lambda: False)
+    for file in files:
+        console.print(str(file))
 
 
 def replay(arguments: argparse.Namespace) -> None:
@@ -272,6 +292,18 @@ def _parser() -> argparse.ArgumentParser:
     one = add(solve)
     one.add_argument("session", type=Path, help="a session's folder")
     one.add_argument("--method", choices=METHODS, help="solver; the session's own if absent")
+
+    one = add(export, json=False)
+    metres = _number(float, 1e-3, 1e6)
+    one.add_argument("session", type=Path, help="a session's folder")
+    one.add_argument(
+        "--output", type=Path, help="folder for the files; results/export/NAME if absent"
+    )
+    one.add_argument(
+        "--format", action="append", choices=tuple(FORMATS), help="may be repeated; all if absent"
+    )
+    one.add_argument("--near-m", type=metres, default=0.1, help="OpenGL's near plane")
+    one.add_argument("--far-m", type=metres, default=100.0, help="OpenGL's far plane")
 
     one = add(replay)
     one.add_argument("recording", type=Path, help=".db3 or .bag file")

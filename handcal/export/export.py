@@ -2,47 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal, TypeAlias
 
 from handcal.errors import CancelledError
 from handcal.export.archive import write_archive
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
+from handcal.export.formats import FORMATS, Format
 from handcal.export.outcome import Outcome, conclude
 from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
 from handcal.session import SessionRecord
-
-Format: TypeAlias = Literal["report", "csv", "yaml", "json", "ply", "zip"]
-
-
-@dataclass(frozen=True, slots=True)
-class FormatInfo:
-    """What a format is called, and the patterns of its files' names in the export's folder."""
-
-    title: str
-    patterns: tuple[str, ...]
-
-
-FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
-    {
-        "report": FormatInfo("Report (PDF)", ("report.pdf",)),
-        "csv": FormatInfo("Parameters and trials (CSV)", ("parameters.csv", "trials.csv")),
-        "yaml": FormatInfo("Calibration (OpenCV YAML)", ("calibration.yaml",)),
-        "json": FormatInfo(
-            "Matrices for OpenCV, OpenGL, Unity, OpenXR (JSON)", ("calibration.json",)
-        ),
-        "ply": FormatInfo(
-            "Clouds (PLY)", ("clouds/alignment-*-cursor.ply", "clouds/alignment-*-hand.ply")
-        ),
-        "zip": FormatInfo("Whole session (ZIP)", ("session.zip",)),
-    }
-)
-
 
 @dataclass(frozen=True, slots=True)
 class ExportSettings:
@@ -91,7 +64,7 @@ def export_session(
     report : callable
         Told what is being made and which share of the whole is done, 0..1.
     is_cancelled : callable
-        Asked every few tenths of a second whether to give up.
+        Asked many times a second whether to give up.
 
     Raises
     ------
@@ -100,11 +73,15 @@ def export_session(
     FileError
         If the session cannot be solved, or a file cannot be written or replaced.
     """
+    told = ("", 0)
 
     def checkpoint(what: str, share: float) -> None:
+        nonlocal told
         if is_cancelled():
             raise CancelledError("the export was cancelled; nothing has changed")
-        report(what, share)
+        if told != (what, int(100 * share)):
+            told = what, int(100 * share)
+            report(what, share)
 
     formats = [name for name in FORMATS if name in settings.formats]
     with Staging(folder) as staging:
@@ -132,9 +109,11 @@ def _write(
     """Write the files of one format into `place`, which are meant for `folder`."""
     match name:
         case "report":
-            from handcal.export.report import write_report  # matplotlib takes a second
+            for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf"):
+                import_module(heavy)
+                checkpoint(0.0)
+            from handcal.export.report import write_report
 
-            checkpoint(0.1)
             write_report(place / "report.pdf", outcome, checkpoint)
         case "csv":
             write_parameters(place / "parameters.csv", outcome)

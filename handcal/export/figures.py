@@ -27,9 +27,12 @@ _MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
 _LINES: Mapping[Eye, str] = {"left": "-", "right": "--"}
 _HAND, _CURSOR = "#0072B2", "#D55E00"
 _LABEL_PT, _TITLE_PT = 7.5, 8.5
+# Side of a cell of the residual map, and the colour of one without inliers.
+_CELL_MM = 2.5
+_OUTLIER = (0.75, 0.75, 0.75, 1.0)
 # An outline is sought in a mask in which a display's longer side is so long, and gaps between
 # points are closed.
-_MASK_PX, _GAP_PX = 1000, 17
+_MASK_PX, _GAP_PX = 500, 9
 _AROUND_DISPLAY = 0.12
 
 
@@ -51,6 +54,7 @@ def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Resu
 def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> None:
     """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
     count = len(results.alignments)
+    is_tuned = any("fine_tuned" in outcome.shifts_m[eye] for eye in EYES)
     for component, ax in enumerate(axes):
         for eye in EYES:
             offset = -0.12 if eye == "left" else 0.12
@@ -77,12 +81,12 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
                 ax.plot(count + 2 + offset, tuned_mm, _MARKERS[eye], color=_COLORS[eye], mfc="none")
         ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
         ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
-        ax.set_xlim(0.5, count + 2.5)
+        ends = ["fused", "tuned"] if is_tuned else ["fused"]
+        ax.set_xlim(0.5, count + len(ends) + 0.5)
         shown = range(0, count, max(1, -(-count // 8)))
         names = [str(outcome.record.alignment_numbers[index]) for index in shown]
-        ax.set_xticks(
-            [*(index + 1 for index in shown), count + 1, count + 2], [*names, "fused", "tuned"]
-        )
+        places = [*(index + 1 for index in shown), *range(count + 1, count + 1 + len(ends))]
+        ax.set_xticks(places, [*names, *ends])
         _name(ax, f"φ{'₁₂₃'[component]}", "alignment", "mm")
     axes[0].legend(fontsize=6.5, frameon=False)
 
@@ -108,32 +112,33 @@ def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results
 def draw_residuals(
     ax: Axes, alignment: Alignment, eye: Eye, shift: EyeShift, most_mm: float
 ) -> None:
-    """Draw the hand as the eye faces it, each point coloured by its residual; outliers crossed."""
-    x_mm, y_mm, _ = 1e3 * transform(alignment.T_E_W[eye], alignment.hand_m).T
-    residual_mm = 1e3 * shift.residuals_m
-    is_outlier = np.isnan(residual_mm)
-    ax.scatter(
-        x_mm[is_outlier],
-        y_mm[is_outlier],
-        marker="x",
-        s=3,
-        color="0.6",
-        linewidth=0.3,
-        rasterized=True,
+    """Draw the hand as the eye faces it, coloured by the mean residual in each cell.
+
+    Cells in which all points are outliers are grey.
+    """
+    hand_mm = 1e3 * transform(alignment.T_E_W[eye], alignment.hand_m)[:, :2]
+    corner_mm = hand_mm.min(axis=0)
+    columns, rows = ((hand_mm - corner_mm) / _CELL_MM).astype(int).T
+    width, height = columns.max() + 1, rows.max() + 1
+    cells = rows * width + columns
+    is_inlier = np.isfinite(shift.residuals_m)
+    points, inliers = (
+        np.bincount(each, minlength=width * height) for each in (cells, cells[is_inlier])
     )
-    colored = ax.scatter(
-        x_mm[~is_outlier],
-        y_mm[~is_outlier],
-        c=residual_mm[~is_outlier],
-        s=1.2,
-        linewidth=0.0,
-        cmap="viridis",
-        norm=Normalize(0.0, most_mm, clip=True),
-        rasterized=True,
+    residuals_mm = 1e3 * shift.residuals_m[is_inlier]
+    sums_mm = np.bincount(cells[is_inlier], residuals_mm, minlength=width * height)
+    colors = ScalarMappable(Normalize(0.0, most_mm, clip=True), "viridis")
+    picture = colors.to_rgba(sums_mm / np.maximum(inliers, 1))
+    picture[inliers == 0] = _OUTLIER
+    picture[points == 0] = 0.0
+    left_mm, top_mm = corner_mm
+    ax.imshow(
+        picture.reshape(height, width, 4),
+        extent=(left_mm, left_mm + width * _CELL_MM, top_mm + height * _CELL_MM, top_mm),
+        interpolation="nearest",
     )
     ax.set_aspect("equal", adjustable="datalim")
-    ax.invert_yaxis()
-    _color_bar(ax, colored)
+    _color_bar(ax, colors)
 
 
 def draw_overlay(
@@ -239,7 +244,7 @@ def _ellipse(ax: Axes, shift: EyeShift, color: str, linewidth: float) -> None:
 
 
 def _color_bar(ax: Axes, colored: ScalarMappable) -> None:
-    inset = ax.inset_axes((0.97, 0.1, 0.025, 0.8))
+    inset = ax.inset_axes((0.93, 0.1, 0.025, 0.8))
     bar = ax.figure.colorbar(colored, cax=inset, extend="max")
     bar.ax.tick_params(labelsize=6.0, pad=1, length=2)
     bar.set_label("mm", fontsize=6.0, labelpad=1)

@@ -24,18 +24,21 @@ _MM_PER_INCH, _POINTS_PER_INCH = 25.4, 72.0
 _LINE = 1.35
 _FAMILY = "DejaVu Sans"
 _TABLE_PT, _TEXT_PT = 7.5, 9.0
-_CELL_PAD_MM = 1.0
+_CELL_PAD_MM = 1.2
 _GREY = "0.45"
+_NO_BREAK = "\u00a0"
+# So many characters of a cell count for its column's width.
+_MEASURED = 300
+_CAPTION_MM = 9.0
 # Inside a cell of axes: room for tick labels and titles.
 _AXES_LEFT_MM, _AXES_RIGHT_MM, _AXES_TOP_MM, _AXES_BOTTOM_MM = 13.0, 3.0, 6.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column of a table; its width is a share of the page's."""
+    """A column of a table; a table whose titles are all empty has no head."""
 
-    title: str
-    share: float
+    title: str = ""
     align: Literal["left", "right"] = "right"
 
 
@@ -103,20 +106,24 @@ class Document:
 
     def table(self, columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> None:
         """Set a table over the page's width; its head is repeated on every page it reaches."""
-        total = sum(column.share for column in columns)
-        widths_mm = [CONTENT_MM * column.share / total for column in columns]
-        self._row(columns, widths_mm, [column.title for column in columns], head=True)
+        head = [column.title for column in columns]
+        widths_mm = _column_widths_mm(columns, [head, *rows])
+
+        def set_head() -> None:
+            if any(head):
+                self._row(columns, widths_mm, head, weight="bold")
+
+        set_head()
         for row in rows:
-            height_mm = self._row_height(widths_mm, row)
-            if self._y_mm + height_mm > HEIGHT_MM - _BOTTOM_MM:
+            if self._y_mm + _row_height_mm(widths_mm, row) > HEIGHT_MM - _BOTTOM_MM:
                 self.new_page()
-                self._row(columns, widths_mm, [column.title for column in columns], head=True)
+                set_head()
             self._row(columns, widths_mm, row)
         self.space(1.5)
 
     def axes(self, height_mm: float, columns: int, *, left_mm: float = _AXES_LEFT_MM) -> list[Axes]:
         """Return axes beside one another in a strip of the page's width."""
-        self._need(height_mm)
+        self._need(height_mm + _CAPTION_MM)
         width_mm = CONTENT_MM / columns
         found = [
             self._pages[-1].add_axes(
@@ -144,34 +151,21 @@ class Document:
         columns: Sequence[Column],
         widths_mm: Sequence[float],
         cells: Sequence[str],
-        *,
-        head: bool = False,
+        weight: str = "normal",
     ) -> None:
-        weight = "bold" if head else "normal"
-        height_mm = self._row_height(widths_mm, cells, weight)
+        height_mm = _row_height_mm(widths_mm, cells, weight)
         self._need(height_mm)
         left_mm = _MARGIN_MM
         for column, width_mm, cell in zip(columns, widths_mm, cells, strict=True):
-            is_right = column.align == "right"
-            x_mm = left_mm + (width_mm - _CELL_PAD_MM if is_right else _CELL_PAD_MM)
+            x_mm = left_mm + (width_mm - _CELL_PAD_MM if column.align == "right" else _CELL_PAD_MM)
             lines = _wrap(cell, _TABLE_PT, weight, width_mm - 2 * _CELL_PAD_MM)
             for number, line in enumerate(lines):
                 y_mm = self._y_mm + _CELL_PAD_MM + number * _line_mm(_TABLE_PT)
-                align = column.align
-                _put(self._pages[-1], line, x_mm, y_mm, _TABLE_PT, weight=weight, ha=align)
+                style = {"weight": weight, "ha": column.align}
+                _put(self._pages[-1], line, x_mm, y_mm, _TABLE_PT, **style)
             left_mm += width_mm
         self._y_mm += height_mm
-        self._rule(self._y_mm, "black" if head else "0.85", self._pages[-1])
-
-    @staticmethod
-    def _row_height(
-        widths_mm: Sequence[float], cells: Sequence[str], weight: str = "normal"
-    ) -> float:
-        lines = max(
-            len(_wrap(cell, _TABLE_PT, weight, width_mm - 2 * _CELL_PAD_MM))
-            for cell, width_mm in zip(cells, widths_mm, strict=True)
-        )
-        return lines * _line_mm(_TABLE_PT) + 2 * _CELL_PAD_MM
+        self._rule(self._y_mm, "0.85" if weight == "normal" else "black", self._pages[-1])
 
     @staticmethod
     def _rule(y_mm: float, color: str, page: Figure) -> None:
@@ -182,11 +176,7 @@ class Document:
 
 def plain(text: str) -> str:
     """Return a text without what the report's font lacks, control characters included."""
-    known = _charmap()
-    return "".join(
-        char if char.isprintable() and ord(char) in known else " " if char.isspace() else "\ufffd"
-        for char in text
-    )
+    return "".join(map(_plain_char, text))
 
 
 def _wrap(text: str, points: float, weight: str, width_mm: float) -> list[str]:
@@ -220,6 +210,37 @@ def _break(word: str, points: float, weight: str, width_mm: float) -> list[str]:
     return pieces
 
 
+def _column_widths_mm(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> list[float]:
+    """Return widths that fill the page: as the cells need, and between words where too much."""
+    pad_mm = 2 * _CELL_PAD_MM + 0.5  # lest rounding break a line
+    least_mm, most_mm = [], []
+    for cells in zip(*rows, strict=True):
+        texts = [plain(cell)[:_MEASURED] for cell in cells]
+        words = [word for text in texts for word in text.split(" ")]
+        least_mm.append(pad_mm + max((_width_mm(w, _TABLE_PT, "bold") for w in words), default=0.0))
+        most_mm.append(pad_mm + max(_width_mm(text, _TABLE_PT, "bold") for text in texts))
+    left_mm = CONTENT_MM - sum(most_mm)
+    if left_mm < 0.0:
+        share = (CONTENT_MM - sum(least_mm)) / (sum(most_mm) - sum(least_mm))
+        if share < 0.0:
+            return [CONTENT_MM * width_mm / sum(least_mm) for width_mm in least_mm]
+        pairs = zip(least_mm, most_mm, strict=True)
+        return [least + share * (most - least) for least, most in pairs]
+    if columns[-1].align == "left":
+        return [*most_mm[:-1], most_mm[-1] + left_mm]
+    return [width_mm + left_mm / len(columns) for width_mm in most_mm]
+
+
+def _row_height_mm(
+    widths_mm: Sequence[float], cells: Sequence[str], weight: str = "normal"
+) -> float:
+    lines = max(
+        len(_wrap(cell, _TABLE_PT, weight, width_mm - 2 * _CELL_PAD_MM))
+        for cell, width_mm in zip(cells, widths_mm, strict=True)
+    )
+    return lines * _line_mm(_TABLE_PT) + 2 * _CELL_PAD_MM
+
+
 def _width_mm(text: str, points: float, weight: str) -> float:
     """Return the width of a text as it is printed, kerning left out."""
     return sum(_char_width_mm(char, weight) for char in text) * points
@@ -232,6 +253,13 @@ def _char_width_mm(char: str, weight: str) -> float:
     font.set_size(100.0, _POINTS_PER_INCH)
     advance: int = font.load_char(ord(char)).linearHoriAdvance
     return advance / 2**16 / 100.0 * _MM_PER_INCH / _POINTS_PER_INCH
+
+
+@lru_cache(maxsize=4096)
+def _plain_char(char: str) -> str:
+    if char == _NO_BREAK or (char.isprintable() and ord(char) in _charmap()):
+        return char
+    return " " if char.isspace() else "\ufffd"
 
 
 @lru_cache(maxsize=1)

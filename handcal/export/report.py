@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -23,7 +23,10 @@ from handcal.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.results import Results
 from handcal.trial import ErrorStatistics, summarise
-from handcal.types import EYES, Eye, EyeShift, VerdictName
+from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
 
 _ORIGINS: Mapping[Origin, str] = {
     "fine_tuned": "fine-tuned by hand",
@@ -47,22 +50,36 @@ def write_report(path: Path, outcome: Outcome, checkpoint: Callable[[float], Non
     path : Path
     outcome : Outcome
     checkpoint : callable
-        Told the share done, every few tenths of a second; what it raises ends the writing.
+        Told the share done, many times a second; what it raises ends the writing.
     """
-    # TrueType rather than Type 3, which publishers refuse; clouds of points as pixels.
+    # TrueType rather than Type 3, which publishers refuse; pictures at 200 dots an inch.
     with matplotlib.rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
         document = Document(f"{outcome.name} · {outcome.record.wearer or 'wearer not named'}")
         sections = list(_sections(document, outcome))
         for done, section in enumerate(sections):
-            checkpoint(0.5 * done / len(sections))
+            checkpoint(0.4 * done / len(sections))
             section()
         pages = document.finish()
-        stream = io.BytesIO()
+        stream = _CheckedStream(checkpoint, 0.4)
         with PdfPages(stream, metadata=_metadata(outcome)) as pdf:
             for done, page in enumerate(pages):
-                checkpoint(0.5 + 0.5 * done / len(pages))
+                stream.share = 0.4 + 0.5 * done / len(pages)
                 pdf.savefig(page)
+            stream.share = 0.9
     write_atomic(path, stream.getvalue())
+
+
+class _CheckedStream(io.BytesIO):
+    """Bytes whose every writing is a checkpoint: matplotlib works for long between two pages."""
+
+    def __init__(self, checkpoint: Callable[[float], None], share: float) -> None:
+        super().__init__()
+        self.share = share
+        self._checkpoint = checkpoint
+
+    def write(self, data: Buffer, /) -> int:
+        self._checkpoint(self.share)
+        return super().write(data)
 
 
 def _sections(document: Document, outcome: Outcome) -> Iterator[Callable[[], None]]:
@@ -71,11 +88,14 @@ def _sections(document: Document, outcome: Outcome) -> Iterator[Callable[[], Non
     yield lambda: _summary(document, outcome)
     if results is not None:
         yield lambda: _alignments(document, outcome, results)
-        yield lambda: _plots(document, outcome, results)
+        yield lambda: _shift_plots(document, outcome, results)
+        yield lambda: _convergence(document, outcome, results)
         yield from _residuals(document, outcome, results)
-        yield lambda: _overlays(document, outcome)
+        yield from _overlays(document, outcome)
     if outcome.record.trials:
         yield lambda: _user_test(document, outcome)
+        yield lambda: _running_mean(document, outcome)
+        yield lambda: _trials(document, outcome)
     if outcome.record.notes.strip():
         yield lambda: _notes(document, outcome.record.notes)
     yield lambda: _conditions(document, outcome)
@@ -100,17 +120,17 @@ def _summary(document: Document, outcome: Outcome) -> None:
         f"NumPy {np.__version__}, on {platform.system()} {platform.machine()}",
         "Made at": _time(datetime.now(UTC).isoformat()),
     }
-    document.table([Column("", 1, "left"), Column("", 3, "left")], list(facts.items()))
+    document.table([Column(align="left"), Column(align="left")], list(facts.items()))
     document.heading("Eye shift φ")
     document.table(
         [
-            Column("eye", 1.0, "left"),
-            Column("which", 2.2, "left"),
-            Column("φ₁ ± σ, mm", 1.8),
-            Column("φ₂ ± σ, mm", 1.8),
-            Column("φ₃ ± σ, mm", 1.8),
-            Column("final", 0.9),
-            Column("applied", 1.1),
+            Column("eye", "left"),
+            Column("φ", "left"),
+            Column("φ₁ ± σ, mm"),
+            Column("φ₂ ± σ, mm"),
+            Column("φ₃ ± σ, mm"),
+            Column("final"),
+            Column("applied"),
         ],
         [
             [
@@ -131,13 +151,13 @@ def _summary(document: Document, outcome: Outcome) -> None:
     document.heading("How it was solved")
     document.table(
         [
-            Column("eye", 0.8, "left"),
-            Column("verdict", 1.4, "left"),
-            Column("expected error, ′", 1.5),
-            Column("RMS, mm", 1.2),
-            Column("inliers, %", 1.2),
-            Column("iterations", 1.3),
-            Column("reason", 4.5, "left"),
+            Column("eye", "left"),
+            Column("verdict", "left"),
+            Column("expected error, arcmin"),
+            Column("RMS, mm"),
+            Column("inliers, %"),
+            Column("iterations"),
+            Column("reason", "left"),
         ],
         [
             [
@@ -187,25 +207,23 @@ def _alignments(document: Document, outcome: Outcome, results: Results) -> None:
     document.heading("Alignments")
     document.table(
         [
-            Column("no.", 0.6),
-            Column("time, UTC", 1.3),
-            Column("eyes open", 1.4, "left"),
-            Column("points, cursor / hand", 1.9),
-            Column("rotation, °", 1.2),
-            Column("eye", 0.9, "left"),
-            Column("φ₁ ± σ, mm", 2.0),
-            Column("φ₂ ± σ, mm", 2.0),
-            Column("φ₃ ± σ, mm", 2.0),
-            Column("RMS, mm", 1.0),
-            Column("inliers, %", 1.1),
-            Column("iter.", 0.8),
+            Column("no."),
+            Column("time, UTC"),
+            Column("eyes", "left"),
+            Column("rotation,\u00a0°"),
+            Column("eye", "left"),
+            Column("φ₁ ± σ, mm"),
+            Column("φ₂ ± σ, mm"),
+            Column("φ₃ ± σ, mm"),
+            Column("RMS, mm"),
+            Column("inliers, %"),
+            Column("iterations"),
         ],
         [
             [
                 str(number),
                 times.get(number, "")[11:19],
-                " + ".join(alignment.eyes),
-                f"{len(alignment.cursor_m):,} / {len(alignment.hand_m):,}",
+                "both" if len(alignment.eyes) == 2 else alignment.eyes[0],
                 f"{np.degrees(np.linalg.norm(alignment.rotation_rad)):.1f}",
                 eye,
                 *_with_sigma(shift),
@@ -220,12 +238,12 @@ def _alignments(document: Document, outcome: Outcome, results: Results) -> None:
         ],
     )
     document.caption(
-        "Each alignment solved alone, without priors. One alignment with both eyes open gives "
-        "both eyes the same hand displacement; only fusing tells them apart."
+        "Each alignment solved alone, without priors; eyes: those open. One alignment with both "
+        "eyes open shows one hand displacement for both; fusing shares it out between them."
     )
 
 
-def _plots(document: Document, outcome: Outcome, results: Results) -> None:
+def _shift_plots(document: Document, outcome: Outcome, results: Results) -> None:
     numbers = outcome.record.alignment_numbers
     document.heading("φ of each alignment, and fused", room_mm=75.0)
     figures.draw_shifts(document.axes(58.0, 3), outcome, results)
@@ -235,8 +253,11 @@ def _plots(document: Document, outcome: Outcome, results: Results) -> None:
         "Grey: each alignment by its number; coloured: fused. Ellipses are 1σ (39 % of cases); the "
         "cross at 0 is the viewpoint of the offline calibration."
     )
+
+
+def _convergence(document: Document, outcome: Outcome, results: Results) -> None:
     document.heading("Convergence", room_mm=70.0)
-    figures.draw_convergence(document.axes(55.0, 2), numbers, results)
+    figures.draw_convergence(document.axes(55.0, 2), outcome.record.alignment_numbers, results)
     document.caption("Root mean square distance of the pairs at each iteration.")
 
 
@@ -262,31 +283,30 @@ def _residuals(
     for index in range(len(results.alignments)):
         yield partial(draw, index)
     yield lambda: document.caption(
-        "The hand as the eye faces it, mm in E; colour is a point's residual, grey crosses are "
-        "outliers and points that belong to a cut edge."
+        "The hand as the eye faces it, in E, mm; colour: mean residual in cells of 2.5 mm; grey: "
+        "only outliers, or points that belong to a cut edge."
     )
 
 
-def _overlays(document: Document, outcome: Outcome) -> None:
+def _overlays(document: Document, outcome: Outcome) -> Iterator[Callable[[], None]]:
+    """Yield what draws each eye's newest alignment."""
     record = outcome.record
-    document.heading("Hand and cursor through the display", room_mm=75.0)
-    for eye in EYES:
-        took_part = [
-            (number, alignment)
-            for number, alignment in zip(record.alignment_numbers, record.alignments, strict=True)
-            if eye in alignment.eyes
-        ]
-        if not took_part:
-            continue
-        number, alignment = took_part[-1]
-        display = record.rig.eyes[eye]
-        before, after = document.axes(58.0, 2)
-        figures.draw_overlay(before, display, alignment, eye, np.zeros(3))
-        figures.draw_overlay(after, display, alignment, eye, outcome.final_shift_m(eye))
-        title = f"{eye} eye, alignment {number}: "
-        before.set_title(f"{title}before", fontsize=8.5, loc="left")
-        after.set_title(f"{title}after", fontsize=8.5, loc="left")
-    document.caption(
+    newest = {
+        eye: (number, alignment)
+        for number, alignment in zip(record.alignment_numbers, record.alignments, strict=True)
+        for eye in alignment.eyes
+    }
+
+    def draw(eye: Eye, number: int, alignment: Alignment) -> None:
+        shifts_m = {"before": np.zeros(3), "after": outcome.final_shift_m(eye)}
+        for ax, (when, shift_m) in zip(document.axes(58.0, 2), shifts_m.items(), strict=True):
+            figures.draw_overlay(ax, record.rig.eyes[eye], alignment, eye, shift_m)
+            ax.set_title(f"alignment {number}, {eye} eye, {when}", fontsize=8.5, loc="left")
+
+    yield lambda: document.heading("Hand and cursor through the display", room_mm=75.0)
+    for eye, (number, alignment) in newest.items():
+        yield partial(draw, eye, number, alignment)
+    yield lambda: document.caption(
         "When the wearer confirmed, the hand (filled) covered the cursor (dashed, as the headset "
         "drew it then). Before: what the offline calibration predicts for that moment. After: what "
         "the final φ predicts; the better φ is, the better they agree. Pixels; the frame is the "
@@ -303,13 +323,13 @@ def _user_test(document: Document, outcome: Outcome) -> None:
     groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
     document.table(
         [
-            Column("trials", 1.4, "left"),
-            Column("number", 1.0),
-            Column("corners", 1.0),
-            Column("mean ± SD, px", 1.9),
-            Column("median (min–max), px", 2.6),
-            Column("mean ± SD, ′", 1.9),
-            Column("median (min–max), ′", 2.6),
+            Column("trials", "left"),
+            Column("number"),
+            Column("corners"),
+            Column("mean ± SD, px"),
+            Column("median (min–max), px"),
+            Column("mean ± SD, arcmin"),
+            Column("median (min–max), arcmin"),
         ],
         [[name, *_error_cells(errors)] for name, errors in groups.items()],
     )
@@ -318,18 +338,27 @@ def _user_test(document: Document, outcome: Outcome) -> None:
     document.caption(
         "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges."
     )
+
+
+def _running_mean(document: Document, outcome: Outcome) -> None:
+    record = outcome.record
     figures.draw_running_mean(document.axes(48.0, 1)[0], record.trial_numbers, record.trials)
+    document.caption("Points: mean error of each trial; lines: mean of all so far.")
+
+
+def _trials(document: Document, outcome: Outcome) -> None:
+    record = outcome.record
     document.heading("Trials", room_mm=30.0)
     document.table(
         [
-            Column("no.", 0.7),
-            Column("time, UTC", 1.6),
-            Column("eye", 0.9, "left"),
-            Column("distance, m", 1.3),
-            Column("calibrated φ, mm", 2.6),
-            Column("adjusted φ, mm", 2.6),
-            Column("mean error, px", 1.6),
-            Column("mean error, ′", 1.6),
+            Column("no."),
+            Column("time, UTC"),
+            Column("eye", "left"),
+            Column("distance, m"),
+            Column("calibrated φ, mm"),
+            Column("adjusted φ, mm"),
+            Column("mean error, px"),
+            Column("mean error, arcmin"),
         ],
         [
             [
@@ -337,8 +366,8 @@ def _user_test(document: Document, outcome: Outcome) -> None:
                 trial.time[11:19],
                 trial.eye,
                 f"{trial.target_depth_m:g}",
-                "  ".join(map(_mm, trial.calibrated_shift_m)),
-                "  ".join(map(_mm, trial.adjusted_shift_m)),
+                "\u00a0\u00a0".join(map(_mm, trial.calibrated_shift_m)),
+                "\u00a0\u00a0".join(map(_mm, trial.adjusted_shift_m)),
                 f"{trial.error_px.mean():.2f}",
                 f"{trial.error_arcmin.mean():.2f}",
             ]
@@ -369,7 +398,7 @@ def _notes(document: Document, notes: str) -> None:
 
 def _conditions(document: Document, outcome: Outcome) -> None:
     record = outcome.record
-    columns = Column("", 1, "left"), Column("", 1)
+    columns = Column(align="left"), Column(align="left")
     links = [event for event in record.events if event.name == "link"]
     if links:
         document.heading(f"Link to the headset, at {_time(links[-1].time)}")
@@ -384,7 +413,7 @@ def _conditions(document: Document, outcome: Outcome) -> None:
 def _definitions(document: Document) -> None:
     document.new_page()
     document.heading("Definitions")
-    document.table([Column("", 1, "left"), Column("", 4, "left")], list(DEFINITIONS.items()))
+    document.table([Column(align="left"), Column(align="left")], list(DEFINITIONS.items()))
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
@@ -406,7 +435,7 @@ def _short(text: str) -> str:
 def _with_sigma(shift: EyeShift) -> list[str]:
     sigma_m = np.sqrt(np.diag(shift.covariance_m2))
     return [
-        f"{_mm(value)} ± {1e3 * sigma:.2f}"
+        f"{_mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}"
         for value, sigma in zip(shift.shift_m, sigma_m, strict=True)
     ]
 

@@ -1,0 +1,34 @@
+"""The formats of an export, without what writes them: quick to import."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+Format: TypeAlias = Literal["report", "csv", "yaml", "json", "ply", "zip"]
+
+
+@dataclass(frozen=True, slots=True)
+class FormatInfo:
+    """What a format is called, and the patterns of its files' names in the export's folder."""
+
+    title: str
+    patterns: tuple[str, ...]
+
+
+FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
+    {
+        "report": FormatInfo("Report (PDF)", ("report.pdf",)),
+        "csv": FormatInfo("Parameters and trials (CSV)", ("parameters.csv", "trials.csv")),
+        "yaml": FormatInfo("Calibration (OpenCV YAML)", ("calibration.yaml",)),
+        "json": FormatInfo(
+            "Matrices for OpenCV, OpenGL, Unity, OpenXR (JSON)", ("calibration.json",)
+        ),
+        "ply": FormatInfo(
+            "Clouds (PLY)", ("clouds/alignment-*-cursor.ply", "clouds/alignment-*-hand.ply")
+        ),
+        "zip": FormatInfo("Whole session (ZIP)", ("session.zip",)),
+    }
+)
