@@ -17,6 +17,7 @@ from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
 from handcal.session import SessionRecord
 
+
 @dataclass(frozen=True, slots=True)
 class ExportSettings:
     """What is exported.
