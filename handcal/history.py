@@ -167,7 +167,7 @@ def clean_wearer(name: str) -> str:
     """
     name = name.strip()
     if len(name) > MAX_WEARER_CHARACTERS:
-        raise ValueError(f"a wearer's name may have {MAX_WEARER_CHARACTERS} characters")
+        raise ValueError(f"a wearer's name may have at most {MAX_WEARER_CHARACTERS} characters")
     if any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name):
         raise ValueError("a wearer's name may hold no line breaks or control characters")
     return name

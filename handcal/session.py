@@ -193,8 +193,14 @@ class Session(Closable):
         return cls(path)
 
     @staticmethod
-    def open(path: Path) -> SessionRecord:
+    def open(path: Path, before: SessionRecord | None = None) -> SessionRecord:
         """Read a session, which may be in use, killed or damaged.
+
+        Parameters
+        ----------
+        path : Path
+        before : SessionRecord, optional
+            What it held before; the alignments in it, which never change, are not read again.
 
         Raises
         ------
@@ -206,6 +212,7 @@ class Session(Closable):
         history = _replay(path, journal.events)
         if history.rig_sha256 != _sha256(_rig_bytes(path)):
             raise FileError(f"{path / 'rig.yaml'} is damaged: its checksum is not the journal's")
+        known = _alignments_by_number(before) if before else {}
         results, notes = path / "results.json", path / "notes.txt"
         return SessionRecord(
             path=path,
@@ -214,9 +221,9 @@ class Session(Closable):
             wearer=history.wearer,
             notes=_read_notes(notes) if notes.exists() else "",
             events=journal.events,
-            alignments=tuple(_read_alignments(path, history.alignments.kept).values()),
+            alignments=tuple(_read_alignments(path, history.alignments.kept, known).values()),
             alignment_numbers=tuple(history.alignments.kept),
-            deleted=MappingProxyType(_read_alignments(path, history.alignments.deleted)),
+            deleted=MappingProxyType(_read_alignments(path, history.alignments.deleted, known)),
             trials=tuple(history.trials.kept.values()),
             trial_numbers=tuple(history.trials.kept),
             deleted_trials=MappingProxyType(history.trials.deleted),
@@ -368,7 +375,7 @@ class Session(Closable):
             If they are longer than 20,000 characters.
         """
         if len(text) > MAX_NOTES_CHARACTERS:
-            raise ValueError(f"notes may have {MAX_NOTES_CHARACTERS:,} characters")
+            raise ValueError(f"notes may have at most {MAX_NOTES_CHARACTERS:,} characters")
         write_atomic(self.path / "notes.txt", text.encode(errors="replace"))
         self.revision += 1
 
@@ -415,9 +422,15 @@ def _replay(path: Path, events: Sequence[Event]) -> History:
     return history
 
 
-def _read_alignments(path: Path, checksums: Mapping[int, str]) -> dict[int, Alignment]:
+def _alignments_by_number(record: SessionRecord) -> dict[int, Alignment]:
+    return {**dict(zip(record.alignment_numbers, record.alignments, strict=True)), **record.deleted}
+
+
+def _read_alignments(
+    path: Path, checksums: Mapping[int, str], known: Mapping[int, Alignment]
+) -> dict[int, Alignment]:
     return {
-        number: _read_alignment(_alignment_path(path, number), sha256)
+        number: known.get(number) or _read_alignment(_alignment_path(path, number), sha256)
         for number, sha256 in checksums.items()
     }
 

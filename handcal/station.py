@@ -275,7 +275,7 @@ class Station(Closable):
     def _newest_record(self) -> SessionRecord:
         if self._revision != self.session.revision:
             self._revision = self.session.revision
-            self._record = Session.open(self.session.path)
+            self._record = Session.open(self.session.path, self._record)
         return self._record
 
 

@@ -395,6 +395,20 @@ def test_any_alignment_can_be_deleted_and_restored_at_its_place(
     assert numbers(Session.open(session.path)) == ([1, 2, 3, 4], [])
 
 
+def test_reading_again_takes_the_alignments_that_are_known(
+    session: Session, alignment: Alignment
+) -> None:
+    for number in (1, 2):
+        session.save_alignment(replace(alignment, t_b_ns=number))
+    before = Session.open(session.path)
+    session.delete_alignment(1)
+    session.save_alignment(replace(alignment, t_b_ns=3))
+    record = Session.open(session.path, before)
+    assert numbers(record) == ([2, 3], [1])
+    assert record.deleted[1] is before.alignments[0]
+    assert record.alignments[0] is before.alignments[1]
+
+
 def test_a_session_of_many_alignments_is_full(session: Session, alignment: Alignment) -> None:
     for _ in range(MAX_ALIGNMENTS):
         session.save_alignment(alignment)
