@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -33,14 +34,10 @@ class NumberTable(QTableWidget):
     ----------
     name : str
         For screen readers and, in lower case with dashes, as object name.
-    equal_columns : bool
-        All as wide; otherwise as wide as what is in them, and the last one to the end.
     parent : QWidget or None
     """
 
-    def __init__(
-        self, name: str, *, equal_columns: bool = False, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName(name.lower().replace(" ", "-"))
         self.setAccessibleName(name)
@@ -49,14 +46,10 @@ class NumberTable(QTableWidget):
         self.setTabKeyNavigation(False)
         self.setWordWrap(False)
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        mode = QHeaderView.ResizeMode
-        across, down = self.horizontalHeader(), self.verticalHeader()
-        across.setSectionResizeMode(mode.Stretch if equal_columns else mode.ResizeToContents)
-        across.setStretchLastSection(True)
-        across.setSectionsClickable(False)
-        down.setSectionResizeMode(mode.ResizeToContents)
-        down.setSectionsClickable(False)
-        self._equal_columns = equal_columns
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.horizontalHeader().setSectionsClickable(False)
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.verticalHeader().setSectionsClickable(False)
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
 
@@ -75,13 +68,27 @@ class NumberTable(QTableWidget):
                 self.setItem(number, column, _number_item(text, row.tooltip))
             if len(row.cells) < len(columns):
                 self.setSpan(number, len(row.cells) - 1, 1, len(columns) - len(row.cells) + 1)
-        if self._equal_columns:
-            widths = [self.sizeHintForColumn(column) for column in range(len(columns))]
-            self.horizontalHeader().setMinimumSectionSize(max(widths))
+        self._fit_columns()
 
     def as_text(self) -> str:
         """Return the table as tab-separated lines."""
         return rows_as_text(self._columns, self._rows)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Share what room there is."""
+        super().resizeEvent(event)
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        """Give each column what is in it needs, and an equal share of what is left."""
+        header = self.horizontalHeader()
+        needed_px = [
+            max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
+            for column in range(self.columnCount())
+        ]
+        spare_px = max(0, self.viewport().width() - sum(needed_px))
+        for column, width_px in enumerate(needed_px):
+            self.setColumnWidth(column, width_px + spare_px // len(needed_px))
 
 
 def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:

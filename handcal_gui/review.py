@@ -89,8 +89,7 @@ class Review(QObject):
         panels = self._window.panels
         note = "" if stored.results else "It holds no alignment yet."
         self._page.show_session(record, stored.results, note)
-        expected = stored.results.expected_after_another_arcmin if stored.results else {}
-        panels.results.show_results(stored.results, record.alignments, record.rig, expected)
+        panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, Q
 
 from handcal.results import Results
 from handcal.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye, Rig
+from handcal.types import EYES, Alignment, Rig
 from handcal_gui.number_table import NumberTable, rows_as_text
 from handcal_gui.results.compare_tab import CompareTab
 from handcal_gui.results.convergence_plot import ConvergencePlot
@@ -33,7 +33,7 @@ _EMPTY = (
 
 
 class ResultsPanel(QWidget):
-    """Shows results in tabs: numbers, convergence, residuals, alignments, comparison.
+    """Shows results in tabs: eyes, convergence, residuals, alignments, comparison.
 
     Attributes
     ----------
@@ -53,10 +53,10 @@ class ResultsPanel(QWidget):
         self.setAccessibleName("Results")
         self._results: Results | None = None
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
-        self._numbers = NumberTable("Numbers of both eyes", equal_columns=True)
+        self._numbers = NumberTable("Numbers of both eyes")
         self._convergence = ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable("Each alignment alone", equal_columns=True)
+        self._alignments = NumberTable("Each alignment alone")
         self._another = QLabel()
         self._another.setWordWrap(True)
         self._compare = CompareTab()
@@ -69,19 +69,10 @@ class ResultsPanel(QWidget):
         """Show the results of a snapshot, if they are others than those shown."""
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
-            self.show_results(
-                procedure.results,
-                record.alignments,
-                record.rig,
-                procedure.expected_after_another_arcmin,
-            )
+            self.show_results(procedure.results, record.alignments, record.rig)
 
     def show_results(
-        self,
-        results: Results | None,
-        alignments: Sequence[Alignment],
-        rig: Rig,
-        expected_after_another_arcmin: Mapping[Eye, float],
+        self, results: Results | None, alignments: Sequence[Alignment], rig: Rig
     ) -> None:
         """Show results, or that there are none.
 
@@ -92,8 +83,6 @@ class ResultsPanel(QWidget):
             Those that were solved, in the same order; of any that are missing no residual map is
             shown.
         rig : Rig
-        expected_after_another_arcmin : mapping of eye to float
-            May be empty.
         """
         self._results = results
         self._stack.setCurrentIndex(0 if results is None else 1)
@@ -102,11 +91,11 @@ class ResultsPanel(QWidget):
         for eye, card in self._cards.items():
             card.show_verdict(results.verdicts.get(eye))
         eyes = [EYE_NAMES[eye] for eye in EYES]
-        self._numbers.show_rows(eyes, result_rows(results, rig, expected_after_another_arcmin))
+        self._numbers.show_rows(eyes, result_rows(results, rig))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
         self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, rig))
-        self._another.setText(another_text(results, rig, expected_after_another_arcmin))
+        self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
 
     def show_comparison(self, other: Results) -> None:
@@ -141,7 +130,7 @@ class ResultsPanel(QWidget):
         tabs = QTabWidget()
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
-        tabs.addTab(self._numbers_tab(), "Numbers")
+        tabs.addTab(self._eyes_tab(), "Eyes")
         tabs.addTab(self._convergence, "Convergence")
         tabs.addTab(self._residuals, "Residuals")
         tabs.addTab(self._alignments_tab(), "Alignments")
@@ -150,7 +139,7 @@ class ResultsPanel(QWidget):
         self._stack.addWidget(empty)
         self._stack.addWidget(tabs)
 
-    def _numbers_tab(self) -> QWidget:
+    def _eyes_tab(self) -> QWidget:
         cards = QHBoxLayout()
         cards.setSpacing(SPACING_PX)
         for card in self._cards.values():

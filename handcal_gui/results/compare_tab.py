@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Literal
+
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QComboBox,
@@ -14,18 +17,17 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.results import Results
-from handcal.types import METHODS, Rig
+from handcal.types import METHODS, Method, Rig
 from handcal_gui.number_table import NumberTable
 from handcal_gui.results.rows import comparison_rows
 from handcal_gui.theme import SPACING_PX
 
-_METHOD_MEANINGS = {
-    "paper": "as published by Hu et al. 2021; slow",
-    "linear": "the paper's model, all three rows of each pair",
-    "consistent": "exact model, robust to cuts and a turned hand; the default",
-    "icp": "rigid, the paper's baseline",
+_MEANINGS: Mapping[Method, str] = {
+    "paper": "as published by Hu et al. 2021; slow.",
+    "linear": "the paper's model, solved with all three rows of each pair.",
+    "consistent": "exact model, robust to cuts and a turned hand; the default.",
+    "icp": "rigid registration, the paper's baseline.",
 }
-_IDLE = "Choose a method and press Compare."
 
 
 class CompareTab(QWidget):
@@ -52,6 +54,7 @@ class CompareTab(QWidget):
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")
         self._methods.setAccessibleName("Compare with method")
+        self._methods.currentTextChanged.connect(self._explain)
         self._compare = QPushButton("&Compare")
         self._compare.setObjectName("comparison-start")
         self._compare.clicked.connect(self._ask)
@@ -66,6 +69,7 @@ class CompareTab(QWidget):
         self._progress.setSizePolicy(policy)
         self._progress.setMaximumHeight(SPACING_PX)
         self._status = QLabel()
+        self._status.setObjectName("comparison-status")
         self._status.setWordWrap(True)
         self._lay_out()
         self._set_busy(False)
@@ -76,9 +80,8 @@ class CompareTab(QWidget):
         self._methods.clear()
         for method in METHODS:
             if method != results.method:
-                self._methods.addItem(f"{method}: {_METHOD_MEANINGS[method]}", method)
+                self._methods.addItem(method)
         self.table.show_rows((), ())
-        self._status.setText(_IDLE)
         self._set_busy(False)
 
     def show_comparison(self, other: Results) -> None:
@@ -88,15 +91,21 @@ class CompareTab(QWidget):
             return
         columns = self._results.method, other.method, "Difference"
         self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
-        self._status.setText(f"Difference: {other.method} less {self._results.method}.")
+        self._status.setText(
+            f"Difference: {other.method} less {self._results.method}. "
+            "Of σ and expected error only those of “consistent” are honest; others are too small."
+        )
 
     def show_failure(self, text: str) -> None:
         """Say why there is no comparison."""
         self._set_busy(False)
         self._status.setText(text)
 
+    def _explain(self, method: Method | Literal[""]) -> None:
+        self._status.setText(f"{method}: {_MEANINGS[method]}" if method else "")
+
     def _ask(self) -> None:
-        method = self._methods.currentData()
+        method = self._methods.currentText()
         self._set_busy(True)
         self._status.setText(f"Solving with {method} …")
         self.requested.emit(method)
@@ -115,10 +124,6 @@ class CompareTab(QWidget):
     def _lay_out(self) -> None:
         label = QLabel("Compare &with")
         label.setBuddy(self._methods)
-        self._methods.setMinimumContentsLength(12)
-        self._methods.setSizeAdjustPolicy(
-            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
-        )
         row = QHBoxLayout()
         row.setSpacing(SPACING_PX)
         row.addWidget(label)

@@ -18,21 +18,29 @@ _SHADES = 32
 
 
 class ResidualMap(Plot):
-    """Residuals in colour; points without a partner are grey crosses."""
+    """Residuals in colour; points without a partner are grey crosses.
+
+    Attributes
+    ----------
+    scatters : tuple of 2 pyqtgraph.ScatterPlotItem
+        Inliers and outliers, mm.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Residual map", "Right (mm)", "Down (mm)", parent)
         self._shown = np.empty((0, 2)), np.empty(0)
-        self._outliers = pg.ScatterPlotItem(size=5, symbol="x")
-        self._inliers = pg.ScatterPlotItem(size=4, pen=None)
+        self.scatters = (
+            pg.ScatterPlotItem(size=4, pen=None),
+            pg.ScatterPlotItem(size=5, symbol="x"),
+        )
         self._bar = pg.ColorBarItem(
             values=(0.0, _LARGEST_MM), width=14, interactive=False, label="Residual (mm)"
         )
         item = self.item
         item.setAspectLocked()
         item.invertY()
-        item.addItem(self._outliers)
-        item.addItem(self._inliers)
+        for scatter in reversed(self.scatters):
+            item.addItem(scatter)
         item.layout.addItem(self._bar, 2, 5)
         self._redraw()
 
@@ -64,10 +72,11 @@ class ResidualMap(Plot):
             self._bar.getAxis(side).setTextPen(self.palette().windowText().color())
         shades = [pg.mkBrush(c) for c in palette.getLookupTable(0.0, 1.0, _SHADES)]
         shade = (_SHADES / _LARGEST_MM * 1e3 * residuals_m[~is_outlier]).astype(int)
-        self._inliers.setData(
+        inliers, outliers = self.scatters
+        inliers.setData(
             pos=1e3 * places_m[~is_outlier], brush=[shades[min(i, _SHADES - 1)] for i in shade]
         )
-        self._outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
+        outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
 
 
 def _palette() -> pg.ColorMap:

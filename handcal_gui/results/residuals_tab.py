@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
 
 from handcal.geometry import transform
@@ -50,6 +51,7 @@ class ResidualsTab(QWidget):
     def _show_chosen(self) -> None:
         chosen = self._choice.currentData()
         if self._results is None or chosen is None:
+            self._map.show_residuals(np.empty((0, 2)), np.empty(0))
             return
         index, eye = chosen
         alignment = self._alignments[index]

@@ -9,6 +9,7 @@ from handcal.register.verdict import expected_error_arcmin
 from handcal.results import Results
 from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
 from handcal_gui.number_table import Row
+from handcal_gui.numbers import signed
 
 EYE_NAMES: Mapping[Eye, str] = {"left": "Left eye", "right": "Right eye"}
 VERDICT_WORDS: Mapping[VerdictName, str] = {
@@ -25,16 +26,17 @@ class Quantity:
 
     Attributes
     ----------
-    name, unit, meaning : str
+    name, suffix, meaning : str
+        The unit is in one of the first two.
     value : callable
-        From the shift and the eye's display to the number in `unit`.
+        From the shift and the eye's display to the number in its unit.
     decimals : int
     sigma : callable or None
         From the shift to the number's standard deviation.
     """
 
     name: str
-    unit: str
+    suffix: str
     meaning: str
     value: Callable[[EyeShift, EyeDisplay], float]
     decimals: int
@@ -44,28 +46,29 @@ class Quantity:
         """Return the number, with its standard deviation if it has one."""
         value = self.value(shift, display)
         if self.sigma is None:
-            return f"{value:.{self.decimals}f}{self.unit}"
-        return f"{_signed(value, self.decimals)} ± {self.sigma(shift):.{self.decimals}f}{self.unit}"
+            return f"{value:.{self.decimals}f}{self.suffix}"
+        return (
+            f"{signed(value, self.decimals)} ± {self.sigma(shift):.{self.decimals}f}{self.suffix}"
+        )
 
     def difference(self, shift: EyeShift, other: EyeShift, display: EyeDisplay) -> str:
         """Return by how much the other's number is larger."""
         apart = self.value(other, display) - self.value(shift, display)
-        return f"{_signed(apart, self.decimals)}{self.unit}"
+        return f"{signed(apart, self.decimals)}{self.suffix}"
 
 
 def _phi(index: int, direction: str) -> Quantity:
     return Quantity(
-        f"φ{index + 1}",
-        " mm",
-        f"How far the eye lies {direction} of the rig's viewpoint, in millimetres,\n"
-        "± one standard deviation (σ)",
+        f"φ{index + 1} (mm)",
+        "",
+        f"How far the eye lies {direction} the rig's viewpoint,\n± one standard deviation (σ)",
         lambda shift, _: 1e3 * float(shift.shift_m[index]),
         2,
         lambda shift: 1e3 * float(shift.covariance_m2[index, index]) ** 0.5,
     )
 
 
-PHI = (_phi(0, "to the right"), _phi(1, "below"), _phi(2, "in front"))
+PHI = (_phi(0, "to the right of"), _phi(1, "below"), _phi(2, "in front of"))
 EXPECTED_ERROR = Quantity(
     "Expected error",
     "′",
@@ -78,8 +81,8 @@ QUANTITIES = (
     *PHI,
     EXPECTED_ERROR,
     Quantity(
-        "RMS",
-        " mm",
+        "RMS (mm)",
+        "",
         "Distance between hand and cursor after registration, root mean square over the inliers",
         lambda shift, _: 1e3 * shift.rms_m,
         2,
@@ -94,27 +97,22 @@ QUANTITIES = (
     Quantity("Iterations", "", "Of all alignments together", lambda s, _: float(s.iterations), 0),
 )
 _ANOTHER = "The error to expect if one more alignment like these were added"
-_EYE_DISTANCE = "Between the two solved eyes, in millimetres"
+_EYE_DISTANCE = "Eye distance"
+_EYE_DISTANCE_MEANING = "Between the two solved eyes"
 
 
-def result_rows(
-    results: Results, rig: Rig, expected_after_another_arcmin: Mapping[Eye, float]
-) -> list[Row]:
+def result_rows(results: Results, rig: Rig) -> list[Row]:
     """Return what is known of each eye, in a column each, and then of both together."""
     rows = [
         Row(q.name, tuple(_cell(q, results.shifts.get(eye), rig, eye) for eye in EYES), q.meaning)
         for q in QUANTITIES
     ]
-    another = tuple(
-        f"{expected_after_another_arcmin[eye]:.{EXPECTED_ERROR.decimals}f}{EXPECTED_ERROR.unit}"
-        if eye in expected_after_another_arcmin
-        else NOTHING
-        for eye in EYES
-    )
+    arcmin = results.expected_after_another_arcmin
+    another = tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
     rows.insert(QUANTITIES.index(EXPECTED_ERROR) + 1, Row("With one more", another, _ANOTHER))
     return [
         *rows,
-        Row("Eye distance", (eye_distance_text(results),), _EYE_DISTANCE),
+        Row(_EYE_DISTANCE, (eye_distance_text(results),), _EYE_DISTANCE_MEANING),
         Row("Alignments", (str(len(results.alignments)),), "Fused into these results"),
         Row("Method", (results.method,), "The solver"),
     ]
@@ -128,17 +126,14 @@ def verdict_rows(results: Results) -> list[Row]:
     ]
 
 
-def another_text(
-    results: Results, rig: Rig, expected_after_another_arcmin: Mapping[Eye, float]
-) -> str:
-    """Return what one more alignment would buy; empty if that is not known."""
-    parts = [
-        f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.shifts[eye], rig.eyes[eye])} → "
-        f"{arcmin:.{EXPECTED_ERROR.decimals}f}{EXPECTED_ERROR.unit}"
-        for eye, arcmin in expected_after_another_arcmin.items()
-        if eye in results.shifts
-    ]
-    return f"One more alignment: expected error {', '.join(parts)}." if parts else ""
+def another_text(results: Results, rig: Rig) -> str:
+    """Return what one more alignment would buy."""
+    gains = ", ".join(
+        f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.shifts[eye], rig.eyes[eye])}"
+        f" → {_arcmin(arcmin)}"
+        for eye, arcmin in results.expected_after_another_arcmin.items()
+    )
+    return f"One more alignment like these: expected error {gains}."
 
 
 def eye_distance_text(results: Results) -> str:
@@ -168,8 +163,8 @@ def comparison_rows(results: Results, other: Results, rig: Rig) -> list[Row]:
                 rows.append(Row(q.name, (*both, q.difference(one, two, display)), q.meaning))
     if results.eye_distance_m is not None and other.eye_distance_m is not None:
         apart_mm = 1e3 * (other.eye_distance_m - results.eye_distance_m)
-        texts = (*map(eye_distance_text, (results, other)), f"{_signed(apart_mm, 1)} mm")
-        rows.append(Row("Eye distance", texts, _EYE_DISTANCE))
+        texts = (*map(eye_distance_text, (results, other)), f"{signed(apart_mm, 1)} mm")
+        rows.append(Row(_EYE_DISTANCE, texts, _EYE_DISTANCE_MEANING))
     return rows
 
 
@@ -177,5 +172,5 @@ def _cell(quantity: Quantity, shift: EyeShift | None, rig: Rig, eye: Eye) -> str
     return NOTHING if shift is None else quantity.text(shift, rig.eyes[eye])
 
 
-def _signed(value: float, decimals: int) -> str:
-    return f"{value:+.{decimals}f}".replace("-", "−")
+def _arcmin(arcmin: float) -> str:
+    return f"{arcmin:.{EXPECTED_ERROR.decimals}f}{EXPECTED_ERROR.suffix}"

@@ -1,0 +1,217 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTabWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.geometry import transform
+from handcal.results import Results, SolveSettings, solve_session
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Alignment, Rig, Verdict
+from handcal_gui.number_table import NumberTable
+from handcal_gui.panels.results import ResultsPanel
+from handcal_gui.results.compare_tab import CompareTab
+from handcal_gui.results.convergence_plot import ConvergencePlot
+from handcal_gui.results.residual_map import ResidualMap
+from handcal_gui.results.verdict_card import VerdictCard
+
+Make = Callable[..., Snapshot]
+Child = TypeVar("Child", bound=QObject)
+
+
+def child(parent: QObject, kind: type[Child], name: str = "") -> Child:
+    return next(found for found in parent.findChildren(kind) if found.objectName().startswith(name))
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> ResultsPanel:
+    panel = ResultsPanel()
+    qtbot.addWidget(panel)
+    panel.resize(420, 440)
+    panel.show()
+    return panel
+
+
+@pytest.fixture
+def solved(
+    panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
+) -> ResultsPanel:
+    panel.show_results(results, alignments, rig)
+    return panel
+
+
+@pytest.fixture(scope="module")
+def other(alignments: Sequence[Alignment], rig: Rig) -> Results:
+    return solve_session(alignments, rig, SolveSettings("icp"))
+
+
+def button(panel: ResultsPanel, name: str) -> QPushButton:
+    return child(panel, QPushButton, f"comparison-{name}")
+
+
+def cell(table: NumberTable, row: int, column: int) -> str:
+    item = table.item(row, column)
+    assert item is not None
+    return item.text()
+
+
+def status(panel: ResultsPanel) -> str:
+    return child(panel, QLabel, "comparison-status").text()
+
+
+def test_without_results_it_says_how_to_get_them(panel: ResultsPanel, snapshot: Make) -> None:
+    panel.show_snapshot(snapshot(State.ALIGN))
+    assert not child(panel, QTabWidget).isVisible()
+    assert any("Nothing is solved yet" in label.text() for label in panel.findChildren(QLabel))
+    panel.show_snapshot(snapshot(State.SOLVED))
+    assert child(panel, QTabWidget).isVisible()
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    assert not child(panel, QTabWidget).isVisible()
+    assert panel.as_text() == ""
+
+
+def test_the_numbers_are_the_results(solved: ResultsPanel, results: Results) -> None:
+    table = child(solved, NumberTable, "numbers-of-both-eyes")
+    assert table.as_text().splitlines()[1].startswith("φ1 (mm)\t")
+    for column, eye in enumerate(EYES):
+        shown_mm = float(cell(table, 0, column).split("±")[0].replace("−", "-"))
+        assert shown_mm == pytest.approx(1e3 * results.shifts[eye].shift_m[0], abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("accept", "✓ Accept"), ("repeat", "↻ Repeat"), ("implausible", "✕ Implausible")],
+)
+def test_a_verdict_is_a_sign_a_word_and_a_reason(qtbot: QtBot, name: str, word: str) -> None:
+    card = VerdictCard("left")
+    qtbot.addWidget(card)
+    height = card.sizeHint().height()
+    card.show_verdict(Verdict(name, "because of this"))  # type: ignore[arg-type]
+    texts = [label.text() for label in card.findChildren(QLabel)]
+    assert texts == ["Left eye", word, "Because of this"]
+    assert card.sizeHint().height() == height
+
+
+def test_an_eye_without_part_is_not_judged(
+    panel: ResultsPanel, alignments: Sequence[Alignment], rig: Rig
+) -> None:
+    one = replace(alignments[0], eyes=("right",))
+    panel.show_results(solve_session([one], rig, SolveSettings()), [one], rig)
+    card = child(panel, VerdictCard, "verdict-left")
+    texts = [label.text() for label in card.findChildren(QLabel)]
+    assert "– Not solved" in texts
+    choices = child(panel, QComboBox, "residuals-choice")
+    assert [choices.itemText(i) for i in range(choices.count())] == ["Alignment 1, right eye"]
+
+
+def test_convergence_has_a_line_for_each_alignment_and_eye(
+    solved: ResultsPanel, results: Results
+) -> None:
+    lines = child(solved, ConvergencePlot).item.listDataItems()
+    assert len(lines) == 4
+    iterations, rms_mm = lines[2].getData()
+    history_m2 = results.alignments[1]["left"].history_m2
+    np.testing.assert_array_equal(iterations, np.arange(1, len(history_m2) + 1))
+    np.testing.assert_allclose((rms_mm / 1e3) ** 2, history_m2)
+
+
+def test_the_map_shows_each_point_of_the_chosen_hand_once(
+    solved: ResultsPanel, results: Results, alignments: Sequence[Alignment]
+) -> None:
+    choices = child(solved, QComboBox, "residuals-choice")
+    choices.setCurrentText("Alignment 2, left eye")
+    inliers, outliers = (
+        np.column_stack(scatter.getData()) for scatter in child(solved, ResidualMap).scatters
+    )
+    is_outlier = np.isnan(results.alignments[1]["left"].residuals_m)
+    places_mm = 1e3 * transform(alignments[1].T_E_W["left"], alignments[1].hand_m)[:, :2]
+    np.testing.assert_allclose(inliers, places_mm[~is_outlier])
+    np.testing.assert_allclose(outliers, places_mm[is_outlier])
+    assert 0 < len(outliers) < len(inliers)
+
+
+def test_an_alignment_whose_cloud_is_missing_has_no_map(
+    panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
+) -> None:
+    panel.show_results(results, alignments[:1], rig)
+    assert child(panel, QComboBox, "residuals-choice").count() == 2
+    panel.show_results(results, (), rig)
+    assert child(panel, QComboBox, "residuals-choice").count() == 0
+    assert not len(child(panel, ResidualMap).scatters[0].getData()[0])
+
+
+def test_a_comparison_is_asked_for_and_shown(
+    solved: ResultsPanel, results: Results, other: Results, qtbot: QtBot
+) -> None:
+    methods = child(solved, QComboBox, "comparison-method")
+    offered = [methods.itemText(i) for i in range(methods.count())]
+    assert offered == ["paper", "linear", "icp"]
+    methods.setCurrentText("icp")
+    assert status(solved).startswith("icp: rigid")
+    with qtbot.waitSignal(solved.compare_requested) as asked:
+        button(solved, "start").click()
+    assert asked.args == ["icp"]
+    assert not button(solved, "start").isEnabled()
+    assert button(solved, "cancel").isEnabled()
+    solved.show_comparison(other)
+    assert button(solved, "start").isEnabled()
+    table = child(solved, CompareTab).table
+    assert table.as_text().startswith("\tconsistent\ticp\tDifference\n")
+    apart_mm = 1e3 * (other.shifts["left"].shift_m - results.shifts["left"].shift_m)[0]
+    shown_mm = float(cell(table, 1, 2).replace("−", "-"))
+    assert shown_mm == pytest.approx(apart_mm, abs=0.005)
+
+
+def test_a_comparison_can_be_cancelled_and_can_fail(solved: ResultsPanel, qtbot: QtBot) -> None:
+    button(solved, "start").click()
+    with qtbot.waitSignal(solved.compare_cancelled):
+        button(solved, "cancel").click()
+    assert button(solved, "start").isEnabled()
+    assert status(solved) == "Cancelled."
+    button(solved, "start").click()
+    solved.comparison_failed("the disk is full")
+    assert button(solved, "start").isEnabled()
+    assert status(solved) == "the disk is full"
+
+
+def test_only_other_results_end_a_comparison(
+    panel: ResultsPanel, snapshot: Make, other: Results, results: Results
+) -> None:
+    table = child(panel, CompareTab).table
+    panel.show_snapshot(snapshot(State.SOLVED))
+    panel.show_comparison(other)
+    panel.show_snapshot(snapshot(State.SOLVED, number=2))
+    assert table.rowCount() > 0
+    panel.show_snapshot(snapshot(State.SOLVED, procedure={"results": replace(results)}))
+    assert table.rowCount() == 0
+
+
+def test_everything_is_copied_as_text(
+    solved: ResultsPanel, results: Results, other: Results, qtbot: QtBot
+) -> None:
+    solved.show_comparison(other)
+    solved.activateWindow()
+    table = child(solved, NumberTable, "numbers-of-both-eyes")
+    table.setFocus()
+    qtbot.waitUntil(table.hasFocus)
+    QTest.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    text = QGuiApplication.clipboard().text()
+    assert results.verdicts["left"].reason in text
+    assert "\nφ1 (mm)\t" in text
+    assert "\n2 right\t" in text
+    assert "\tconsistent\ticp\tDifference\n" in text
+
+
+def test_it_fits_a_small_dock(solved: ResultsPanel) -> None:
+    smallest = solved.minimumSizeHint()
+    assert smallest.width() <= 300
+    assert smallest.height() <= 260

@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QLabel
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.register.guard import turn_advice
+from handcal.snapshot import Snapshot
+from handcal_gui.dial import RotationDial
+from handcal_gui.panels.rotation import RotationPanel
+from handcal_gui.plots import Plot
+
+Make = Callable[..., Snapshot]
+Child = TypeVar("Child", bound=QObject)
+
+
+def child(parent: QObject, kind: type[Child], name: str = "") -> Child:
+    return next(found for found in parent.findChildren(kind) if found.objectName().startswith(name))
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> RotationPanel:
+    panel = RotationPanel()
+    qtbot.addWidget(panel)
+    panel.resize(380, 300)
+    return panel
+
+
+def word(panel: RotationPanel) -> str:
+    return child(panel, RotationDial, "rotation-dial").accessibleDescription()
+
+
+def text(panel: RotationPanel, name: str) -> str:
+    return child(panel, QLabel, f"rotation-{name}").text()
+
+
+def history(panel: RotationPanel) -> tuple[Any, Any]:
+    """Return times (s) and angles (°) of the plot's line."""
+    _, angle_line = child(panel, Plot, "rotation-history").item.listDataItems()
+    times_s, angles_deg = angle_line.getData()
+    return times_s, angles_deg
+
+
+def turned(snapshot: Make, rotation_deg: Any, t_s: float = 0.0) -> Snapshot:
+    rotation_rad = np.radians(rotation_deg)
+    is_red = bool(np.linalg.norm(rotation_rad) > np.radians(9.0))
+    seen = {"rotation_rad": rotation_rad, "is_red": is_red}
+    return snapshot(observation=seen, t_host_ns=round(1e9 * t_s))
+
+
+def test_before_a_cursor_it_says_what_it_will_show(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    assert text(panel, "advice").startswith("Make a cursor")
+    assert word(panel) == ""
+
+
+@pytest.mark.parametrize(
+    ("rotation_deg", "expected"),
+    [((0.5, 0.5, 0.5), "✓ Hold still"), ((1, 8, 2), "✓ Near enough"), ((-9, 0, 4), "▲ Turn back")],
+)
+def test_the_word_says_whether_it_may_be_confirmed(
+    panel: RotationPanel, snapshot: Make, rotation_deg: tuple[float, ...], expected: str
+) -> None:
+    panel.show_snapshot(turned(snapshot, rotation_deg))
+    assert word(panel) == expected
+    assert child(panel, RotationDial).is_over == expected.startswith("▲")
+
+
+def test_it_says_which_way_to_turn_and_how_far(panel: RotationPanel, snapshot: Make) -> None:
+    rotation_deg = np.array([2.0, -1.0, 11.3])
+    panel.show_snapshot(turned(snapshot, rotation_deg))
+    assert text(panel, "advice") == f"{turn_advice(np.radians(rotation_deg)).text} by 11°."
+    panel.show_snapshot(turned(snapshot, -rotation_deg))
+    assert text(panel, "advice") == f"{turn_advice(np.radians(-rotation_deg)).text} by 11°."
+
+
+def test_a_lost_hand_is_told_and_leaves_a_gap(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(turned(snapshot, (0, 0, 12), 1.0))
+    lost = {"hand": None, "rotation_rad": None, "problem": "no hand; raise it"}
+    panel.show_snapshot(snapshot(observation=lost, t_host_ns=2_000_000_000))
+    assert word(panel) == "? No hand"
+    assert text(panel, "advice") == "No hand; raise it"
+    assert np.isnan(history(panel)[1]).tolist() == [False, True]
+
+
+def test_without_a_new_frame_nothing_changes(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(turned(snapshot, (0, 0, 12)))
+    panel.show_snapshot(snapshot(observation=None))
+    assert word(panel) == "▲ Turn back"
+    assert len(history(panel)[0]) == 1
+
+
+def test_the_history_is_of_the_last_ten_seconds(panel: RotationPanel, snapshot: Make) -> None:
+    for t_s in range(15):
+        panel.show_snapshot(turned(snapshot, (0, 0, t_s), float(t_s)))
+    times_s, angles_deg = history(panel)
+    np.testing.assert_allclose(times_s, np.arange(-10, 1), atol=1e-6)
+    np.testing.assert_allclose(angles_deg, np.arange(4, 15))
+
+
+def test_another_cursor_begins_another_history(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(turned(snapshot, (0, 0, 5)))
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    assert history(panel)[0] is None or not len(history(panel)[0])
+
+
+def test_after_the_alignment_it_asks_for_nothing(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(turned(snapshot, (0, 0, 5)))
+    panel.show_snapshot(snapshot(State.ALIGNED))
+    assert text(panel, "advice") == "The alignment is taken."
+    assert word(panel) == ""
+
+
+def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(snapshot())
+    assert text(panel, "refusals") == "No confirmation refused."
+    panel.show_snapshot(snapshot(procedure={"refused": 2, "refusal": "Your hand is turned."}))
+    assert text(panel, "refusals") == "Refused: 2. Your hand is turned."
+
+
+def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(snapshot(procedure={"guard_limit_rad": float(np.radians(5.0))}))
+    limit_line, _ = child(panel, Plot).item.listDataItems()
+    np.testing.assert_allclose(limit_line.getData()[1], [5.0, 5.0])
+
+
+def test_it_fits_a_small_dock(panel: RotationPanel) -> None:
+    smallest = panel.minimumSizeHint()
+    assert smallest.width() <= 300
+    assert smallest.height() <= 220

@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.register.verdict import expected_error_arcmin
+from handcal.results import Results, SolveSettings, solve_session
+from handcal.types import EYES, Alignment, EyeShift, Rig
+from handcal_gui.number_table import Row
+from handcal_gui.results.rows import (
+    NOTHING,
+    PHI,
+    alignment_rows,
+    another_text,
+    comparison_rows,
+    result_rows,
+    verdict_rows,
+)
+
+
+def cells(rows: Sequence[Row], label: str) -> tuple[str, ...]:
+    return next(row.cells for row in rows if row.label == label)
+
+
+@pytest.fixture(scope="module")
+def left_only(rig: Rig, alignments: Sequence[Alignment]) -> Results:
+    return solve_session([replace(alignments[0], eyes=("left",))], rig, SolveSettings())
+
+
+def test_a_shift_is_told_in_millimetres_with_its_sigma(rig: Rig) -> None:
+    shift = EyeShift(
+        shift_m=np.array([0.0012345, -0.0032, 0.0]),
+        covariance_m2=np.diag([0.0005, 0.001, 0.02]) ** 2,
+        rms_m=0.001,
+        residuals_m=np.zeros(3),
+        inlier_ratio=0.5,
+        iterations=3,
+        converged=True,
+        stop_reason="",
+        history_m2=np.zeros(3),
+        method="fused",
+    )
+    texts = [q.text(shift, rig.eyes["left"]) for q in PHI]
+    assert texts == ["+1.23 ± 0.50", "−3.20 ± 1.00", "+0.00 ± 20.00"]
+
+
+def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
+    rows = result_rows(results, rig)
+    for column, eye in enumerate(EYES):
+        shift = results.shifts[eye]
+        error = expected_error_arcmin(rig.eyes[eye], shift)
+        another = results.expected_after_another_arcmin[eye]
+        assert cells(rows, "Expected error")[column] == f"{error:.1f}′"
+        assert cells(rows, "With one more")[column] == f"{another:.1f}′"
+        assert cells(rows, "RMS (mm)")[column] == f"{1e3 * shift.rms_m:.2f}"
+        assert cells(rows, "Inliers")[column] == f"{100 * shift.inlier_ratio:.0f} %"
+        assert cells(rows, "Iterations")[column] == str(shift.iterations)
+        assert f"{eye} eye {error:.1f}′ → {another:.1f}′" in another_text(results, rig)
+    assert results.eye_distance_m is not None
+    assert cells(rows, "Eye distance") == (f"{1e3 * results.eye_distance_m:.1f} mm",)
+    assert cells(rows, "Alignments") == ("2",)
+    assert [row.cells[1] for row in verdict_rows(results)] == [
+        results.verdicts[eye].reason for eye in EYES
+    ]
+
+
+def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:
+    rows = result_rows(left_only, rig)
+    for label in ("φ1 (mm)", "Expected error", "With one more", "Iterations"):
+        left, right = cells(rows, label)
+        assert left != NOTHING
+        assert right == NOTHING
+    assert cells(rows, "Eye distance") == (NOTHING,)
+    assert [row.label for row in alignment_rows(left_only, rig)] == ["1 left"]
+    assert "right" not in another_text(left_only, rig)
+
+
+def test_each_alignment_is_told_alone(results: Results, rig: Rig) -> None:
+    rows = alignment_rows(results, rig)
+    assert [row.label for row in rows] == ["1 left", "1 right", "2 left", "2 right"]
+    expected = PHI[2].text(results.alignments[1]["left"], rig.eyes["left"])
+    assert rows[2].cells[2] == expected
+
+
+def test_a_difference_is_the_other_less_this_one(results: Results, rig: Rig) -> None:
+    shifts = {
+        eye: replace(shift, shift_m=shift.shift_m + np.array([0.001, 0.0, -0.002]), iterations=0)
+        for eye, shift in results.shifts.items()
+    }
+    other = replace(results, method="icp", shifts=shifts)
+    rows = comparison_rows(results, other, rig)
+    assert cells(rows, "φ1 (mm)")[2] == "+1.00"
+    assert cells(rows, "φ2 (mm)")[2] == "+0.00"
+    assert cells(rows, "φ3 (mm)")[2] == "−2.00"
+    assert cells(rows, "Iterations")[2] == f"−{results.shifts['left'].iterations}"
+    assert cells(rows, "Eye distance")[2] == "+0.0 mm"
+    assert [row.label for row in rows if not any(row.cells)] == ["Left eye", "Right eye"]
+
+
+def test_only_eyes_that_both_solved_are_compared(
+    results: Results, left_only: Results, rig: Rig
+) -> None:
+    labels = [row.label for row in comparison_rows(results, left_only, rig)]
+    assert "Left eye" in labels
+    assert not {"Right eye", "Eye distance"} & set(labels)
