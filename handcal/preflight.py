@@ -126,12 +126,16 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
         return _broken(f"{settings.port} is no port", "choose one from 1 to 65535")
     _require_free((settings.host, settings.port))
     if not address.is_unspecified:
-        return _good(f"connects to {settings.host}, UDP port {settings.port}")
+        return _good(_invitation(settings.host, settings.port))
     try:
         host, _ = local_address(_ANYWHERE)
     except LinkError:
         return _limited("this computer has no network", "connect it to the headset's network")
-    return _good(f"connects to this computer, {host}, UDP port {settings.port}")
+    return _good(_invitation(host, settings.port))
+
+
+def _invitation(host: str, port: int) -> str:
+    return f"let it connect to {host}, UDP port {port}, with the pairing key"
 
 
 def _require_free(address: Address) -> None:

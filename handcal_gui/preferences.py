@@ -76,31 +76,35 @@ class PreferencesFile:
     ----------
     path : Path, optional
         By default in the user's configuration folder; the key lies beside it.
+
+    Attributes
+    ----------
+    path : Path
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        self._path = path or _default_path()
-        self._key_path = self._path.with_name("pairing.key")
+        self.path = path or _default_path()
+        self._key_path = self.path.with_name("pairing.key")
 
     def load(self) -> tuple[Preferences, str]:
         """Return the preferences, and what went wrong for a person to read; empty if nothing did.
 
         A file that cannot be used is kept beside, ending in ``.bad``.
         """
-        if not self._path.exists():
+        if not self.path.exists():
             return Preferences(), ""
         try:
-            return read_settings(Preferences, read_json(self._path), "preferences"), ""
+            return read_settings(Preferences, read_json(self.path), "preferences"), ""
         except FileError as error:
-            bad = self._path.with_name(f"{self._path.name}.bad")
+            bad = self.path.with_name(f"{self.path.name}.bad")
             with suppress(OSError):
-                self._path.replace(bad)
+                self.path.replace(bad)
             return Preferences(), f"The preferences start anew; the old are in {bad}: {error}"
 
     def save(self, preferences: Preferences) -> None:
         """Write the preferences, or raise FileError."""
-        make_folder(self._path.parent)
-        write_json(self._path, settings_json(preferences))
+        make_folder(self.path.parent)
+        write_json(self.path, settings_json(preferences))
 
     def pairing_key(self) -> str:
         """Return the key for network headsets; a fresh one where there is none that can be used.

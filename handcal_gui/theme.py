@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from PySide6.QtCore import QByteArray, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontDatabase, QGuiApplication, QIcon, QPainter, QPixmap
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QFontDatabase,
+    QGuiApplication,
+    QIcon,
+    QPainter,
+    QPalette,
+    QPixmap,
+)
 from PySide6.QtSvg import QSvgRenderer
 
 from handcal.resources import resource_path
@@ -68,9 +78,23 @@ _DARK = Colors(
 )
 
 
+def use_theme(theme: Literal["system", "light", "dark"]) -> None:
+    """Follow the system's colours, or not."""
+    schemes = {
+        "system": Qt.ColorScheme.Unknown,
+        "light": Qt.ColorScheme.Light,
+        "dark": Qt.ColorScheme.Dark,
+    }
+    hints = QGuiApplication.styleHints()
+    QGuiApplication.setPalette(QPalette())
+    hints.setColorScheme(schemes[theme])
+    if theme == "dark" and hints.colorScheme() != Qt.ColorScheme.Dark:
+        QGuiApplication.setPalette(_dark_palette())  # a plain X display knows no schemes
+
+
 def is_dark() -> bool:
     """Whether the system, or the user, asks for dark."""
-    return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
+    return QGuiApplication.palette().window().color().lightness() < 128
 
 
 def colors() -> Colors:
@@ -85,18 +109,44 @@ def number_font(scale: float = 1.0) -> QFont:
     return font
 
 
-def icon(name: str) -> QIcon:
-    """Return the icon ``resources/icons/NAME.svg``, drawn in the palette's text colour."""
+def icon(name: str, color: str = "") -> QIcon:
+    """Return the icon ``resources/icons/NAME.svg``, in the palette's text colour or another."""
     svg = resource_path(f"icons/{name}.svg").read_bytes()
     result = QIcon()
-    for mode, color in (
-        (QIcon.Mode.Normal, QGuiApplication.palette().windowText().color()),
+    text = QGuiApplication.palette().windowText().color()
+    for mode, shade in (
+        (QIcon.Mode.Normal, QColor(color) if color else text),
         (QIcon.Mode.Disabled, QColor(colors().muted)),
     ):
-        tinted = svg.replace(b"currentColor", color.name().encode())
+        tinted = svg.replace(b"currentColor", shade.name().encode())
         for size_px in (16, 24, 32, 48, 64):
             result.addPixmap(_draw(tinted, size_px), mode)
     return result
+
+
+def _dark_palette() -> QPalette:
+    palette = QPalette(QColor("#3a3d42"), QColor("#2b2d31"))
+    for role, color in (
+        (QPalette.ColorRole.Base, "#1e2023"),
+        (QPalette.ColorRole.AlternateBase, "#25272b"),
+        (QPalette.ColorRole.ToolTipBase, "#3a3d42"),
+        (QPalette.ColorRole.ToolTipText, "#eceef1"),
+        (QPalette.ColorRole.Text, "#eceef1"),
+        (QPalette.ColorRole.WindowText, "#eceef1"),
+        (QPalette.ColorRole.ButtonText, "#eceef1"),
+        (QPalette.ColorRole.PlaceholderText, _DARK.muted),
+        (QPalette.ColorRole.Highlight, "#2f6fb5"),
+        (QPalette.ColorRole.HighlightedText, "#ffffff"),
+        (QPalette.ColorRole.Link, _DARK.live),
+    ):
+        palette.setColor(role, QColor(color))
+    for role in (
+        QPalette.ColorRole.Text,
+        QPalette.ColorRole.WindowText,
+        QPalette.ColorRole.ButtonText,
+    ):
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor("#7d848d"))
+    return palette
 
 
 def _draw(svg: bytes, size_px: int) -> QPixmap:

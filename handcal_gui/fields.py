@@ -1,0 +1,92 @@
+"""Fields of forms: numbers with units, choices, buttons and rows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QSpinBox,
+    QWidget,
+)
+
+from handcal_gui.theme import SPACING_PX
+
+Field = TypeVar("Field", bound=QWidget)
+Spin = TypeVar("Spin", bound=QAbstractSpinBox)
+Option = TypeVar("Option", bound=str)
+
+_FIXED = QSizePolicy.Policy.Fixed
+
+
+def named(field: Field, name: str, label: str = "", help_text: str = "") -> Field:
+    """Give a widget its object name, its name for screen readers, and its tooltip."""
+    field.setObjectName(name)
+    field.setAccessibleName(label)
+    field.setToolTip(help_text)
+    return field
+
+
+def number(
+    name: str, low: float, high: float, step: float, unit: str, help_text: str
+) -> QDoubleSpinBox:
+    """Return a field for a number, right-aligned and with its unit."""
+    field = named(QDoubleSpinBox(decimals=1 if step >= 0.1 else 2), name, help_text=help_text)
+    field.setRange(low, high)
+    field.setSingleStep(step)
+    field.setSuffix(unit)
+    return _settle(field)
+
+
+def whole_number(name: str, low: int, high: int, help_text: str) -> QSpinBox:
+    """Return a field for a whole number, right-aligned."""
+    return _settle(named(QSpinBox(minimum=low, maximum=high), name, help_text=help_text))
+
+
+def choice(name: str, label: str, options: Mapping[Option, str], help_text: str = "") -> QComboBox:
+    """Return a field for one of some options, given what each is called."""
+    field = named(QComboBox(), name, label, help_text)
+    for option, text in options.items():
+        field.addItem(text, option)
+    field.setSizePolicy(_FIXED, _FIXED)
+    field.setMinimumWidth(20 * SPACING_PX)
+    return field
+
+
+def button(name: str, text: str = "", label: str = "", help_text: str = "") -> QPushButton:
+    """Return a button that Enter presses, too, while it has the focus."""
+    return named(QPushButton(text, autoDefault=True), name, label or text, help_text)
+
+
+def paragraph(name: str = "", text: str = "") -> QLabel:
+    """Return a label whose text is wrapped and takes the width that there is."""
+    label = QLabel(text, wordWrap=True)
+    label.setObjectName(name)
+    label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+    return label
+
+
+def beside(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
+    """Lay widgets out in a row, without margins, to the left; one of them takes what is left."""
+    layout = QHBoxLayout(row)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(SPACING_PX)
+    for widget in widgets:
+        layout.addWidget(widget, 1 if widget is grows else 0)
+    layout.addStretch(0)
+
+
+def _settle(field: Spin) -> Spin:
+    """Align a number to the right, and keep its width whatever the number."""
+    field.setAlignment(Qt.AlignmentFlag.AlignRight)
+    field.setSizePolicy(_FIXED, _FIXED)
+    field.setMinimumWidth(12 * SPACING_PX)
+    return field

@@ -1,0 +1,76 @@
+"""What hardly anyone changes: how the calibration runs, and what the simulator simulates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
+
+from handcal.station_settings import StationSettings
+from handcal_gui.calibration_fields import CalibrationFields
+from handcal_gui.fields import named, number, whole_number
+from handcal_gui.theme import SPACING_PX
+
+
+class AdvancedFields(QWidget):
+    """Folded until asked for.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._fold = named(QToolButton(autoRaise=True), "advanced")
+        self._fold.setText("Advanced")
+        self._fold.setCheckable(True)
+        self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self._calibration = CalibrationFields()
+        self._seed = whole_number(
+            "seed", 0, 999_999, "Another number is another simulated wearer, hand and room."
+        )
+        self._loss = number("loss", 0.0, 50.0, 1.0, " %", "Datagrams lost on purpose, each way.")
+        self._reorder = number(
+            "reorder", 0.0, 50.0, 1.0, " %", "Datagrams that overtake others on purpose."
+        )
+        for label, field in (
+            ("Simulated wearer", self._seed),
+            ("Simulated loss", self._loss),
+            ("Simulated reordering", self._reorder),
+        ):
+            self._calibration.add_row(label, field)
+            field.valueChanged.connect(self.changed)
+        self._calibration.changed.connect(self.changed)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._fold, 0, Qt.AlignmentFlag.AlignLeft)
+        layout.addWidget(self._calibration)
+        self._fold.toggled.connect(self._unfold)
+        self._unfold(False)
+
+    def show_settings(self, settings: StationSettings) -> None:
+        """Show settings of a station."""
+        self._calibration.show_settings(settings.calibration)
+        self._seed.setValue(settings.seed)
+        self._loss.setValue(100 * settings.loss)
+        self._reorder.setValue(100 * settings.reorder)
+
+    def take(self, settings: StationSettings) -> StationSettings:
+        """Return settings with what is shown."""
+        return replace(
+            settings,
+            calibration=self._calibration.take(settings.calibration),
+            seed=self._seed.value(),
+            loss=self._loss.value() / 100,
+            reorder=self._reorder.value() / 100,
+        )
+
+    def _unfold(self, is_open: bool) -> None:
+        arrow = Qt.ArrowType.DownArrow if is_open else Qt.ArrowType.RightArrow
+        self._fold.setArrowType(arrow)
+        self._calibration.setVisible(is_open)

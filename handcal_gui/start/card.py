@@ -1,0 +1,56 @@
+"""A framed part of a page, with an icon and a title."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QVBoxLayout, QWidget
+
+from handcal_gui.fields import paragraph
+from handcal_gui.theme import SPACING_PX, icon
+
+
+class Card(QFrame):
+    """Says what can be done here; `body` holds the means.
+
+    Attributes
+    ----------
+    body : QVBoxLayout
+    """
+
+    def __init__(
+        self, title: str, hint: str, icon_name: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setFrameShape(QFrame.Shape.StyledPanel)
+        self.setAccessibleName(title)
+        self._icon_name = icon_name
+        self._icon = QLabel()
+        heading = QLabel(title)
+        font = heading.font()
+        font.setPointSizeF(1.3 * font.pointSizeF())
+        font.setBold(True)
+        heading.setFont(font)
+        head = QGridLayout()
+        head.setHorizontalSpacing(SPACING_PX)
+        head.setVerticalSpacing(SPACING_PX // 2)
+        head.setColumnStretch(1, 1)
+        head.addWidget(self._icon, 0, 0)
+        head.addWidget(heading, 0, 1)
+        head.addWidget(paragraph(text=hint), 1, 0, 1, 2)
+        self.body = QVBoxLayout()
+        self.body.setSpacing(SPACING_PX)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(2 * SPACING_PX)
+        layout.addLayout(head)
+        layout.addLayout(self.body, 1)
+        self._refresh()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._refresh()
+
+    def _refresh(self) -> None:
+        self._icon.setPixmap(icon(self._icon_name).pixmap(3 * SPACING_PX))

@@ -1,0 +1,101 @@
+"""The choice of the headset, and what a network headset must be told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
+
+from handcal.station_settings import HeadsetKind, StationSettings
+from handcal_gui.fields import beside, button, choice, named, whole_number
+from handcal_gui.theme import SPACING_PX
+
+_HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
+
+
+class HeadsetField(QWidget):
+    """The virtual headset, or one in the network with address, port and pairing key.
+
+    Parameters
+    ----------
+    pairing_key : str
+        Hidden until asked for.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(self, pairing_key: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._headset = choice("headset", "Headset", _HEADSETS)
+        self._host = named(
+            QLineEdit(),
+            "host",
+            "Address to listen at",
+            "Address of this computer at which the headset is waited for; 0.0.0.0 is any of them.",
+        )
+        self._port = whole_number("port", 1, 65535, "UDP port that the headset connects to.")
+        self._address = QWidget()
+        address = (QLabel("at"), self._host, QLabel("port"), self._port)
+        beside(self._address, *address, grows=self._host)
+        self._key = named(
+            QLineEdit(pairing_key, readOnly=True),
+            "pairingKey",
+            "Pairing key",
+            "Enter this key in the headset; whoever knows it can connect.",
+        )
+        self._reveal = button("showKey", "Show", "Show the pairing key")
+        self._reveal.setCheckable(True)
+        copy = button("copyKey", "Copy key")
+        self._pairing = QWidget()
+        pairing = (QLabel("Pairing key"), self._key, self._reveal, copy)
+        beside(self._pairing, *pairing, grows=self._key)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        first = QWidget()
+        beside(first, self._headset, self._address, grows=self._address)
+        layout.addWidget(first)
+        layout.addWidget(self._pairing)
+        self._headset.currentIndexChanged.connect(self._show_fitting)
+        self._headset.currentIndexChanged.connect(self.changed)
+        self._host.textChanged.connect(self.changed)
+        self._port.valueChanged.connect(self.changed)
+        self._reveal.toggled.connect(self._show_key)
+        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))
+        self._show_fitting()
+        self._show_key(False)
+
+    def show_settings(self, settings: StationSettings) -> None:
+        """Show the headset of a station."""
+        self._headset.setCurrentIndex(self._headset.findData(settings.headset))
+        self._host.setText(settings.host)
+        self._port.setValue(settings.port)
+
+    def take(self, settings: StationSettings) -> StationSettings:
+        """Return settings with the headset shown."""
+        return replace(
+            settings,
+            headset=self._headset.currentData(),
+            host=self._host.text().strip(),
+            port=self._port.value(),
+        )
+
+    def set_pairing_key(self, pairing_key: str) -> None:
+        """Show another key."""
+        self._key.setText(pairing_key)
+
+    def _show_fitting(self) -> None:
+        is_network = self._headset.currentData() == "network"
+        self._address.setVisible(is_network)
+        self._pairing.setVisible(is_network)
+
+    def _show_key(self, is_shown: bool) -> None:
+        echo = QLineEdit.EchoMode.Normal if is_shown else QLineEdit.EchoMode.Password
+        self._key.setEchoMode(echo)
+        self._reveal.setText("Hide" if is_shown else "Show")

@@ -1,0 +1,163 @@
+"""Everything that a calibration needs before it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit
+
+from handcal.doctor import Finding, Health
+from handcal.history import MAX_WEARER_CHARACTERS, clean_wearer
+from handcal.preflight import Part, is_ready
+from handcal.station_settings import StationSettings
+from handcal_gui.fields import button, named, paragraph
+from handcal_gui.preferences import Preferences
+from handcal_gui.start.card import Card
+from handcal_gui.start.latest_job import LatestJob
+from handcal_gui.start.station_form import StationForm
+from handcal_gui.theme import SPACING_PX
+
+Check = Callable[[StationSettings, str], Mapping[Part, Finding]]
+
+_SETTLE_MS, _AGAIN_MS = 300, 3000
+
+
+class NewCalibration(Card):
+    """Wearer, camera, headset, rig and folder, checked as they are chosen; Enter starts.
+
+    Parameters
+    ----------
+    preferences : Preferences
+    pairing_key : str
+    check : callable
+        Given settings and pairing key, returns what was found of each part; called in a job.
+
+    Attributes
+    ----------
+    start_requested : Signal(StationSettings, str)
+        A station that has just been found ready, and the wearer.
+    changed : Signal()
+        Other settings are shown.
+    """
+
+    start_requested = Signal(object, str)
+    changed = Signal()
+
+    def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
+        super().__init__(
+            "Start a calibration",
+            "Everything below stays as it is for the next wearer.",
+            "hand",
+        )
+        self.setObjectName("newCalibration")
+        self._key = pairing_key
+        self._starting: str | None = None
+        self._wearer = named(QComboBox(), "wearer", "Wearer's name or code")
+        self._wearer.setLineEdit(
+            QLineEdit(placeholderText="Name or code", maxLength=MAX_WEARER_CHARACTERS)
+        )
+        self._wearer.setEditable(True)
+        self._wearer.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        self._form = StationForm(self._wearer, preferences.station, pairing_key)
+        self._problem = paragraph("startProblem")
+        self._button = button("start", "Start calibration")
+        self._button.setEnabled(False)
+        self._button.setDefault(True)
+        self._button.setMinimumHeight(5 * SPACING_PX)
+        self._lay_out()
+        self._check = LatestJob(lambda question: check(*question), self)
+        self._check.answered.connect(self._take_findings)
+        self._check.failed.connect(self._problem.setText)
+        self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
+        self._again = QTimer(self, interval=_AGAIN_MS)
+        self._settle.timeout.connect(self.check)
+        self._again.timeout.connect(self.check)
+        self._form.changed.connect(self._settle.start)
+        self._form.changed.connect(self.changed)
+        self._button.clicked.connect(self.start)
+        self.show_preferences(preferences)
+
+    @property
+    def settings(self) -> StationSettings:
+        """The settings as shown."""
+        return self._form.settings
+
+    def show_preferences(self, preferences: Preferences) -> None:
+        """Show what is remembered, and ask for the next wearer."""
+        self._form.show_settings(preferences.station)
+        self._wearer.clear()
+        self._wearer.addItems(list(preferences.wearers))
+        self._wearer.setCurrentIndex(-1)
+        self._wearer.clearEditText()
+        self._wearer.setFocus()
+
+    def set_pairing_key(self, pairing_key: str) -> None:
+        """Take another key for network headsets."""
+        self._key = pairing_key
+        self._form.set_pairing_key(pairing_key)
+        self.check()
+
+    def check(self) -> None:
+        """Look at the station as it is set up now."""
+        self._check.ask(self._question())
+
+    def start(self) -> None:
+        """Look once more, and start if all is well."""
+        try:
+            self._starting = clean_wearer(self._wearer.currentText())
+        except ValueError as error:
+            self._problem.setText(f"{error}.")
+            return
+        self._button.setEnabled(False)
+        self.check()
+
+    def stop(self) -> None:
+        """Wait for the end of what runs in the background; before the program ends."""
+        self._settle.stop()
+        self._again.stop()
+        self._check.stop()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Start on Enter."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self._button.click()
+        else:
+            super().keyPressEvent(event)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look at the station from now on."""
+        super().showEvent(event)
+        self.check()
+        self._again.start()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Leave the station alone: it may be in use."""
+        super().hideEvent(event)
+        self._settle.stop()
+        self._again.stop()
+
+    def _question(self) -> tuple[StationSettings, str]:
+        return self._form.settings, self._key
+
+    def _take_findings(self, question: object, findings: Mapping[Part, Finding]) -> None:
+        if question != self._question():
+            return  # the answer to what is shown now is on its way
+        self._form.show_findings(findings)
+        broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
+        self._problem.setText(f"To be mended first: {', '.join(broken)}." if broken else "")
+        self._button.setEnabled(is_ready(findings))
+        wearer, self._starting = self._starting, None
+        if wearer is not None and is_ready(findings):
+            self._again.start()  # not while the station is being opened
+            self.start_requested.emit(self._form.settings, wearer)
+
+    def _lay_out(self) -> None:
+        last = QHBoxLayout()
+        last.setSpacing(SPACING_PX)
+        last.addWidget(self._problem, 1)
+        last.addWidget(self._button)
+        self.body.addWidget(self._form)
+        self.body.addLayout(last)
+        self.body.addStretch(1)

@@ -1,0 +1,103 @@
+"""A list of sessions to choose one from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal_gui.fields import button, named, paragraph
+from handcal_gui.start.session_entries import Entry
+from handcal_gui.theme import SPACING_PX, icon
+
+
+class SessionList(QWidget):
+    """Lists sessions; a double click, Enter, or the button below chooses one.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers, such as "Unfinished sessions".
+    verb : str
+        What the button says.
+    empty : str
+        What to say when there is nothing to list.
+
+    Attributes
+    ----------
+    chosen : Signal(Path)
+    """
+
+    chosen = Signal(object)
+
+    def __init__(
+        self, name: str, verb: str, empty: str = "", parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._list = named(QListWidget(), "sessions", name)
+        self._list.setWordWrap(True)
+        # As tall as there is room for, not as the items would like.
+        self._list.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        self._list.setMinimumHeight(9 * SPACING_PX)
+        self._list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._list.setAlternatingRowColors(True)
+        self._button = button("choose", verb)
+        self._list.itemActivated.connect(self._choose)
+        self._list.currentItemChanged.connect(self._refresh)
+        self._button.clicked.connect(self._choose)
+        self._empty = paragraph("empty", empty)
+        self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(self._empty, 1)
+        layout.addWidget(self._list, 1)
+        self._buttons = QHBoxLayout()
+        self._buttons.addStretch(1)
+        self._buttons.addWidget(self._button)
+        layout.addLayout(self._buttons)
+        self.show_entries(())
+
+    def show_entries(self, entries: Sequence[Entry]) -> None:
+        """Replace what is listed, keeping the choice where it is still there."""
+        kept = self._list.currentItem()
+        kept_path = kept.data(Qt.ItemDataRole.UserRole) if kept is not None else None
+        self._list.clear()
+        self._list.setVisible(bool(entries))
+        self._empty.setVisible(not entries)
+        for entry in entries:
+            item = QListWidgetItem(entry.text)
+            item.setData(Qt.ItemDataRole.UserRole, entry.path)
+            item.setToolTip(str(entry.path))
+            if not entry.is_enabled:
+                item.setFlags(Qt.ItemFlag.ItemIsEnabled)
+                item.setIcon(icon("warning"))
+            self._list.addItem(item)
+            if entry.is_enabled and (self._list.currentItem() is None or entry.path == kept_path):
+                self._list.setCurrentItem(item)
+        self._refresh()
+
+    def add_button(self, added: QPushButton) -> None:
+        """Put another button before the list's own."""
+        self._buttons.insertWidget(1, added)
+
+    def _choose(self) -> None:
+        item = self._list.currentItem()
+        if _may_be_chosen(item):
+            self.chosen.emit(item.data(Qt.ItemDataRole.UserRole))
+
+    def _refresh(self) -> None:
+        self._button.setEnabled(_may_be_chosen(self._list.currentItem()))
+
+
+def _may_be_chosen(item: QListWidgetItem | None) -> bool:
+    return item is not None and bool(item.flags() & Qt.ItemFlag.ItemIsSelectable)

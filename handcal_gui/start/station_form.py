@@ -1,0 +1,138 @@
+"""The choice of camera, headset, rig and folder, with what was found of each beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
+
+from handcal.doctor import Finding, Health
+from handcal.preflight import PARTS, Part
+from handcal.station_settings import StationSettings
+from handcal_gui.path_field import PathField
+from handcal_gui.start.advanced_fields import AdvancedFields
+from handcal_gui.start.camera_field import CameraField
+from handcal_gui.start.finding_line import FindingLine
+from handcal_gui.start.headset_field import HeadsetField
+from handcal_gui.theme import SPACING_PX
+
+
+class StationForm(QWidget):
+    """Shows a station's settings to be changed.
+
+    Parameters
+    ----------
+    wearer : QWidget
+        The first field, which is not the station's.
+    settings : StationSettings
+    pairing_key : str
+        For network headsets.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        wearer: QWidget,
+        settings: StationSettings,
+        pairing_key: str,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("stationForm")
+        self._settings = settings
+        self._camera = CameraField()
+        self._headset = HeadsetField(pairing_key)
+        self._rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "Example rig")
+        self._rig.setToolTip(
+            "The offline calibration of headset and camera; the virtual headset wears any."
+        )
+        self._sessions = PathField("Session folder", "folder")
+        self._sessions.setToolTip("Every calibration gets a folder of its own in here.")
+        self._advanced = AdvancedFields()
+        self._findings = {part: FindingLine(part) for part in PARTS}
+        self._lay_out(wearer)
+        self.show_settings(settings)
+        for field in (self._camera, self._headset, self._rig, self._sessions, self._advanced):
+            field.changed.connect(self.changed)
+
+    @property
+    def settings(self) -> StationSettings:
+        """The settings as shown."""
+        settings = replace(self._settings, rig=self._rig.path, sessions=self._sessions.path)
+        for field in (self._camera, self._headset, self._advanced):
+            settings = field.take(settings)
+        return settings
+
+    def show_settings(self, settings: StationSettings) -> None:
+        """Show settings."""
+        self._settings = settings
+        for field in (self._camera, self._headset, self._advanced):
+            field.show_settings(settings)
+        self._rig.set_path(settings.rig)
+        self._sessions.set_path(settings.sessions)
+
+    def set_pairing_key(self, pairing_key: str) -> None:
+        """Show another key."""
+        self._headset.set_pairing_key(pairing_key)
+
+    def show_findings(self, findings: Mapping[Part, Finding]) -> None:
+        """Show what was found of each part, with a button where one click mends it."""
+        for part, finding in findings.items():
+            fix, changes = _fix(part, finding, self.settings)
+            self._findings[part].show_finding(finding, fix, partial(self._change, changes))
+
+    def _change(self, changes: Mapping[str, Any]) -> None:
+        self.show_settings(replace(self.settings, **changes))
+
+    def _lay_out(self, wearer: QWidget) -> None:
+        fields: dict[Part, QWidget] = {
+            "camera": self._camera,
+            "headset": self._headset,
+            "rig": self._rig,
+            "sessions": self._sessions,
+        }
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(2 * SPACING_PX)
+        grid.setVerticalSpacing(SPACING_PX // 2)
+        grid.setColumnStretch(1, 1)
+        _add_row(grid, "Wearer", wearer)
+        grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
+        for part, title in PARTS.items():
+            _add_row(grid, title, fields[part])
+            grid.addWidget(self._findings[part], grid.rowCount(), 1)
+        grid.addWidget(self._advanced, grid.rowCount(), 1)
+
+
+def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:
+    """Add a field with its title at the height of the field's first line."""
+    label = QLabel(title)
+    label.setMinimumHeight(QComboBox().sizeHint().height())
+    label.setBuddy(field)
+    row = grid.rowCount()
+    grid.addWidget(label, row, 0, Qt.AlignmentFlag.AlignTop)
+    grid.addWidget(field, row, 1)
+
+
+def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, dict[str, str]]:
+    """Return what would mend a part: a button's label and changed settings; empty if nothing."""
+    is_broken = finding.health is Health.BROKEN
+    is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
+    if part == "camera" and is_broken:
+        return "Use the simulator", {"source": "simulator", "headset": "virtual"}
+    if part == "headset" and is_simulated and not is_virtual:
+        return "Use the virtual headset", {"headset": "virtual"}
+    if part == "headset" and is_virtual and not is_simulated:
+        return "Use a network headset", {"headset": "network"}
+    if part == "rig" and is_broken and settings.rig:
+        return "Use the example", {"rig": ""}
+    return "", {}
