@@ -1,0 +1,205 @@
+"""The hand cloud panel: the frozen cursor and the live hand in space."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, QWidget
+
+from handcal.calibrate import PlacedHand
+from handcal.geometry import invert, transform
+from handcal.register.pairs import matched_pairs
+from handcal.snapshot import Snapshot
+from handcal.types import Alignment, Float64, UInt8
+from handcal_gui.cloud_view import CloudView
+from handcal_gui.legend import LegendEntry
+from handcal_gui.orbit import Direction
+from handcal_gui.residual_scale import ResidualScale, residual_colors
+from handcal_gui.splat import rgb
+from handcal_gui.theme import SPACING_PX, colors
+
+_EMPTY = "The hand's cloud will appear here. Hold a hand up before the depth camera."
+_FROM_CAMERA = "mm from the depth camera"
+_FROM_CURSOR = "mm from the cursor's middle"
+_TURNED = "The live hand is turned too far"
+_DIRECTIONS = {
+    "Front": (Direction.FRONT, "As the wearer sees it (1)"),
+    "Side": (Direction.SIDE, "From the wearer's right (2)"),
+    "Top": (Direction.TOP, "From above (3)"),
+    "Reset": (Direction.ASLANT, "All of it, seen aslant (R, or double-click)"),
+}
+_MOST_POINTS = 6000
+"""Drawn of each cloud, to stay within the time of a frame."""
+_PAIRS_PERIOD_S = 0.5
+_NONE = np.empty((0, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Axes:
+    """Axes that clouds are shown along, where their zero lies, and how that is called."""
+
+    T_axes_W: Float64
+    zero_m: Float64
+    name: str
+
+    def mm(self, points_W_m: Float64) -> Float64:
+        """Return (N, 3) points of W in millimetres along the axes."""
+        mm: Float64 = 1e3 * (transform(self.T_axes_W, points_W_m) - self.zero_m)
+        return mm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cloud:
+    """A cloud with its colour's meaning, or coloured by residuals."""
+
+    name: str
+    role: str
+    points_mm: Float64
+    residuals_m: Float64 | None = None
+
+    def drawn(self) -> tuple[Float64, UInt8]:
+        """Return points, no more than can be drawn in time, and their colours."""
+        every = slice(None, None, max(1, -(-len(self.points_mm) // _MOST_POINTS)))
+        points_mm = self.points_mm[every]
+        if self.residuals_m is not None:
+            return points_mm, residual_colors(self.residuals_m[every])
+        color = np.array(rgb(getattr(colors(), self.role)), np.uint8)
+        return points_mm, np.tile(color, (len(points_mm), 1))
+
+
+class CloudPanel(QWidget):
+    """Cursor and live hand in the depth camera's axes, which are nearly the wearer's.
+
+    A finished alignment is shown in the axes of its first eye.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("cloud-panel")
+        self._clouds: list[_Cloud] = []
+        self._text = ""
+        self._next_pairs_s = 0.0
+        self._view = CloudView()
+        points, widest = Qt.PenStyle.NoPen, "99,999"
+        self._cursor = LegendEntry("Cursor", "cursor", points, "The frozen hand; points", widest)
+        self._hand = LegendEntry("Live hand", "live", points, "The hand now; points", widest)
+        self._scale = ResidualScale()
+        self._pairs = QCheckBox("Pairs")
+        self._pairs.setObjectName("cloud-pairs")
+        self._pairs.setToolTip(
+            "Matched pairs: while aligning, join points of the live hand with those of the cursor "
+            "that they lie on once the hand is laid over it; found anew twice a second"
+        )
+        self._pairs.toggled.connect(self._forget_pairs)
+        self._lay_out()
+        self.clear()
+
+    def clear(self, message: str = _EMPTY) -> None:
+        """Show nothing but a message."""
+        self._show(None, None, message)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the cursor, while there is one, and the live hand."""
+        seen, cursor = snapshot.observation, snapshot.procedure.cursor
+        problem = snapshot.camera.problem or (seen.problem if seen else "")
+        if seen is None and not problem:
+            return
+        problem = problem[:1].upper() + problem[1:]
+        hand = seen.hand if seen and not problem else None
+        placed = cursor or hand
+        if placed is None:
+            self.clear(problem or _EMPTY)
+            return
+        axes = _live_axes(cursor, placed)
+        is_red = seen is not None and seen.is_red
+        role = "red" if is_red else "live"
+        self._show(
+            None if cursor is None else _Cloud("Cursor", "cursor", axes.mm(cursor.points_W_m)),
+            None if hand is None else _Cloud("Live hand", role, axes.mm(hand.points_W_m)),
+            problem or (_TURNED if is_red else axes.name),
+        )
+        if cursor and hand and seen and seen.rotation_rad is not None and self._pairs.isChecked():
+            self._join(cursor, hand, hand.T_W_D[:3, :3] @ seen.rotation_rad, axes)
+        else:
+            self._forget_pairs()
+
+    def show_alignment(self, alignment: Alignment, residuals_m: Float64 | None = None) -> None:
+        """Show a finished alignment, its hand coloured by residuals, (M,), NaN for outliers."""
+        T_E_W = alignment.T_E_W[alignment.eyes[0]]
+        middle_m = np.median(transform(T_E_W, alignment.cursor_m), axis=0)
+        axes = _Axes(T_E_W, middle_m, _FROM_CURSOR)
+        self._forget_pairs()
+        self._show(
+            _Cloud("Cursor", "cursor", axes.mm(alignment.cursor_m)),
+            _Cloud("Hand", "live", axes.mm(alignment.hand_m), residuals_m),
+            axes.name,
+        )
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow a change between light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._draw()
+
+    def _lay_out(self) -> None:
+        controls, legend = QHBoxLayout(), QHBoxLayout()
+        controls.setSpacing(SPACING_PX // 2)
+        for text, (direction, tooltip) in _DIRECTIONS.items():
+            button = QToolButton()
+            button.setObjectName(f"cloud-{text.lower()}")
+            button.setText(text)
+            button.setToolTip(tooltip)
+            button.clicked.connect(lambda _, direction=direction: self._view.look(direction))
+            controls.addWidget(button)
+        controls.addStretch()
+        controls.addWidget(self._pairs)
+        legend.setSpacing(2 * SPACING_PX)
+        legend.addWidget(self._cursor)
+        legend.addWidget(self._hand, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(controls)
+        layout.addWidget(self._view, 1)
+        layout.addWidget(self._scale)
+        layout.addLayout(legend)
+
+    def _show(self, cursor: _Cloud | None, hand: _Cloud | None, text: str) -> None:
+        for entry, cloud in ((self._cursor, cursor), (self._hand, hand)):
+            if cloud is not None:
+                entry.show_name(cloud.name, cloud.role if cloud.residuals_m is None else None)
+            entry.show_number(f"{len(cloud.points_mm):,}" if cloud else "–")
+        self._scale.setVisible(hand is not None and hand.residuals_m is not None)
+        self._clouds = [cloud for cloud in (cursor, hand) if cloud is not None]
+        self._text = text
+        self._draw()
+
+    def _draw(self) -> None:
+        drawn = [cloud.drawn() for cloud in self._clouds]
+        points_mm = np.concatenate([_NONE, *(points for points, _ in drawn)])
+        shades = np.concatenate([np.empty((0, 3), np.uint8), *(shades for _, shades in drawn)])
+        self._view.show_points(points_mm, shades, self._text)
+
+    def _join(self, cursor: PlacedHand, hand: PlacedHand, rotation_W: Float64, axes: _Axes) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_pairs_s:
+            self._next_pairs_s = now_s + _PAIRS_PERIOD_S
+            clouds = cursor.points_W_m, hand.points_W_m
+            pairs = matched_pairs(*clouds, rotation_W, cursor.cloud.is_cut)
+            ends = (axes.mm(cloud[index]) for cloud, index in zip(clouds, pairs.T, strict=True))
+            self._view.show_lines(*ends)
+
+    def _forget_pairs(self) -> None:
+        self._next_pairs_s = 0.0
+        self._view.show_lines(_NONE, _NONE)
+
+
+def _live_axes(cursor: PlacedHand | None, placed: PlacedHand) -> _Axes:
+    """Return the depth camera's axes at the time of the cursor, or now if there is none."""
+    T_D_W = invert(placed.T_W_D)
+    if cursor is None:
+        return _Axes(T_D_W, np.zeros(3), _FROM_CAMERA)
+    return _Axes(T_D_W, transform(T_D_W, cursor.middle_W_m[None])[0], _FROM_CURSOR)

@@ -1,0 +1,208 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.results import Results
+from handcal.snapshot import Snapshot
+from handcal.types import Alignment
+from handcal_gui.cloud_view import CloudView
+from handcal_gui.legend import LegendEntry
+from handcal_gui.panels.cloud import CloudPanel
+from handcal_gui.residual_scale import ResidualScale, residual_colors
+from handcal_gui.splat import rgb
+from handcal_gui.theme import colors
+
+MakeSnapshot = Callable[..., Snapshot]
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> CloudPanel:
+    panel = CloudPanel()
+    qtbot.addWidget(panel)
+    panel.resize(380, 300)
+    panel.show()
+    return panel
+
+
+def _view(panel: CloudPanel) -> CloudView:
+    view = panel.findChild(CloudView)
+    assert view is not None
+    return view
+
+
+def _legend(panel: CloudPanel) -> list[str]:
+    return [entry.text for entry in panel.findChildren(LegendEntry)]
+
+
+def _count(widget: QWidget, color: str) -> int:
+    """Return how many pixels of a widget have nearly a colour, at most a third faded."""
+    image = widget.grab().toImage().convertToFormat(widget.grab().toImage().Format.Format_RGB888)
+    pixels = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    pixels = pixels[:, : 3 * image.width()].reshape(image.height(), image.width(), 3)
+    wanted, canvas = np.array(rgb(color), float), np.array(rgb(colors().canvas), float)
+    faded = [wanted + part * (canvas - wanted) for part in np.linspace(0.0, 0.35, 8)]
+    near = [np.abs(pixels - shade).max(axis=2) < 8 for shade in faded]
+    return int(np.count_nonzero(np.any(near, axis=0)))
+
+
+def test_empty_it_says_what_will_appear(panel: CloudPanel) -> None:
+    assert "Hold a hand up" in _view(panel).accessibleDescription()
+    assert _legend(panel) == ["Cursor –", "Live hand –"]
+
+
+def test_live_hand_alone_is_shown_from_the_camera(
+    panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    now = snapshot(State.SHOW_HAND)
+    panel.show_snapshot(now)
+    assert now.observation is not None
+    assert now.observation.hand is not None
+    assert _legend(panel) == ["Cursor –", f"Live hand {len(now.observation.hand.points_W_m):,}"]
+    assert "depth camera" in _view(panel).accessibleDescription()
+    assert _count(panel, colors().live) > 500
+    # Half a metre from the camera.
+    assert _view(panel).orbit.centre_mm[2] == pytest.approx(500.0, abs=60.0)
+
+
+def test_cursor_and_hand_are_shown_about_the_cursor(
+    panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    panel.show_snapshot(snapshot())
+    assert "cursor" in _view(panel).accessibleDescription()
+    assert _count(panel, colors().cursor) > 500
+    assert _count(panel, colors().live) > 100
+    assert np.abs(_view(panel).orbit.centre_mm).max() < 60.0
+
+
+def test_hand_beyond_the_guard_is_red_and_said_to_be(
+    panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    panel.show_snapshot(snapshot(observation={"is_red": True}))
+    assert "turned too far" in _view(panel).accessibleDescription()
+    assert _count(panel, colors().red) > 100
+    assert _count(_view(panel), colors().live) == 0
+
+
+def test_lost_hand_leaves_the_cursor_and_the_reason(
+    panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    panel.show_snapshot(snapshot(observation={"hand": None, "problem": "no hand in view"}))
+    assert _view(panel).accessibleDescription() == "No hand in view"
+    assert _legend(panel)[1] == "Live hand –"
+    assert _count(panel, colors().cursor) > 500
+
+
+def test_unplugged_camera_takes_the_hand_away(panel: CloudPanel, snapshot: MakeSnapshot) -> None:
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    panel.show_snapshot(
+        snapshot(State.SHOW_HAND, observation=None, camera={"problem": "the camera is gone"})
+    )
+    assert _view(panel).accessibleDescription() == "The camera is gone"
+    assert _count(_view(panel), colors().live) == 0
+
+
+def test_snapshot_without_a_frame_changes_nothing(
+    panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    panel.show_snapshot(snapshot())
+    before = panel.grab().toImage()
+    panel.show_snapshot(snapshot(observation=None))
+    assert panel.grab().toImage() == before
+
+
+def test_pairs_are_drawn_on_demand(panel: CloudPanel, snapshot: MakeSnapshot) -> None:
+    checkbox = panel.findChild(QCheckBox, "cloud-pairs")
+    assert checkbox is not None
+    panel.show_snapshot(snapshot())
+    assert _count(_view(panel), colors().good) == 0
+    checkbox.click()
+    panel.show_snapshot(snapshot())
+    assert _count(_view(panel), colors().good) > 300
+    checkbox.click()
+    assert _count(_view(panel), colors().good) == 0
+
+
+def test_finished_alignment_shows_residuals_on_a_scale(
+    panel: CloudPanel, alignments: tuple[Alignment, ...], results: Results
+) -> None:
+    scale = panel.findChild(ResidualScale)
+    assert scale is not None
+    assert not scale.isVisible()
+    panel.show_alignment(alignments[0], results.alignments[0]["left"].residuals_m)
+    assert scale.isVisible()
+    assert _legend(panel) == ["Cursor 600", "Hand 600"]
+    assert _count(_view(panel), colors().live) == 0
+    panel.show_alignment(alignments[0])
+    assert not scale.isVisible()
+    assert _count(_view(panel), colors().live) > 50
+
+
+def test_residual_colors_tell_distances_and_outliers_apart() -> None:
+    none, small, large, beyond, outlier = residual_colors(
+        np.array([0.0, 0.001, 0.005, 0.5, np.nan])
+    ).tolist()
+    assert none != small != large
+    assert large == beyond
+    assert tuple(outlier) == rgb(colors().red)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "yaw_deg", "pitch_deg"),
+    [
+        ("front", Qt.Key.Key_1, 0.0, 0.0),
+        ("side", Qt.Key.Key_2, 90.0, 0.0),
+        ("top", Qt.Key.Key_3, 0.0, 90.0),
+    ],
+)
+def test_buttons_and_keys_look_from_a_side(
+    qtbot: QtBot, panel: CloudPanel, name: str, key: Qt.Key, yaw_deg: float, pitch_deg: float
+) -> None:
+    view, button = _view(panel), panel.findChild(QToolButton, f"cloud-{name}")
+    assert button is not None
+    for look in (button.click, lambda: qtbot.keyClick(view, key)):
+        qtbot.keyClick(view, Qt.Key.Key_R)
+        assert view.orbit.yaw_rad not in (0.0, np.radians(90.0))
+        look()
+        assert np.degrees([view.orbit.yaw_rad, view.orbit.pitch_rad]) == pytest.approx(
+            [yaw_deg, pitch_deg]
+        )
+
+
+def test_mouse_turns_moves_and_goes_back(
+    qtbot: QtBot, panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    view = _view(panel)
+    panel.show_snapshot(snapshot())
+    panel.grab()
+    start = view.orbit
+
+    def drag(button: Qt.MouseButton) -> None:
+        qtbot.mousePress(view, button, pos=QPoint(100, 100))
+        qtbot.mouseMove(view, QPoint(130, 110))
+        qtbot.mouseRelease(view, button, pos=QPoint(130, 110))
+
+    drag(Qt.MouseButton.LeftButton)
+    assert view.orbit.yaw_rad == pytest.approx(start.yaw_rad - 0.3)
+    assert view.orbit.pitch_rad == pytest.approx(start.pitch_rad + 0.1)
+    before = view.orbit
+    drag(Qt.MouseButton.RightButton)
+    assert view.orbit.centre_mm != before.centre_mm
+    qtbot.keyClick(view, Qt.Key.Key_Plus)
+    assert view.orbit.px_per_mm == pytest.approx(1.2 * before.px_per_mm)
+    panel.grab()  # a chosen size is kept
+    assert view.orbit.px_per_mm == pytest.approx(1.2 * before.px_per_mm)
+    qtbot.mouseDClick(view, Qt.MouseButton.LeftButton)
+    panel.grab()
+    assert view.orbit == start
+
+
+def test_it_fits_into_a_small_dock(panel: CloudPanel, snapshot: MakeSnapshot) -> None:
+    panel.show_snapshot(snapshot(observation={"is_red": True}))
+    hint = panel.minimumSizeHint()
+    assert hint.width() <= 300
+    assert hint.height() <= 220
