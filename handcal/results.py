@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from handcal.errors import CancelledError
 from handcal.register.fuse import FuseSettings, covariances_after_another, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
@@ -63,15 +64,38 @@ class Results:
     expected_after_another_arcmin: Mapping[Eye, float]
 
 
-def solve_session(alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> Results:
+def solve_session(
+    alignments: Sequence[Alignment],
+    rig: Rig,
+    settings: SolveSettings,
+    report: Callable[[str, float], object] = lambda *_: None,
+    is_cancelled: Callable[[], bool] = lambda: False,
+) -> Results:
     """Solve, fuse and judge alignments; equal input gives equal output, bit for bit.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+    rig : Rig
+    settings : SolveSettings
+    report : callable
+        Told before each alignment what is going on and which share of the whole is done.
+    is_cancelled : callable
+        Asked before each alignment.
 
     Raises
     ------
     ValueError
         If there are no alignments, or a cloud cannot be solved.
+    CancelledError
+        If it was cancelled.
     """
-    solved = [solve_alignment(alignment, rig, settings.method) for alignment in alignments]
+    solved = []
+    for done, alignment in enumerate(alignments):
+        if is_cancelled():
+            raise CancelledError("solving was cancelled")
+        report(f"Solving alignment {done + 1} of {len(alignments)}", done / len(alignments))
+        solved.append(solve_alignment(alignment, rig, settings.method))
     pairs = list(zip(alignments, solved, strict=True))
     shifts = fuse_alignments(pairs, rig, settings.fuse)
     after_another_m2 = covariances_after_another(pairs, rig, settings.fuse)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import pytest
 
 from handcal.calibrate import CalibrationSettings
 from handcal.config import read_settings, settings_json
+from handcal.errors import CancelledError
 from handcal.files import write_json
 from handcal.register.verdict import VerdictSettings, expected_error_arcmin
 from handcal.results import SolveSettings, results_json, solve_session
@@ -95,6 +96,22 @@ def test_the_settings_reach_the_verdict(left: Alignment) -> None:
     strict = SolveSettings(verdict=VerdictSettings(error_max_arcmin=0.1))
     assert solve_session([left], RIG, SolveSettings()).verdicts["left"].name == "accept"
     assert solve_session([left], RIG, strict).verdicts["left"].name == "repeat"
+
+
+def test_it_reports_and_can_be_cancelled_between_alignments(left: Alignment) -> None:
+    reports: list[tuple[str, float]] = []
+
+    def solve(is_cancelled: Callable[[], bool]) -> None:
+        solve_session(
+            [left] * 2, RIG, SolveSettings(), lambda *said: reports.append(said), is_cancelled
+        )
+
+    solve(lambda: False)
+    assert reports == [("Solving alignment 1 of 2", 0.0), ("Solving alignment 2 of 2", 0.5)]
+    reports.clear()
+    with pytest.raises(CancelledError):
+        solve(lambda: len(reports) == 1)
+    assert len(reports) == 1
 
 
 def test_nothing_to_solve_is_refused() -> None:
