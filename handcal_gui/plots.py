@@ -90,16 +90,15 @@ class Plot(QWidget):
             connect="finite",
         )
         self._lines.append((line, role, dashed))
-        self._recolor()
+        _color_line(line, role, dashed)
         return line
 
     def add_text(self, text: str, x: float, y: float) -> None:
         """Write to the right of a point."""
-        written = pg.TextItem(text, anchor=(-0.5, 0.5))
+        written = pg.TextItem(text, self.palette().windowText().color(), anchor=(-0.5, 0.5))
         written.setPos(x, y)
         self.item.addItem(written)
         self._texts.append(written)
-        self._recolor()
 
     def clear(self) -> None:
         """Remove all lines and texts."""
@@ -124,9 +123,13 @@ class Plot(QWidget):
             self.item.legend.setLabelTextColor(text)
         for written in self._texts:
             written.setColor(text)
-        for line, role, is_dashed in self._lines:
-            color = getattr(now, role)
-            style = Qt.PenStyle.DashLine if is_dashed else Qt.PenStyle.SolidLine
-            line.setPen(pg.mkPen(color, width=_LINE_PX, style=style))
-            line.setSymbolPen(color)
-            line.setSymbolBrush(None if is_dashed else color)
+        for line in self._lines:
+            _color_line(*line)
+
+
+def _color_line(line: pg.PlotDataItem, role: str, dashed: bool) -> None:
+    color = getattr(colors(), role)
+    style = Qt.PenStyle.DashLine if dashed else Qt.PenStyle.SolidLine
+    line.setPen(pg.mkPen(color, width=_LINE_PX, style=style))
+    line.setSymbolPen(color)
+    line.setSymbolBrush(None if dashed else color)

@@ -71,7 +71,7 @@ class RotationPanel(QWidget):
             self._show_nothing("? No hand", problem[:1].upper() + problem[1:] or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
-        if angle_rad < _STRAIGHT_RAD:
+        if angle_rad < _STRAIGHT_RAD and not observation.is_red:
             self._dial.show_angle(angle_rad, self._limit_rad, "✓ Hold still")
             self._hand.show_turn("")
             self._advice.setText(_STRAIGHT)
@@ -128,6 +128,7 @@ def _text_label(name: str, scale: float = 1.0) -> QLabel:
     """Return a label that takes the room of two lines however much of it is filled."""
     label = QLabel()
     label.setObjectName(name)
+    label.setTextFormat(Qt.TextFormat.PlainText)
     label.setWordWrap(True)
     label.setAlignment(Qt.AlignmentFlag.AlignTop)
     font = label.font()

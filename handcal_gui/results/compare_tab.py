@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -70,19 +70,21 @@ class CompareTab(QWidget):
         self._progress.setMaximumHeight(SPACING_PX)
         self._status = QLabel()
         self._status.setObjectName("comparison-status")
+        self._status.setTextFormat(Qt.TextFormat.PlainText)
         self._status.setWordWrap(True)
         self._lay_out()
         self._set_busy(False)
 
     def show_results(self, results: Results, rig: Rig) -> None:
         """Take new results to compare with; a comparison with earlier ones is taken away."""
+        if self._cancel.isEnabled():
+            self._give_up()
         self._results, self._rig = results, rig
         self._methods.clear()
         for method in METHODS:
             if method != results.method:
                 self._methods.addItem(method)
         self.table.show_rows((), ())
-        self._set_busy(False)
 
     def show_comparison(self, other: Results) -> None:
         """Show another method's results of the same alignments."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
 
 from handcal.geometry import transform
@@ -16,7 +17,7 @@ from handcal_gui.theme import SPACING_PX
 
 
 class ResidualsTab(QWidget):
-    """Shows the residual map of one alignment and eye at a time."""
+    """Shows the residual map of one alignment and eye at a time, drawn only while it is seen."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -48,7 +49,14 @@ class ResidualsTab(QWidget):
         self._choice.blockSignals(False)
         self._show_chosen()
 
+    def showEvent(self, event: QShowEvent) -> None:
+        """Draw what was chosen while nobody looked."""
+        super().showEvent(event)
+        self._show_chosen()
+
     def _show_chosen(self) -> None:
+        if not self.isVisible():
+            return
         chosen = self._choice.currentData()
         if self._results is None or chosen is None:
             self._map.show_residuals(np.empty((0, 2)), np.empty(0))

@@ -28,6 +28,7 @@ class VerdictCard(QFrame):
         font.setPointSizeF(1.25 * font.pointSizeF())
         self._word.setFont(font)
         self._reason = QLabel()
+        self._reason.setTextFormat(Qt.TextFormat.PlainText)
         self._reason.setWordWrap(True)
         self._reason.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         self._reason.setMinimumHeight(_REASON_LINES * self._reason.fontMetrics().lineSpacing())

@@ -127,6 +127,7 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
 def test_the_map_shows_each_point_of_the_chosen_hand_once(
     solved: ResultsPanel, results: Results, alignments: Sequence[Alignment]
 ) -> None:
+    child(solved, QTabWidget).setCurrentIndex(2)
     choices = child(solved, QComboBox, "residuals-choice")
     choices.setCurrentText("Alignment 2, left eye")
     inliers, outliers = (
@@ -143,7 +144,9 @@ def test_an_alignment_whose_cloud_is_missing_has_no_map(
     panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
     panel.show_results(results, alignments[:1], rig)
+    child(panel, QTabWidget).setCurrentIndex(2)
     assert child(panel, QComboBox, "residuals-choice").count() == 2
+    assert len(child(panel, ResidualMap).scatters[0].getData()[0])
     panel.show_results(results, (), rig)
     assert child(panel, QComboBox, "residuals-choice").count() == 0
     assert not len(child(panel, ResidualMap).scatters[0].getData()[0])
@@ -181,6 +184,15 @@ def test_a_comparison_can_be_cancelled_and_can_fail(solved: ResultsPanel, qtbot:
     solved.comparison_failed("the disk is full")
     assert button(solved, "start").isEnabled()
     assert status(solved) == "the disk is full"
+
+
+def test_other_results_cancel_a_comparison_under_way(
+    solved: ResultsPanel, results: Results, rig: Rig, qtbot: QtBot
+) -> None:
+    button(solved, "start").click()
+    with qtbot.waitSignal(solved.compare_cancelled):
+        solved.show_results(replace(results), (), rig)
+    assert button(solved, "start").isEnabled()
 
 
 def test_only_other_results_end_a_comparison(

@@ -72,6 +72,13 @@ def test_the_word_says_whether_it_may_be_confirmed(
     assert child(panel, RotationDial).is_over == expected.startswith("▲")
 
 
+def test_a_strict_limit_is_told_however_small(panel: RotationPanel, snapshot: Make) -> None:
+    seen = {"rotation_rad": np.radians([0.0, 1.5, 0.0]), "is_red": True}
+    limit = {"guard_limit_rad": float(np.radians(1.0))}
+    panel.show_snapshot(snapshot(observation=seen, procedure=limit))
+    assert word(panel) == "▲ Turn back"
+
+
 def test_it_says_which_way_to_turn_and_how_far(panel: RotationPanel, snapshot: Make) -> None:
     rotation_deg = np.array([2.0, -1.0, 11.3])
     panel.show_snapshot(turned(snapshot, rotation_deg))
