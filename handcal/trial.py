@@ -6,9 +6,9 @@ the real one; where its corners are drawn then is taken for the truth.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -158,8 +158,8 @@ def summarise(trials: Sequence[Trial]) -> TrialStatistics:
     """Return statistics of trials; JSON-able with `dataclasses.asdict`."""
     return TrialStatistics(
         total=_errors(trials) if trials else None,
-        by_eye=_by(trials, lambda trial: trial.eye),
-        by_depth_m=_by(trials, lambda trial: trial.target_depth_m),
+        by_eye=_by(trials, "eye"),
+        by_depth_m=_by(trials, "target_depth_m"),
     )
 
 
@@ -177,23 +177,21 @@ def read_trial(data: Mapping[str, Any], time: str) -> Trial:
     ValueError
         If anything in it is missing or wrong.
     """
-    names = [field.name for field in fields(Trial) if field.name != "time"]
     try:
-        return Trial(**{name: data[name] for name in names}, time=time)
+        return Trial(
+            **{name: data[name] for name in ("eye", "target_depth_m", *_SHAPES)}, time=time
+        )
     except KeyError as error:
         raise ValueError(f"the trial has no {error}") from error
     except (TypeError, OverflowError) as error:
         raise ValueError(f"the trial holds something else than numbers: {error}") from error
 
 
-Key = TypeVar("Key", bound=Hashable)
-
-
-def _by(trials: Sequence[Trial], key: Callable[[Trial], Key]) -> dict[Key, ErrorStatistics]:
-    groups: dict[Key, list[Trial]] = {}
-    for trial in trials:
-        groups.setdefault(key(trial), []).append(trial)
-    return {value: _errors(groups[value]) for value in sorted(groups)}  # type: ignore[type-var]
+def _by(trials: Sequence[Trial], name: str) -> dict[Any, ErrorStatistics]:
+    return {
+        value: _errors([trial for trial in trials if getattr(trial, name) == value])
+        for value in sorted({getattr(trial, name) for trial in trials})
+    }
 
 
 def _errors(trials: Sequence[Trial]) -> ErrorStatistics:
