@@ -31,11 +31,11 @@ from handcal.types import Frame
 from handcal_gui.depth_scale import DepthColors, DepthLegend
 from handcal_gui.hand_overlay import HandOverlay
 from handcal_gui.image_view import ImageView
-from handcal_gui.theme import SPACING_PX, icon, number_font
+from handcal_gui.number_label import UNKNOWN, NumberLabel
+from handcal_gui.theme import SPACING_PX, icon
 
 _EMPTY = "The camera's picture will appear here. Choose a camera on the start page."
 _NO_COLOR = "This camera gives no colour picture."
-_UNKNOWN = "–"
 
 
 class Mode(StrEnum):
@@ -205,11 +205,13 @@ class _Status(QWidget):
         self._name = QLabel()
         self._name.setObjectName("camera-name")
         self._name.setWordWrap(True)
-        self._rate = _number("camera-rate", "999.9 fps", "Frames per second over the last second")
-        self._age = _number(
+        self._rate = NumberLabel(
+            "camera-rate", "999.9 fps", "Frames per second over the last second"
+        )
+        self._age = NumberLabel(
             "camera-age", "9999.9 ms", "Time since the frame shown arrived, in milliseconds"
         )
-        self._dropped = _number(
+        self._dropped = NumberLabel(
             "camera-dropped", "99999", "Frames missing in the camera's own count since it started"
         )
         row = QHBoxLayout()
@@ -226,7 +228,7 @@ class _Status(QWidget):
         layout.setSpacing(SPACING_PX // 2)
         layout.addWidget(self._name)
         layout.addLayout(row)
-        self.show_status(CameraStatus(_UNKNOWN), None)
+        self.show_status(CameraStatus(UNKNOWN), None)
 
     def show_status(self, camera: CameraStatus, age_ms: float | None) -> None:
         self._name.setText(camera.name)
@@ -237,7 +239,7 @@ class _Status(QWidget):
 
 def _age(age_ms: float | None) -> str:
     if age_ms is None:
-        return _UNKNOWN
+        return UNKNOWN
     return f"{age_ms:.1f} ms" if age_ms < 10_000 else f"{age_ms / 1e3:.0f} s"
 
 
@@ -246,14 +248,3 @@ def _caption(seen: Observation) -> str:
     if seen.is_red and seen.rotation_rad is not None:
         return f"Turned by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
     return seen.problem[:1].upper() + seen.problem[1:]
-
-
-def _number(name: str, widest: str, tooltip: str) -> QLabel:
-    """Return a label for a number, as wide as its widest text."""
-    label = QLabel()
-    label.setObjectName(name)
-    label.setToolTip(tooltip)
-    label.setFont(number_font())
-    label.setMinimumWidth(label.fontMetrics().horizontalAdvance(widest))
-    label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    return label

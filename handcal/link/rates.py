@@ -1,0 +1,50 @@
+"""How the link did over a while, from its counters at both ends of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from handcal.link.server import LinkStatistics
+
+
+@dataclass(frozen=True, slots=True)
+class LinkRates:
+    """What passed between PC and headset, each way, over a while.
+
+    Attributes
+    ----------
+    lost, lost_inbound : float or None
+        Share of the datagrams to the headset and from it that did not arrive, 0 to 1; None if
+        there were none. Those to the headset are counted by its reports, a moment late.
+    sent_bytes_s, received_bytes_s : float
+    """
+
+    lost: float | None
+    lost_inbound: float | None
+    sent_bytes_s: float
+    received_bytes_s: float
+
+
+def link_rates(before: LinkStatistics, after: LinkStatistics, elapsed_s: float) -> LinkRates:
+    """Return the rates between two readings of one server's counters.
+
+    A headset that connected anew in between begins to count its losses at zero.
+
+    Raises
+    ------
+    ValueError
+        If `elapsed_s` is not positive.
+    """
+    if elapsed_s <= 0.0:
+        raise ValueError(f"rates over {elapsed_s:g} s are not defined")
+    lost_inbound = max(0, after.lost_inbound - before.lost_inbound)
+    return LinkRates(
+        lost=_share(after.lost - before.lost, after.sent - before.sent),
+        lost_inbound=_share(lost_inbound, after.received - before.received + lost_inbound),
+        sent_bytes_s=(after.bytes_sent - before.bytes_sent) / elapsed_s,
+        received_bytes_s=(after.bytes_received - before.bytes_received) / elapsed_s,
+    )
+
+
+def _share(part: int, whole: int) -> float | None:
+    return min(1.0, max(0, part) / whole) if whole > 0 else None

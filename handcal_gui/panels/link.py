@@ -1,0 +1,136 @@
+"""The link panel: whether the headset is there, how well it is reached, and how to pair it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.link.rates import link_rates
+from handcal.link.server import LinkStatistics
+from handcal.snapshot import Snapshot
+from handcal_gui.link_history import LinkHistory
+from handcal_gui.link_table import RATES_S, LinkTable
+from handcal_gui.pairing_box import PairingBox
+from handcal_gui.theme import SPACING_PX, colors, icon
+
+_PERIOD_S = 0.25
+"""Numbers that change faster cannot be read."""
+_ICON_PX = 24
+
+
+class LinkPanel(QWidget):
+    """Shows how the link does, and the pairing.
+
+    Attributes
+    ----------
+    new_key_requested : Signal()
+        The user wants another pairing key.
+    restart_headset_requested : Signal()
+        The user wants the virtual headset started again.
+    """
+
+    new_key_requested = Signal()
+    restart_headset_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("link-panel")
+        self._readings: deque[tuple[float, LinkStatistics]] = deque()
+        self._is_connected: bool | None = None
+        self._sign = QLabel()
+        self._state = QLabel()
+        self._state.setObjectName("link-state")
+        self._state.setWordWrap(True)
+        self._restart = QPushButton("Restart headset")
+        self._restart.setToolTip("End the virtual headset's program and start it again")
+        self._restart.clicked.connect(self.restart_headset_requested)
+        self._restart.hide()
+        self._table = LinkTable()
+        self._history = LinkHistory()
+        self._pairing = PairingBox()
+        self._pairing.new_key_requested.connect(self.new_key_requested)
+        self._pairing.hide()
+        self._lay_out()
+        self._show_state(is_connected=False, problem="Open a session on the start page.")
+
+    def show_pairing(self, address: str, key: str, *, is_virtual: bool = False) -> None:
+        """Begin with another link.
+
+        Parameters
+        ----------
+        address : str
+            Where the headset must connect to, host:port.
+        key : str
+            Pairing key.
+        is_virtual : bool
+            Whether the headset is the virtual one, which can be restarted from here.
+        """
+        self._readings.clear()
+        self._history.clear()
+        self._pairing.show_pairing(address, key)
+        self._pairing.show()
+        self._restart.setVisible(is_virtual)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show how the link does; numbers at a pace at which they can be read."""
+        link, t_s = snapshot.link, 1e-9 * snapshot.t_host_ns
+        self._show_state(is_connected=link.connected, problem=snapshot.link_problem)
+        if self._readings and 0.0 <= t_s - self._readings[-1][0] < _PERIOD_S:
+            return
+        self._readings.append((t_s, link))
+        while len(self._readings) > 2 and self._readings[1][0] <= t_s - RATES_S:
+            self._readings.popleft()
+        since_s, before = self._readings[0]
+        rates = link_rates(before, link, t_s - since_s) if t_s > since_s else None
+        self._table.show_link(link, rates)
+        self._history.add(t_s, link.latency_ms, rates)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow a change between light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and self._is_connected is not None:
+            self._draw_sign(self._is_connected)
+
+    def _show_state(self, *, is_connected: bool, problem: str) -> None:
+        if is_connected is not self._is_connected:
+            self._is_connected = is_connected
+            self._draw_sign(is_connected)
+        word = "Connected" if is_connected else "Not connected"
+        self._state.setText(f"{word}. {problem}" if problem else word)
+
+    def _draw_sign(self, is_connected: bool) -> None:
+        drawn = icon("link", colors().good) if is_connected else icon("link-off", colors().warning)
+        self._sign.setPixmap(drawn.pixmap(QSize(_ICON_PX, _ICON_PX), self.devicePixelRatio()))
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.setSpacing(SPACING_PX)
+        top.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
+        top.addWidget(self._state, 1)
+        top.addWidget(self._restart, 0, Qt.AlignmentFlag.AlignTop)
+        content = QWidget()
+        rows = QVBoxLayout(content)
+        rows.setContentsMargins(*4 * (SPACING_PX,))
+        rows.setSpacing(SPACING_PX)
+        rows.addLayout(top)
+        rows.addWidget(self._table)
+        rows.addWidget(self._history)
+        rows.addWidget(self._pairing)
+        rows.addStretch()
+        area = QScrollArea()
+        area.setWidget(content)
+        area.setWidgetResizable(True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(area)

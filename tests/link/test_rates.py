@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from handcal.link.rates import LinkRates, link_rates
+from handcal.link.server import LinkStatistics
+
+START = LinkStatistics(
+    connected=True,
+    sent=1000,
+    received=500,
+    lost=10,
+    lost_inbound=20,
+    resent=0,
+    acked=0,
+    unacked=0,
+    failed=0,
+    rejected={},
+    pose_rate_hz=60.0,
+    latency_ms=None,
+    clock_offset_ms=None,
+    clock_drift_ppm=None,
+    clock_uncertainty_ms=None,
+    bytes_sent=100_000,
+    bytes_received=50_000,
+)
+
+
+def test_rates_are_of_the_while_between() -> None:
+    after = replace(
+        START,
+        sent=1200,
+        received=590,
+        lost=16,
+        lost_inbound=30,
+        bytes_sent=140_000,
+        bytes_received=51_000,
+    )
+    rates = link_rates(START, after, 2.0)
+    assert rates == LinkRates(
+        lost=0.03, lost_inbound=0.1, sent_bytes_s=20_000.0, received_bytes_s=500.0
+    )
+
+
+def test_where_nothing_passed_no_share_was_lost() -> None:
+    assert link_rates(START, START, 1.0) == LinkRates(None, None, 0.0, 0.0)
+
+
+def test_a_headset_that_connects_anew_counts_from_zero() -> None:
+    anew = replace(START, sent=1100, received=600, lost=0, lost_inbound=0)
+    rates = link_rates(START, anew, 1.0)
+    assert (rates.lost, rates.lost_inbound) == (0.0, 0.0)
+
+
+def test_no_more_than_all_is_lost() -> None:
+    late_report = replace(START, sent=1001, lost=15)
+    assert link_rates(START, late_report, 1.0).lost == 1.0
+
+
+def test_no_time_gives_no_rates() -> None:
+    with pytest.raises(ValueError, match="0 s"):
+        link_rates(START, START, 0.0)
