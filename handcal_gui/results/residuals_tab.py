@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from PySide6.QtGui import QShowEvent
@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
 
 from handcal.geometry import transform
 from handcal.results import Results
-from handcal.types import Alignment
+from handcal.types import Alignment, Eye, EyeShift
 from handcal_gui.results.residual_map import ResidualMap
 from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.theme import SPACING_PX
@@ -22,8 +22,7 @@ class ResidualsTab(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("residuals")
-        self._results: Results | None = None
-        self._alignments: Sequence[Alignment] = ()
+        self._solved: list[tuple[Alignment, Mapping[Eye, EyeShift]]] = []
         self._choice = QComboBox()
         self._choice.setObjectName("residuals-choice")
         self._choice.setAccessibleName("Alignment and eye")
@@ -39,15 +38,12 @@ class ResidualsTab(QWidget):
 
     def show_results(self, results: Results, alignments: Sequence[Alignment]) -> None:
         """Show the first alignment's map and offer the others, as far as their clouds are known."""
-        self._results, self._alignments = results, alignments
-        self._choice.blockSignals(True)
+        self._solved = list(zip(alignments, results.alignments, strict=False))
         self._choice.clear()
-        for index, (_, shifts) in enumerate(zip(alignments, results.alignments, strict=False)):
+        for index, (_, shifts) in enumerate(self._solved):
             for eye in shifts:
                 name = f"Alignment {index + 1}, {EYE_NAMES[eye].lower()}"
                 self._choice.addItem(name, (index, eye))
-        self._choice.blockSignals(False)
-        self._show_chosen()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Draw what was chosen while nobody looked."""
@@ -58,11 +54,10 @@ class ResidualsTab(QWidget):
         if not self.isVisible():
             return
         chosen = self._choice.currentData()
-        if self._results is None or chosen is None:
+        if chosen is None:
             self._map.show_residuals(np.empty((0, 2)), np.empty(0))
             return
         index, eye = chosen
-        alignment = self._alignments[index]
+        alignment, shifts = self._solved[index]
         hand_E_m = transform(alignment.T_E_W[eye], alignment.hand_m)
-        residuals_m = self._results.alignments[index][eye].residuals_m
-        self._map.show_residuals(hand_E_m[:, :2], residuals_m)
+        self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m)
