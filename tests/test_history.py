@@ -1,0 +1,56 @@
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.history import History, SessionEvent, Shelf, read_shifts
+from handcal.journal import Event
+
+
+@given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))
+def test_a_shelf_keeps_everything_once_and_in_order(operations: list[tuple[str, int]]) -> None:
+    shelf = Shelf[str]("thing", 5)
+    saved = 0
+    for operation, number in operations:
+        with contextlib.suppress(ValueError):
+            if operation == "save":
+                shelf.save(number, f"thing {number}")
+                saved += 1
+            else:
+                getattr(shelf, operation)(number)
+        assert sorted([*shelf.kept, *shelf.deleted]) == list(range(1, saved + 1))
+        assert list(shelf.kept) == sorted(shelf.kept)
+        assert all(item == f"thing {number}" for number, item in shelf.kept.items())
+    assert saved <= 5
+
+
+def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
+    history = History()
+    for name, data, problem in (
+        (SessionEvent.ALIGNMENT_SAVED, {"number": 2, "sha256": "x"}, "alignment 2 is not the next"),
+        (SessionEvent.ALIGNMENT_DELETED, {"number": 1}, "there is no alignment 1"),
+        (SessionEvent.TRIAL_RESTORED, {"number": 1}, "there is no deleted trial 1"),
+        (SessionEvent.TRIAL_SAVED, {"number": 1, "trial": {}}, "the trial has no 'eye'"),
+        (SessionEvent.FINE_TUNED, {}, "fine_tuned lacks 'shift_m'"),
+        (SessionEvent.CREATED, {"rig_sha256": "x", "wearer": 3}, "holds something wrong"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            history.take(Event(1, "", name, data))
+
+
+def test_an_event_of_others_changes_nothing_but_that_it_goes_on() -> None:
+    history = History()
+    history.take(Event(1, "", SessionEvent.FINISHED, {}))
+    assert history.is_finished
+    history.take(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
+    assert not history.is_finished
+
+
+def test_shifts_are_read_only_and_in_the_order_of_the_eyes() -> None:
+    read = read_shifts({"right": [1, 2, 3], "left": [0, 0, 0]})
+    assert list(read) == ["left", "right"]
+    np.testing.assert_array_equal(read["right"], [1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="read-only"):
+        read["right"][0] = 0.0

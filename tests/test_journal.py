@@ -1,0 +1,57 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from handcal import journal
+from handcal.errors import FileError
+from handcal.journal import JournalWriter, happens_now, journal_line, read_journal
+
+
+def begin(path: Path) -> JournalWriter:
+    path.write_bytes(journal_line(happens_now(1, "created", {})))
+    return JournalWriter(path, read_journal(path))
+
+
+def test_what_is_appended_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    appended = begin(path).append("said", {"text": "φ\n", "value": 0.1 + 0.2})
+    content = read_journal(path)
+    assert content.events[1] == appended
+    assert (appended.number, appended.data["value"]) == (2, 0.1 + 0.2)
+    assert (content.complete_bytes, content.torn_bytes) == (path.stat().st_size, 0)
+
+
+def test_a_torn_line_is_left_out_and_goes_with_the_next(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    begin(path)
+    with path.open("ab") as file:
+        file.write(b'{"version": 2, "numb')
+    torn = read_journal(path)
+    assert (len(torn.events), torn.torn_bytes) == (1, 20)
+    JournalWriter(path, torn).append("next", {})
+    assert [event.name for event in read_journal(path).events] == ["created", "next"]
+
+
+def test_a_full_journal_refuses_and_stays_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    writer = begin(path)
+    monkeypatch.setattr(journal, "MAX_JOURNAL_BYTES", 1000)
+    with pytest.raises(FileError, match="is full; start another session"):
+        writer.append("long", {"text": "x" * 1000})
+    writer.append("short", {})
+    assert [event.number for event in read_journal(path).events] == [1, 2]
+    path.write_bytes(b"x" * 1001)
+    with pytest.raises(FileError, match="larger than the 1,000 bytes"):
+        read_journal(path)
+
+
+@pytest.mark.parametrize("version", [0, 3, "2", None])
+def test_an_unknown_version_is_refused(tmp_path: Path, version: object) -> None:
+    path = tmp_path / "journal.jsonl"
+    begin(path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": version}) + "\n")
+    with pytest.raises(FileError, match="is not 2 or 1"):
+        read_journal(path)
