@@ -121,6 +121,8 @@ class Plot(QWidget):
             self.item.getAxis(side).setTextPen(text)
         if self.item.legend is not None:
             self.item.legend.setLabelTextColor(text)
+            for _, label in self.item.legend.items:
+                label.setText(label.text)  # pyqtgraph writes it in its new colour only then
         for written in self._texts:
             written.setColor(text)
         for line in self._lines:

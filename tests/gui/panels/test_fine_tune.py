@@ -214,16 +214,14 @@ def test_undo_and_redo(
     after_mm = fields_mm(panel, "left")
     focused = field(panel, "left", 3)
     focused.setFocus()
-    modifier = Qt.KeyboardModifier.ControlModifier
+    ctrl, shift = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
     for _ in range(2):
-        QTest.keyClick(focused.lineEdit(), Qt.Key.Key_Z, modifier)
+        QTest.keyClick(focused.lineEdit(), Qt.Key.Key_Z, ctrl)
     assert fields_mm(panel, "left") == before_mm
     qtbot.waitUntil(lambda: bool(sent))
     assert same_shifts(sent[-1], {eye: results.shifts[eye].shift_m for eye in EYES})
     for _ in range(2):
-        QTest.keyClick(
-            focused.lineEdit(), Qt.Key.Key_Z, modifier | Qt.KeyboardModifier.ShiftModifier
-        )
+        QTest.keyClick(focused.lineEdit(), Qt.Key.Key_Z, ctrl | shift)
     assert fields_mm(panel, "left") == after_mm
     assert not action(panel, "Redo").isEnabled()
 

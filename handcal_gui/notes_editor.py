@@ -1,0 +1,89 @@
+"""Notes that save themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSignalBlocker, QTimer, Signal
+from PySide6.QtWidgets import QLabel, QPlainTextEdit, QVBoxLayout, QWidget
+
+from handcal.session import MAX_NOTES_CHARACTERS
+from handcal_gui.theme import SPACING_PX
+
+SAVE_MS = 800
+
+
+class NotesEditor(QWidget):
+    """Notes on a session, and whether they are saved.
+
+    Attributes
+    ----------
+    changed : Signal(str)
+        All notes, to be saved, 0.8 s after the last key.
+    """
+
+    changed = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session: Path | None = None
+        self._saved = ""
+        self._edit = QPlainTextEdit()
+        self._edit.setAccessibleName("Notes on the session")
+        self._edit.setPlaceholderText("Notes on this session; they are saved by themselves")
+        self._edit.setTabChangesFocus(True)
+        self._edit.setEnabled(False)
+        self._edit.textChanged.connect(self._begin)
+        self._state = QLabel()
+        self._state.setObjectName("notesState")
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(SAVE_MS)
+        self._timer.timeout.connect(self._save)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(self._edit)
+        layout.addWidget(self._state)
+
+    def show_saved(self, session: Path, notes: str) -> None:
+        """Take note of what is saved; replace what is being written only in another session."""
+        self._saved = notes
+        if session != self._session:
+            self._session = session
+            self._timer.stop()
+            with QSignalBlocker(self._edit):
+                self._edit.setPlainText(notes)
+            self._edit.setEnabled(True)
+        self._refresh()
+
+    def set_read_only(self, is_read_only: bool) -> None:
+        """Let the notes only be read."""
+        self._edit.setReadOnly(is_read_only)
+        self._refresh()
+
+    def flush(self) -> None:
+        """Do now what is waiting: ask for the notes to be saved."""
+        if self._timer.isActive():
+            self._timer.stop()
+            self._save()
+
+    def _begin(self) -> None:
+        self._timer.start()
+        self._refresh()
+
+    def _save(self) -> None:
+        if self._too_many() <= 0:
+            self.changed.emit(self._edit.toPlainText())
+
+    def _too_many(self) -> int:
+        return len(self._edit.toPlainText()) - MAX_NOTES_CHARACTERS
+
+    def _refresh(self) -> None:
+        if self._edit.isReadOnly() or self._session is None:
+            text = ""
+        elif self._too_many() > 0:
+            text = f"⚠ Too long by {self._too_many():,} characters: not saved"
+        else:
+            text = "Saved ✓" if self._edit.toPlainText() == self._saved else "Not saved yet"
+        self._state.setText(text)

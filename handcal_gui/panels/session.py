@@ -1,0 +1,165 @@
+"""The session panel: what is in the session's folder, with notes, and deletions to take back."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.results import Results
+from handcal.session import SessionRecord
+from handcal.snapshot import Snapshot
+from handcal_gui.elided_label import ElidedLabel
+from handcal_gui.notes_editor import NotesEditor
+from handcal_gui.record_table import RecordTable
+from handcal_gui.record_tabs import RecordTabs
+from handcal_gui.session_rows import (
+    ALIGNMENT_COLUMNS,
+    TRIAL_COLUMNS,
+    Deletion,
+    alignment_rows,
+    deletions,
+    local_time,
+    trial_rows,
+)
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.undo_strip import UndoStrip
+
+
+class SessionPanel(QWidget):
+    """Shows a session, and asks for changes to it.
+
+    Attributes
+    ----------
+    delete_alignment_requested, restore_alignment_requested : Signal(int)
+        The alignment's number.
+    delete_trial_requested, restore_trial_requested : Signal(int)
+        The trial's number.
+    notes_changed : Signal(str)
+        All notes, 0.8 s after the last key.
+    export_requested : Signal()
+    """
+
+    delete_alignment_requested = Signal(int)
+    restore_alignment_requested = Signal(int)
+    delete_trial_requested = Signal(int)
+    restore_trial_requested = Signal(int)
+    notes_changed = Signal(str)
+    export_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("session")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._record: SessionRecord | None = None
+        self._results: Results | None = None
+        self._is_read_only = False
+        self._wearer, self._folder, self._started = ElidedLabel(), ElidedLabel(), QLabel()
+        self._alignments = RecordTable(
+            "Alignments", ALIGNMENT_COLUMNS, "Confirmed alignments appear here"
+        )
+        self._alignments.delete_requested.connect(self.delete_alignment_requested)
+        self._trials = RecordTable(
+            "Trials of the session", TRIAL_COLUMNS, "Recorded trials appear here"
+        )
+        self._trials.delete_requested.connect(self.delete_trial_requested)
+        self._notes = NotesEditor()
+        self._notes.changed.connect(self.notes_changed)
+        self._strip = UndoStrip(self)
+        self._strip.restore_requested.connect(self._restore)
+        self._tabs = RecordTabs()
+        self._open_folder = QPushButton("Open folder")
+        self._export = QPushButton("Export…")
+        self._lay_out()
+        self._refresh()
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the session of a snapshot."""
+        results = snapshot.procedure.results
+        if snapshot.record is not self._record or results is not self._results:
+            self.show_record(snapshot.record, results)
+
+    def show_record(self, record: SessionRecord, results: Results | None) -> None:
+        """Show a session.
+
+        Parameters
+        ----------
+        record : SessionRecord
+        results : Results or None
+            Those of all its alignments, if they are known.
+        """
+        self._record, self._results = record, results
+        self._alignments.show_rows(alignment_rows(record, results))
+        self._trials.show_rows(trial_rows(record))
+        self._notes.show_saved(record.path, record.notes)
+        self._refresh()
+
+    def set_read_only(self, is_read_only: bool) -> None:
+        """Let a session only be looked at and exported."""
+        self._is_read_only = is_read_only
+        for part in (self._alignments, self._trials, self._notes):
+            part.set_read_only(is_read_only)
+        self._refresh()
+
+    def flush(self) -> None:
+        """Ask now for notes to be saved that wait for that."""
+        self._notes.flush()
+
+    def _restore(self, deletion: Deletion) -> None:
+        if deletion.kind == "alignment":
+            self.restore_alignment_requested.emit(deletion.number)
+        else:
+            self.restore_trial_requested.emit(deletion.number)
+
+    def _refresh(self) -> None:
+        record = self._record
+        self._open_folder.setEnabled(record is not None)
+        self._export.setEnabled(record is not None)
+        if record is None:
+            self._wearer.setText("–")
+            self._folder.setText("Start or open a session to see it here")
+            self._started.setText("–")
+            return
+        self._wearer.setText(record.wearer or "–")
+        self._folder.setText(str(record.path))
+        began = local_time(record.events[0].time, "%Y-%m-%d %H:%M:%S")
+        self._started.setText(f"{began}, finished" if record.is_finished else began)
+        self._strip.show_deletions([] if self._is_read_only else deletions(record))
+        self._tabs.setTabText(0, f"Alignments ({len(record.alignments)})")
+        self._tabs.setTabText(1, f"Trials ({len(record.trials)})")
+
+    def _show_folder(self) -> None:
+        if self._record is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._record.path.absolute())))
+
+    def _lay_out(self) -> None:
+        self._open_folder.setToolTip("Show the session's folder in the file manager")
+        self._open_folder.clicked.connect(self._show_folder)
+        self._export.setToolTip("Write a report, tables and calibration files")
+        self._export.clicked.connect(self.export_requested)
+        form = QFormLayout()
+        form.setVerticalSpacing(SPACING_PX // 2)
+        form.addRow("Wearer", self._wearer)
+        form.addRow("Folder", self._folder)
+        form.addRow("Started", self._started)
+        self._tabs.addTab(self._alignments, "Alignments")
+        self._tabs.addTab(self._trials, "Trials")
+        self._tabs.addTab(self._notes, "Notes")
+        buttons = QHBoxLayout()
+        buttons.setSpacing(SPACING_PX)
+        buttons.addWidget(self._strip, 1)
+        buttons.addWidget(self._open_folder)
+        buttons.addWidget(self._export)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(form)
+        layout.addWidget(self._tabs, 1)
+        layout.addLayout(buttons)

@@ -1,0 +1,196 @@
+"""The trials panel: the user test, trial by trial, with running statistics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import (
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.calibrate import State
+from handcal.display import TARGET_DEPTHS_M
+from handcal.session import SessionRecord
+from handcal.snapshot import Snapshot
+from handcal.trial import summarise
+from handcal.types import EYES, Eye
+from handcal_gui.number_table import NumberTable
+from handcal_gui.record_table import RecordTable
+from handcal_gui.record_tabs import RecordTabs
+from handcal_gui.results.rows import EYE_NAMES
+from handcal_gui.session_rows import (
+    STATISTICS_COLUMNS,
+    TRIAL_COLUMNS,
+    deletions,
+    statistics_rows,
+    statistics_text,
+    trial_rows,
+)
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.trial_plot import TrialPlot
+from handcal_gui.undo_strip import UndoStrip
+
+_HOW = (
+    "Fine-tune φ until the drawn target covers the real one, then record: a trial is by how much "
+    "the solved φ misses that."
+)
+
+
+class TrialsPanel(QWidget):
+    """Records trials and shows them.
+
+    Attributes
+    ----------
+    trial_requested : Signal(str, float)
+        Eye, and the target's distance in metres.
+    delete_trial_requested, restore_trial_requested : Signal(int)
+        The trial's number.
+    """
+
+    trial_requested = Signal(str, float)
+    delete_trial_requested = Signal(int)
+    restore_trial_requested = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("trials")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._snapshot: Snapshot | None = None
+        self._record: SessionRecord | None = None
+        self._is_read_only = False
+        self._eyes, self._depth = QComboBox(), QComboBox()
+        self._fill_choices()
+        self._make_record_action()
+        self._message = QLabel()
+        self._message.setObjectName("message")
+        self._summary = QLabel()
+        self._summary.setObjectName("summary")
+        self._table = RecordTable(
+            "Trials", TRIAL_COLUMNS, "Trials appear here as they are recorded"
+        )
+        self._table.delete_requested.connect(self.delete_trial_requested)
+        self._statistics = NumberTable("Statistics of trials")
+        self._plot = TrialPlot()
+        self._strip = UndoStrip(self)
+        self._strip.restore_requested.connect(
+            lambda deletion: self.restore_trial_requested.emit(deletion.number)
+        )
+        self._lay_out()
+        self._refresh()
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the session's trials, and whether another can be recorded."""
+        self._snapshot = snapshot
+        if snapshot.record is not self._record:
+            self.show_record(snapshot.record)
+        self._refresh()
+
+    def show_record(self, record: SessionRecord) -> None:
+        """Show the trials of a session."""
+        before, self._record = self._record, record
+        if before is None or _trials_of(before) != _trials_of(record):
+            statistics = summarise(record.trials)
+            self._table.show_rows(trial_rows(record))
+            self._summary.setText(statistics_text(statistics))
+            self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(statistics))
+            self._plot.show_trials(record.trials, statistics)
+        self._show_deletions()
+
+    def set_read_only(self, is_read_only: bool) -> None:
+        """Let a session only be looked at."""
+        self._is_read_only = is_read_only
+        self._table.set_read_only(is_read_only)
+        self._show_deletions()
+        self._refresh()
+
+    def _next_eye(self) -> Eye:
+        chosen: Eye | None = self._eyes.currentData()
+        if chosen is not None:
+            return chosen
+        trials = self._record.trials if self._record else ()
+        return "right" if trials and trials[-1].eye == "left" else "left"
+
+    def _why_not(self) -> str:
+        """Return why no trial can be recorded now; empty if one can."""
+        if self._is_read_only:
+            return "This session is only looked at."
+        if self._snapshot is None:
+            return "Trials are recorded while a session runs."
+        procedure, eye = self._snapshot.procedure, self._next_eye()
+        if procedure.state is not State.APPLIED or procedure.results is None:
+            return "Solve and apply the alignments first."
+        if eye not in procedure.results.shifts:
+            return f"The {EYE_NAMES[eye].lower()} has not been aligned."
+        return ""
+
+    def _refresh(self) -> None:
+        why_not = self._why_not()
+        self._record_action.setEnabled(not why_not)
+        self._message.setText(why_not or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
+
+    def _show_deletions(self) -> None:
+        can_undo = self._record is not None and not self._is_read_only
+        found = deletions(self._record) if self._record and can_undo else []
+        self._strip.show_deletions([deletion for deletion in found if deletion.kind == "trial"])
+
+    def _ask(self) -> None:
+        self.trial_requested.emit(self._next_eye(), self._depth.currentData())
+
+    def _fill_choices(self) -> None:
+        self._eyes.setAccessibleName("Eye")
+        self._eyes.setToolTip("The eye that looks at the target; the other is closed")
+        for eye in EYES:
+            self._eyes.addItem(EYE_NAMES[eye], eye)
+        self._eyes.addItem("Eyes in turn", None)
+        self._eyes.setCurrentIndex(len(EYES))
+        self._eyes.currentIndexChanged.connect(self._refresh)
+        self._depth.setAccessibleName("Distance of the target")
+        self._depth.setToolTip("Distance of the target from the eye, in metres")
+        for depth_m in TARGET_DEPTHS_M:
+            self._depth.addItem(f"{depth_m:g} m", depth_m)
+
+    def _make_record_action(self) -> None:
+        self._record_action = QAction("Record trial", self)
+        self._record_action.setToolTip("Record by how much the solved φ misses the one set (T)")
+        self._record_action.setShortcut(Qt.Key.Key_T)
+        self._record_action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        self._record_action.triggered.connect(self._ask)
+        self.addAction(self._record_action)
+
+    def _lay_out(self) -> None:
+        hint = QLabel(text=_HOW, wordWrap=True)
+        record = QToolButton()
+        record.setDefaultAction(self._record_action)
+        choices = QHBoxLayout()
+        choices.setSpacing(SPACING_PX)
+        for widget in (self._eyes, self._depth, record):
+            choices.addWidget(widget)
+        choices.addStretch(1)
+        tabs = RecordTabs()
+        for page, title in (
+            (self._table, "Trials"),
+            (self._statistics, "Statistics"),
+            (self._plot, "Plot"),
+        ):
+            tabs.addTab(page, title)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(hint)
+        layout.addLayout(choices)
+        layout.addWidget(self._message)
+        layout.addWidget(tabs, 1)
+        layout.addWidget(self._summary)
+        layout.addWidget(self._strip)
+
+
+def _trials_of(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
+    """Return what tells trials from others: a number is never given twice."""
+    return record.path, record.trial_numbers

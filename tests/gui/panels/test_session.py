@@ -1,0 +1,166 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton, QTabWidget, QToolButton
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.results import Results
+from handcal.session import Session, SessionRecord
+from handcal.snapshot import Snapshot
+from handcal.trial import make_trial
+from handcal.types import Rig
+from handcal_gui.panels.session import SessionPanel
+from handcal_gui.record_table import RecordTable
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> SessionPanel:
+    panel = SessionPanel()
+    qtbot.addWidget(panel)
+    panel.resize(430, 450)
+    panel.show()
+    return panel
+
+
+def table(panel: SessionPanel, name: str) -> RecordTable:
+    [table] = panel.findChildren(RecordTable, name)
+    return table
+
+
+def cell(table: RecordTable, row: int, column: int) -> str:
+    return str(table.model().index(row, column).data())
+
+
+def texts(panel: SessionPanel) -> list[str]:
+    return [label.text() for label in panel.findChildren(QLabel)]
+
+
+def button(panel: SessionPanel, text: str) -> QPushButton:
+    return next(b for b in panel.findChildren(QPushButton) if b.text() == text)
+
+
+def tool(panel: SessionPanel, text: str) -> QToolButton:
+    return next(b for b in panel.findChildren(QToolButton) if b.text() == text)
+
+
+def undo_text(panel: SessionPanel) -> str:
+    [label] = panel.findChildren(QLabel, "undoText")
+    return label.text()
+
+
+def test_empty(panel: SessionPanel) -> None:
+    assert any("Start or open a session" in text for text in texts(panel))
+    assert not button(panel, "Open folder").isEnabled()
+    assert not button(panel, "Export…").isEnabled()
+
+
+def test_shows_the_session_of_a_snapshot(
+    panel: SessionPanel, snapshot: Callable[..., Snapshot], record: SessionRecord
+) -> None:
+    panel.show_snapshot(snapshot(State.SOLVED))
+    assert str(record.path) in texts(panel)
+    alignments = table(panel, "alignments")
+    assert alignments.rowCount() == 2
+    assert "–" not in [cell(alignments, 0, column) for column in range(8)]
+    panel.show_snapshot(snapshot(State.ALIGN))
+    assert cell(alignments, 0, 3) == "–", "the results are gone"
+
+
+def test_an_unchanged_session_is_not_shown_anew(
+    panel: SessionPanel, snapshot: Callable[..., Snapshot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panel.show_snapshot(snapshot(State.SOLVED))
+    shown: list[SessionRecord] = []
+    monkeypatch.setattr(panel, "show_record", lambda record, _results: shown.append(record))
+    panel.show_snapshot(snapshot(State.SOLVED, number=2))
+    assert shown == []
+
+
+def test_deletes_and_takes_back(
+    qtbot: QtBot, panel: SessionPanel, record: SessionRecord, results: Results
+) -> None:
+    panel.show_record(record, results)
+    alignments = table(panel, "alignments")
+    alignments.selectRow(1)
+    with qtbot.waitSignal(panel.delete_alignment_requested) as asked:
+        tool(panel, "Delete").click()
+    assert asked.args == [2]
+    with Session(record.path) as session:
+        session.delete_alignment(2)
+    panel.show_record(Session.open(record.path), None)
+    assert alignments.rowCount() == 1
+    assert undo_text(panel) == "Alignment 2 deleted."
+    alignments.setFocus()
+    with qtbot.waitSignal(panel.restore_alignment_requested) as asked:
+        QTest.keyClick(alignments, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert asked.args == [2]
+    with Session(record.path) as session:
+        session.restore_alignment(2)
+    panel.show_record(Session.open(record.path), None)
+    assert alignments.rowCount() == 2
+    assert undo_text(panel) == ""
+    assert not tool(panel, "Undo").isVisible()
+
+
+def test_deletes_trials_and_takes_back(
+    qtbot: QtBot, panel: SessionPanel, record: SessionRecord, rig: Rig
+) -> None:
+    with Session(record.path) as session:
+        trial = make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [0.001, 0.0, 0.0])
+        for _ in range(2):
+            session.save_trial(trial)
+        session.delete_trial(2)
+    panel.show_record(Session.open(record.path), None)
+    [tabs] = panel.findChildren(QTabWidget)
+    tabs.setCurrentIndex(1)
+    table(panel, "trials-of-the-session").selectRow(0)
+    with qtbot.waitSignal(panel.delete_trial_requested) as asked:
+        tool(panel, "Delete").click()
+    assert asked.args == [1]
+    with qtbot.waitSignal(panel.restore_trial_requested) as asked:
+        tool(panel, "Undo").click()
+    assert asked.args == [2]
+    tabs.setCurrentIndex(2)
+    assert not tool(panel, "Delete").isVisible()
+
+
+def test_notes_are_passed_on(qtbot: QtBot, panel: SessionPanel, record: SessionRecord) -> None:
+    panel.show_record(record, None)
+    [edit] = panel.findChildren(QPlainTextEdit)
+    edit.setPlainText("left-handed")
+    with qtbot.waitSignal(panel.notes_changed) as asked:
+        panel.flush()
+    assert asked.args == ["left-handed"]
+
+
+def test_a_finished_session_is_only_looked_at(
+    qtbot: QtBot, panel: SessionPanel, record: SessionRecord
+) -> None:
+    with Session(record.path) as session:
+        session.delete_alignment(2)
+        session.finish()
+    panel.set_read_only(True)
+    panel.show_record(Session.open(record.path), None)
+    assert any(text.endswith(", finished") for text in texts(panel))
+    table(panel, "alignments").selectRow(0)
+    assert not tool(panel, "Delete").isEnabled()
+    assert undo_text(panel) == ""
+    with qtbot.waitSignal(panel.export_requested):
+        button(panel, "Export…").click()
+
+
+def test_opens_the_folder(
+    panel: SessionPanel, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    panel.show_record(record, None)
+    button(panel, "Open folder").click()
+    assert [url.toLocalFile() for url in opened] == [str(record.path)]

@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QComboBox, QLabel, QToolButton
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.results import Results
+from handcal.session import Session, SessionRecord
+from handcal.snapshot import Snapshot
+from handcal.trial import make_trial
+from handcal.types import Eye, Rig
+from handcal_gui.number_table import NumberTable
+from handcal_gui.panels.trials import TrialsPanel
+from handcal_gui.record_table import RecordTable
+from handcal_gui.trial_plot import TrialPlot
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> TrialsPanel:
+    panel = TrialsPanel()
+    qtbot.addWidget(panel)
+    panel.resize(430, 450)
+    panel.show()
+    return panel
+
+
+@pytest.fixture
+def tried(record: SessionRecord, rig: Rig) -> SessionRecord:
+    """Return a session with trials 1 (left, 0.4 m) and 3 (left, 0.6 m); 2 is deleted."""
+    trials: list[tuple[Eye, float]] = [("left", 0.4), ("right", 0.5), ("left", 0.6)]
+    with Session(record.path) as session:
+        for eye, depth_m in trials:
+            session.save_trial(make_trial(rig.eyes[eye], eye, depth_m, np.zeros(3), [1e-3, 0, 0]))
+        session.delete_trial(2)
+    return Session.open(record.path)
+
+
+def label(panel: TrialsPanel, name: str) -> str:
+    [label] = panel.findChildren(QLabel, name)
+    return label.text()
+
+
+def choose(panel: TrialsPanel, name: str, text: str) -> None:
+    [combo] = (c for c in panel.findChildren(QComboBox) if c.accessibleName() == name)
+    combo.setCurrentText(text)
+
+
+def tool(panel: TrialsPanel, text: str) -> QToolButton:
+    return next(b for b in panel.findChildren(QToolButton) if b.text() == text)
+
+
+def test_empty(panel: TrialsPanel) -> None:
+    assert label(panel, "message") == "Trials are recorded while a session runs."
+    assert not tool(panel, "Record trial").isEnabled()
+
+
+@pytest.mark.parametrize("state", [State.SHOW_HAND, State.ALIGN, State.SOLVED, State.APPLYING])
+def test_needs_an_applied_calibration(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot], state: State
+) -> None:
+    panel.show_snapshot(snapshot(state))
+    assert label(panel, "message") == "Solve and apply the alignments first."
+    assert not tool(panel, "Record trial").isEnabled()
+
+
+def test_needs_the_eye_to_be_solved(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot], results: Results
+) -> None:
+    one = replace(results, shifts={"right": results.shifts["right"]})
+    panel.show_snapshot(snapshot(State.APPLIED, procedure={"results": one}))
+    assert label(panel, "message") == "The left eye has not been aligned."
+    choose(panel, "Eye", "Right eye")
+    assert tool(panel, "Record trial").isEnabled()
+
+
+def test_asks_for_a_trial_by_key(
+    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
+) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    choose(panel, "Eye", "Right eye")
+    choose(panel, "Distance of the target", "0.6 m")
+    panel.setFocus()
+    with qtbot.waitSignal(panel.trial_requested) as asked:
+        QTest.keyClick(panel, Qt.Key.Key_T)
+    assert asked.args == ["right", 0.6]
+
+
+def test_takes_the_eyes_in_turn(
+    qtbot: QtBot,
+    panel: TrialsPanel,
+    snapshot: Callable[..., Snapshot],
+    tried: SessionRecord,
+    rig: Rig,
+) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    assert label(panel, "message") == "Next: left eye"
+    panel.show_snapshot(snapshot(State.APPLIED, record=tried))
+    assert label(panel, "message") == "Next: right eye"
+    with qtbot.waitSignal(panel.trial_requested) as asked:
+        tool(panel, "Record trial").click()
+    assert asked.args[0] == "right"
+
+
+def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -> None:
+    panel.show_record(tried)
+    [table] = panel.findChildren(RecordTable)
+    numbers = [table.model().index(row, 0).data() for row in range(table.rowCount())]
+    assert numbers == ["1", "3"]
+    mean = np.concatenate([trial.error_arcmin for trial in tried.trials]).mean()
+    assert label(panel, "summary").startswith(f"2 trials: {mean:.1f} ±")
+    [statistics] = panel.findChildren(NumberTable)
+    assert "0.4 m" in statistics.as_text()
+    assert "0.5 m" not in statistics.as_text()
+
+
+def test_plots_every_corner_and_each_median(panel: TrialsPanel, tried: SessionRecord) -> None:
+    panel.show_record(tried)
+    [plot] = panel.findChildren(TrialPlot)
+    drawn = {line.name(): line.getData() for line in plot.item.listDataItems()}
+    _, errors = drawn["Left eye"]
+    expected = np.concatenate([trial.error_arcmin for trial in tried.trials])
+    np.testing.assert_allclose(errors[~np.isnan(errors)], expected)
+    at_m, medians = drawn["Median"]
+    np.testing.assert_allclose(np.nanmean(at_m.reshape(2, 3), axis=1), (0.4, 0.6))
+    np.testing.assert_allclose(
+        np.nanmean(medians.reshape(2, 3), axis=1),
+        [np.median(trial.error_arcmin) for trial in tried.trials],
+    )
+
+
+def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: SessionRecord) -> None:
+    with Session(tried.path) as session:
+        session.delete_alignment(1)
+    panel.show_record(Session.open(tried.path))
+    [table] = panel.findChildren(RecordTable)
+    table.selectRow(1)
+    with qtbot.waitSignal(panel.delete_trial_requested) as asked:
+        tool(panel, "Delete").click()
+    assert asked.args == [3]
+    assert label(panel, "undoText") == "Trial 2 deleted.", "alignments are not of this panel"
+    with qtbot.waitSignal(panel.restore_trial_requested) as asked:
+        QTest.keyClick(panel, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert asked.args == [2]
+
+
+def test_a_finished_session_is_only_looked_at(panel: TrialsPanel, tried: SessionRecord) -> None:
+    panel.set_read_only(True)
+    panel.show_record(tried)
+    assert not tool(panel, "Record trial").isEnabled()
+    assert label(panel, "undoText") == ""
