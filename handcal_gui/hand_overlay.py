@@ -42,7 +42,7 @@ class HandOverlay:
             return
         color = QColor(colors().red if self.is_red else colors().live)
         self._draw_mask(painter, QColor(color))
-        strays_px = _SMOOTHED_PX / painter.transform().m11()
+        strays_px = _SMOOTHED_PX / painter.deviceTransform().m11()
         for points_px, is_cut in contour_runs(self.image_px, self.cloud.contour_is_cut):
             _set_pen(painter, color, Qt.PenStyle.DashLine if is_cut else Qt.PenStyle.SolidLine)
             line_px = cv2.approxPolyDP(points_px.astype(np.float32), strays_px, closed=False)

@@ -69,28 +69,19 @@ class CameraPanel(QWidget):
         self._freeze.setShortcut("F")
         self._freeze.setCheckable(True)
         self._freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        save = QAction("Save picture…", self._pictures)
-        save.triggered.connect(self._ask_where_to_save)
-        self._pictures.addAction(save)
-
         self._mode = QComboBox()
         self._mode.setAccessibleName("Picture shown")
         self._mode.setToolTip("Show the colour picture, the depth picture or both")
         self._mode.addItems(list(Mode))
         self._mode.currentTextChanged.connect(lambda text: self._pictures.set_mode(Mode(text)))
-        top = QHBoxLayout()
-        top.addWidget(self._mode)
-        top.addStretch()
-        top.addWidget(self._freeze)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(top)
-        layout.addWidget(self._pictures, 1)
-        layout.addWidget(self._status)
+        save = QAction("Save picture…", self)
+        save.triggered.connect(self._ask_where_to_save)
+        self.addAction(save)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self._lay_out()
         self._pictures.set_mode(Mode.COLOR)
-        self._draw_icons()
         self._pictures.show_text(message=_EMPTY)
+        self._draw_icons()
 
     def set_mode(self, mode: Mode) -> None:
         """Show the colour picture, the depth picture or both."""
@@ -118,6 +109,18 @@ class CameraPanel(QWidget):
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._draw_icons()
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.addWidget(self._mode)
+        top.addStretch()
+        top.addWidget(self._freeze)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (SPACING_PX,))
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(top)
+        layout.addWidget(self._pictures, 1)
+        layout.addWidget(self._status)
 
     def _draw_icons(self) -> None:
         self._freeze.setIcon(icon("pause"))
@@ -160,7 +163,6 @@ class _Pictures(QWidget):
         self._layout.setSpacing(SPACING_PX)
         self._layout.addWidget(self._color, 1)
         self._layout.addWidget(self._depth_side, 1)
-        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
 
     def set_mode(self, mode: Mode) -> None:
         self._color.setVisible(mode is not Mode.DEPTH)
