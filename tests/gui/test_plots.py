@@ -32,6 +32,14 @@ def test_a_line_has_the_colour_of_its_role_in_light_and_dark(
     assert corner.name() == theme.colors().canvas
 
 
+def test_the_legend_is_readable_after_a_change_to_dark(plot: Plot) -> None:
+    plot.show_legend()
+    plot.add_line("left", name="Left eye")
+    plot.setPalette(QPalette(QColor("#202020")))
+    [(_, label)] = plot.item.legend.items
+    assert plot.palette().windowText().color().name() in label.item.toHtml()
+
+
 def test_lines_of_one_name_are_in_the_legend_once(plot: Plot) -> None:
     plot.show_legend()
     for name in ("Left eye", "Right eye", "Left eye"):
