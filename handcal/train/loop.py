@@ -224,13 +224,13 @@ def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[
 
 
 def _groups(net: HandNet, settings: TrainSettings) -> list[dict[str, Any]]:
-    """Return the trained parameters with their highest rates; biases and scales do not decay."""
+    """Return all parameters with their highest rates; biases and scales do not decay."""
     groups = []
     for pretrained, rate in ((True, settings.backbone_rate), (False, settings.rate)):
         named = [
             parameter
             for name, parameter in net.named_parameters()
-            if parameter.requires_grad and name.startswith("blocks.") == pretrained
+            if name.startswith("blocks.") == pretrained
         ]
         groups += [
             {"params": [p for p in named if p.ndim > 1], "highest": rate},

@@ -50,7 +50,7 @@ class SampleSettings:
         Shares of samples that are simulated pictures, and photographs with a simulated hand.
     """
 
-    side_px: int = 224
+    side_px: int = 192
     whole_px: float = 300.0
     zoomed: float = 0.5
     zoom_max: float = 4.0

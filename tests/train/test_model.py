@@ -1,0 +1,31 @@
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+import torch
+
+from handcal.hand.detect import points
+from handcal.train.model import HandNet
+
+
+def test_one_prediction_for_every_point() -> None:
+    net = HandNet().eval()
+    with torch.inference_mode():
+        raw = net(torch.zeros(2, 3, 64, 96))
+    assert raw.shape == (2, 5, len(points(64, 96)[0]))
+
+
+def test_at_first_nothing_is_a_hand() -> None:
+    net = HandNet().eval()
+    with torch.inference_mode():
+        raw = net(255.0 * torch.rand(1, 3, 64, 64))
+    assert raw[:, 0].sigmoid().numpy() == pytest.approx(np.full((1, 84), 0.01), abs=0.01)
+
+
+def test_the_first_blocks_are_not_trained() -> None:
+    net = HandNet(frozen_blocks=5)
+    net(torch.rand(2, 3, 64, 64)).sum().backward()
+    trained = {name for name, value in net.named_parameters() if value.grad is not None}
+    assert "blocks.4.pointwise.weight" not in trained
+    assert "blocks.5.depthwise.weight" in trained
+    assert "predict.bias" in trained

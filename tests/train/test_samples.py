@@ -1,0 +1,78 @@
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from handcal.evaluate.annotations import Photo
+from handcal.files import write_json
+from handcal.train.samples import Samples, SampleSettings, collate
+
+HAND = (120, 80, 180, 160)
+
+
+def photo(path: Path) -> Photo:
+    """Write a photograph in which the hand is the only thing that is bright."""
+    x0, y0, x1, y1 = HAND
+    image = np.full((300, 400, 3), 30, np.uint8)
+    image[y0:y1, x0:x1] = 220
+    cv2.imwrite(str(path), image)
+    boxes = np.array([HAND], float)
+    quads = np.array([[[x0, y0], [x1, y0], [x1, y1], [x0, y1]]], float)
+    return Photo(path, 400, 300, boxes, quads, np.ones(1, bool))
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Samples]:
+    """Return samples of photographs, of simulated pictures, and of one pasted on the other."""
+    folder = tmp_path_factory.mktemp("pictures")
+    picture = np.zeros((240, 424, 4), np.uint8)
+    picture[60:160, 200:280] = 255
+    cv2.imwrite(str(folder / "00000.png"), picture)
+    write_json(folder / "boxes.json", {"00000.png": [200, 60, 280, 160]})
+    photos = [photo(folder / "photo.png")]
+    return {
+        name: Samples(photos, folder, SampleSettings(simulated=sim, pasted=pasted), seed=1)
+        for name, sim, pasted in (
+            ("photographed", 0.0, 0.0),
+            ("simulated", 1.0, 0.0),
+            ("pasted", 0.0, 1.0),
+        )
+    }
+
+
+@pytest.mark.parametrize("kind", ["photographed", "simulated"])
+def test_boxes_are_where_the_hand_is(samples: dict[str, Samples], kind: str) -> None:
+    checked = 0
+    for index in range(40):
+        image, boxes = samples[kind][index]
+        x0, y0, x1, y1 = boxes[0, :4].round().astype(int) if len(boxes) else (0, 0, 0, 0)
+        gray = image.mean(2)
+        inside, whole = gray[y0 + 3 : y1 - 3, x0 + 3 : x1 - 3], gray.mean()
+        if inside.size > 100 and boxes[0, 4] == 0 and gray.max() > 60:
+            assert inside.mean() > whole
+            checked += 1
+    assert checked > 10
+
+
+def test_a_pasted_hand_is_one_more(samples: dict[str, Samples]) -> None:
+    without = [len(samples["photographed"][index][1]) for index in range(30)]
+    pasted = [len(samples["pasted"][index][1]) for index in range(30)]
+    assert sum(pasted) > sum(without)
+
+
+def test_a_sample_is_the_same_every_time(samples: dict[str, Samples]) -> None:
+    first, again = samples["pasted"][7], samples["pasted"][7]
+    assert (first[0] == again[0]).all()
+    assert (first[1] == again[1]).all()
+    assert (samples["pasted"][8][0] != first[0]).any()
+
+
+def test_a_batch_keeps_pictures_and_boxes_together(samples: dict[str, Samples]) -> None:
+    drawn = [samples["simulated"][index] for index in range(3)]
+    images, boxes = collate(drawn)
+    assert images.shape == (3, 3, 192, 192)
+    assert (images[1].numpy().transpose(1, 2, 0) == drawn[1][0]).all()
+    assert [len(part) for part in boxes] == [len(part) for _, part in drawn]
