@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QMargins, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHeaderView,
-    QTableWidget,
-    QTableWidgetItem,
-    QWidget,
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QMargins,
+    QModelIndex,
+    QPersistentModelIndex,
+    Qt,
+    Signal,
 )
+from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, number_font
 
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
+_NO_INDEX = QModelIndex()
+_MEASURED_ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +32,13 @@ class Column:
     is_number: bool = True
 
 
-class RecordTable(QTableWidget):
+class RecordTable(QTableView):
     """Shows one thing a row.
 
     Parameters
     ----------
     name : str
-        For screen readers and, with dashes, as object name.
+        For screen readers and, in lower case with dashes, as object name.
     columns : sequence of Column
     empty_text : str
         Shown while there is nothing: what will be here, and how it gets there.
@@ -55,27 +58,24 @@ class RecordTable(QTableWidget):
         empty_text: str,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(0, len(columns), parent)
+        super().__init__(parent)
         self.setObjectName(name.lower().replace(" ", "-"))
         self.setAccessibleName(name)
-        self._columns = tuple(columns)
         self._empty_text = empty_text
-        self._rows: dict[int, tuple[str, ...]] = {}
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self._is_read_only = False
+        self._records = _Records(columns)
+        self.setModel(self._records)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setTabKeyNavigation(False)
         self.setWordWrap(False)
         self.verticalHeader().hide()
-        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.horizontalHeader().setHighlightSections(False)
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        for index, column in enumerate(columns):
-            header = QTableWidgetItem(column.title)
-            header.setToolTip(column.tooltip)
-            header.setTextAlignment(_alignment(column))
-            self.setHorizontalHeaderItem(index, header)
+        self.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + SPACING_PX // 2)
+        across = self.horizontalHeader()
+        across.setHighlightSections(False)
+        across.setResizeContentsPrecision(_MEASURED_ROWS)
+        across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.delete_action = QAction("Delete", self)
         self.delete_action.setToolTip("Delete the chosen row (Del); it can be undone")
         self.delete_action.setShortcut(Qt.Key.Key_Delete)
@@ -83,26 +83,18 @@ class RecordTable(QTableWidget):
         self.delete_action.triggered.connect(self._delete)
         self.addAction(self.delete_action)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self.itemSelectionChanged.connect(self._refresh)
-        self._is_read_only = False
+        self.selectionModel().selectionChanged.connect(self._refresh)
         self._refresh()
 
     def show_rows(self, rows: Mapping[int, tuple[str, ...]]) -> None:
         """Show cells by number, in order; a new last one is brought into view."""
-        if dict(rows) == self._rows:
-            return
-        chosen, had_last = self.currentRow(), max(self._rows, default=0)
-        number = self.chosen_number()
-        self._rows = dict(rows)
-        self.setRowCount(len(rows))
-        for row, cells in enumerate(rows.values()):
-            for index, (text, column) in enumerate(zip(cells, self._columns, strict=True)):
-                self.setItem(row, index, _item(text, column))
-        if number in self._rows:
-            chosen = list(self._rows).index(number)
-        if number is not None and self._rows:
-            self.selectRow(min(chosen, len(self._rows) - 1))
-        if max(self._rows, default=0) > had_last:
+        before, numbers = self._records.numbers, list(rows)
+        chosen, row = self.chosen_number(), self.currentIndex().row()
+        self._records.replace(rows)
+        if chosen is not None and numbers:
+            is_there = chosen in rows
+            self.selectRow(numbers.index(chosen) if is_there else min(row, len(numbers) - 1))
+        if max(numbers, default=0) > max(before, default=0):
             self.scrollToBottom()
         self._refresh()
 
@@ -112,14 +104,14 @@ class RecordTable(QTableWidget):
         self._refresh()
 
     def chosen_number(self) -> int | None:
-        """Return the number in the chosen row; None if none is chosen."""
+        """Return the number of the chosen row's thing; None if none is chosen."""
         rows = self.selectionModel().selectedRows()
-        return list(self._rows)[rows[0].row()] if rows else None
+        return self._records.numbers[rows[0].row()] if rows else None
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Say what will be here while there is nothing."""
         super().paintEvent(event)
-        if not self._rows:
+        if not self._records.numbers:
             painter = QPainter(self.viewport())
             painter.setPen(QColor(colors().muted))
             room = self.viewport().rect().marginsRemoved(_EMPTY_MARGINS)
@@ -133,19 +125,59 @@ class RecordTable(QTableWidget):
             self.delete_requested.emit(number)
 
     def _refresh(self) -> None:
-        has_choice = bool(self.selectionModel().selectedRows())
+        has_choice = self.chosen_number() is not None
         self.delete_action.setEnabled(has_choice and not self._is_read_only)
 
 
-def _item(text: str, column: Column) -> QTableWidgetItem:
-    item = QTableWidgetItem(text)
-    item.setToolTip(column.tooltip)
-    item.setTextAlignment(_alignment(column))
-    if column.is_number:
-        item.setFont(number_font())
-    return item
+class _Records(QAbstractTableModel):
+    """The rows as Qt asks for them; items of their own would take half a second for a thousand."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        super().__init__()
+        self.numbers: list[int] = []
+        self._columns = tuple(columns)
+        self._cells: list[tuple[str, ...]] = []
+        self._font = number_font()
+
+    def replace(self, rows: Mapping[int, tuple[str, ...]]) -> None:
+        self.beginResetModel()
+        self.numbers, self._cells = list(rows), list(rows.values())
+        self.endResetModel()
+
+    def rowCount(self, _parent: QModelIndex | QPersistentModelIndex = _NO_INDEX) -> int:
+        return len(self._cells)
+
+    def columnCount(self, _parent: QModelIndex | QPersistentModelIndex = _NO_INDEX) -> int:
+        return len(self._columns)
+
+    def data(
+        self,
+        index: QModelIndex | QPersistentModelIndex,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> object:
+        column = self._columns[index.column()]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._cells[index.row()][index.column()]
+        if role == Qt.ItemDataRole.FontRole and column.is_number:
+            return self._font
+        return _look(column, role)
+
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> object:
+        if orientation == Qt.Orientation.Vertical:
+            return None
+        column = self._columns[section]
+        return column.title if role == Qt.ItemDataRole.DisplayRole else _look(column, role)
 
 
-def _alignment(column: Column) -> Qt.AlignmentFlag:
-    side = Qt.AlignmentFlag.AlignRight if column.is_number else Qt.AlignmentFlag.AlignLeft
-    return side | Qt.AlignmentFlag.AlignVCenter
+def _look(column: Column, role: int) -> object:
+    if role == Qt.ItemDataRole.ToolTipRole:
+        return column.tooltip
+    if role == Qt.ItemDataRole.TextAlignmentRole:
+        side = Qt.AlignmentFlag.AlignRight if column.is_number else Qt.AlignmentFlag.AlignLeft
+        return side | Qt.AlignmentFlag.AlignVCenter
+    return None

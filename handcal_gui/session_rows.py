@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -43,7 +44,7 @@ TRIAL_COLUMNS = (
     Column("Error ′", "Mean over the target's four corners, in arcminutes"),
     Column("Time", "When it was recorded"),
 )
-STATISTICS_COLUMNS = ("Trials", "Mean ± SD ′", "Median ′", "Largest ′", "Mean ± SD px")
+STATISTICS_COLUMNS = ("n", "Mean ± SD ′", "Median ′", "Max ′", "Mean ± SD px")
 
 _DELETED: dict[str, Kind] = {
     SessionEvent.ALIGNMENT_DELETED: "alignment",
@@ -106,6 +107,11 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
             local_time(times[number]),
         )
     return rows
+
+
+def trials_id(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
+    """Return what tells trials from others: a number is never given twice."""
+    return record.path, record.trial_numbers
 
 
 def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:

@@ -28,6 +28,7 @@ from handcal_gui.session_rows import (
     deletions,
     local_time,
     trial_rows,
+    trials_id,
 )
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.undo_strip import UndoStrip
@@ -95,9 +96,10 @@ class SessionPanel(QWidget):
         results : Results or None
             Those of all its alignments, if they are known.
         """
-        self._record, self._results = record, results
+        before, self._record, self._results = self._record, record, results
         self._alignments.show_rows(alignment_rows(record, results))
-        self._trials.show_rows(trial_rows(record))
+        if before is None or trials_id(before) != trials_id(record):
+            self._trials.show_rows(trial_rows(record))
         self._notes.show_saved(record.path, record.notes)
         self._refresh()
 

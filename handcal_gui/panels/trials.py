@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
@@ -32,6 +30,7 @@ from handcal_gui.session_rows import (
     statistics_rows,
     statistics_text,
     trial_rows,
+    trials_id,
 )
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.trial_plot import TrialPlot
@@ -95,7 +94,7 @@ class TrialsPanel(QWidget):
     def show_record(self, record: SessionRecord) -> None:
         """Show the trials of a session."""
         before, self._record = self._record, record
-        if before is None or _trials_of(before) != _trials_of(record):
+        if before is None or trials_id(before) != trials_id(record):
             statistics = summarise(record.trials)
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(statistics))
@@ -189,8 +188,3 @@ class TrialsPanel(QWidget):
         layout.addWidget(tabs, 1)
         layout.addWidget(self._summary)
         layout.addWidget(self._strip)
-
-
-def _trials_of(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
-    """Return what tells trials from others: a number is never given twice."""
-    return record.path, record.trial_numbers

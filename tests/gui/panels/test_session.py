@@ -67,7 +67,7 @@ def test_shows_the_session_of_a_snapshot(
     panel.show_snapshot(snapshot(State.SOLVED))
     assert str(record.path) in texts(panel)
     alignments = table(panel, "alignments")
-    assert alignments.rowCount() == 2
+    assert alignments.model().rowCount() == 2
     assert "–" not in [cell(alignments, 0, column) for column in range(8)]
     panel.show_snapshot(snapshot(State.ALIGN))
     assert cell(alignments, 0, 3) == "–", "the results are gone"
@@ -95,7 +95,7 @@ def test_deletes_and_takes_back(
     with Session(record.path) as session:
         session.delete_alignment(2)
     panel.show_record(Session.open(record.path), None)
-    assert alignments.rowCount() == 1
+    assert alignments.model().rowCount() == 1
     assert undo_text(panel) == "Alignment 2 deleted."
     alignments.setFocus()
     with qtbot.waitSignal(panel.restore_alignment_requested) as asked:
@@ -104,7 +104,7 @@ def test_deletes_and_takes_back(
     with Session(record.path) as session:
         session.restore_alignment(2)
     panel.show_record(Session.open(record.path), None)
-    assert alignments.rowCount() == 2
+    assert alignments.model().rowCount() == 2
     assert undo_text(panel) == ""
     assert not tool(panel, "Undo").isVisible()
 

@@ -111,7 +111,7 @@ def test_takes_the_eyes_in_turn(
 def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -> None:
     panel.show_record(tried)
     [table] = panel.findChildren(RecordTable)
-    numbers = [table.model().index(row, 0).data() for row in range(table.rowCount())]
+    numbers = [table.model().index(row, 0).data() for row in range(table.model().rowCount())]
     assert numbers == ["1", "3"]
     mean = np.concatenate([trial.error_arcmin for trial in tried.trials]).mean()
     assert label(panel, "summary").startswith(f"2 trials: {mean:.1f} ±")
