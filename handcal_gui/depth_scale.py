@@ -71,22 +71,29 @@ def _levels(gate_m: tuple[float, float]) -> UInt8:
 class DepthLegend(QWidget):
     """The scale, with the gate's ends marked."""
 
-    def __init__(self, depth_colors: DepthColors, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._colors = depth_colors
-        low_m, high_m = depth_colors.gate_m
+        self._colors: DepthColors | None = None
         self.setObjectName("depth-legend")
         self.setAccessibleName("Scale of depth")
-        self.setToolTip(
-            f"Depth in metres. A hand is looked for from {low_m:.2f} to {high_m:.2f} m, "
-            "in colour; what is nearer or farther is grey, what was not measured black."
-        )
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         width_px = self.fontMetrics().horizontalAdvance("0.00 m")
         self.setFixedWidth(_BAR_PX + SPACING_PX + width_px)
 
+    def show_colors(self, depth_colors: DepthColors) -> None:
+        """Show what colours mean."""
+        self._colors = depth_colors
+        low_m, high_m = depth_colors.gate_m
+        self.setToolTip(
+            f"Depth in metres. A hand is looked for from {low_m:.2f} to {high_m:.2f} m, "
+            "in colour; what is nearer or farther is grey, what was not measured black."
+        )
+        self.update()
+
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the bar from near, at the top, to far, and its marks."""
+        if self._colors is None:
+            return
         painter = QPainter(self)
         line_px = self.fontMetrics().height()
         bar = QRectF(0, line_px / 2, _BAR_PX, self.height() - line_px)

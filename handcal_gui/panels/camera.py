@@ -51,17 +51,15 @@ class CameraPanel(QWidget):
 
     Parameters
     ----------
-    settings : SegmentSettings
-        Whose depth gate is marked.
     parent : QWidget or None
     """
 
-    def __init__(self, settings: SegmentSettings, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("camera-panel")
         self._frame: Frame | None = None
         self._caption = ""
-        self._pictures = _Pictures(DepthColors((settings.depth_min_m, settings.depth_max_m)))
+        self._pictures = _Pictures()
         self._status = _Status()
         self._freeze = QToolButton()
         self._freeze.setText("Freeze")
@@ -80,8 +78,15 @@ class CameraPanel(QWidget):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._lay_out()
         self._pictures.set_mode(Mode.COLOR)
-        self._pictures.show_text(message=_EMPTY)
         self._draw_icons()
+        self.begin(SegmentSettings())
+
+    def begin(self, settings: SegmentSettings) -> None:
+        """Forget what was shown, and mark the depth gate of a session's settings."""
+        self._frame = None
+        self._freeze.setChecked(False)
+        self._pictures.begin(DepthColors((settings.depth_min_m, settings.depth_max_m)))
+        self._pictures.show_text(message=_EMPTY)
 
     def set_mode(self, mode: Mode) -> None:
         """Show the colour picture, the depth picture or both."""
@@ -147,22 +152,29 @@ class CameraPanel(QWidget):
 class _Pictures(QWidget):
     """The two pictures, beside or below each other, whichever lets them be larger."""
 
-    def __init__(self, depth_colors: DepthColors) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._depth_colors = depth_colors
         self._color = ImageView("Colour picture")
-        self._depth = ImageView("Depth picture", depth_colors.colorize)
+        self._depth = ImageView("Depth picture", lambda depth: self._depth_colors.colorize(depth))
+        self._legend = DepthLegend()
         self._depth_side = QWidget()
         depth_layout = QHBoxLayout(self._depth_side)
         depth_layout.setContentsMargins(0, 0, 0, 0)
         depth_layout.setSpacing(SPACING_PX // 2)
         depth_layout.addWidget(self._depth, 1)
-        depth_layout.addWidget(DepthLegend(depth_colors))
+        depth_layout.addWidget(self._legend)
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(SPACING_PX)
         self._layout.addWidget(self._color, 1)
         self._layout.addWidget(self._depth_side, 1)
+
+    def begin(self, depth_colors: DepthColors) -> None:
+        self._depth_colors = depth_colors
+        self._legend.show_colors(depth_colors)
+        for view in (self._color, self._depth):
+            view.show_image(None)
+            view.show_overlay(None)
 
     def set_mode(self, mode: Mode) -> None:
         self._color.setVisible(mode is not Mode.DEPTH)

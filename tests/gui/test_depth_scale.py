@@ -54,8 +54,9 @@ def test_the_ramp_is_what_depths_are_drawn_in() -> None:
 
 
 def test_the_legend_names_the_gate(qtbot: QtBot) -> None:
-    legend = DepthLegend(DepthColors(GATE_M))
+    legend = DepthLegend()
     qtbot.addWidget(legend)
+    legend.show_colors(DepthColors(GATE_M))
     assert "0.35 to 0.70 m" in legend.toolTip()
     legend.resize(legend.width(), 200)
     picture = legend.grab().toImage()

@@ -15,6 +15,7 @@ from handcal.errors import FileError
 from handcal.geometry import rigid
 from handcal.hand.settings import SegmentSettings
 from handcal.snapshot import Snapshot
+from handcal_gui.depth_scale import DepthLegend
 from handcal_gui.image_view import ImageView
 from handcal_gui.panels.camera import CameraPanel, Mode
 
@@ -25,7 +26,7 @@ Maker = Callable[..., Snapshot]
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> CameraPanel:
-    panel = CameraPanel(SegmentSettings())
+    panel = CameraPanel()
     qtbot.addWidget(panel)
     panel.resize(380, 300)
     panel.show()
@@ -192,6 +193,22 @@ def test_f_freezes_the_picture_but_not_the_numbers(
     freeze.click()
     panel.show_snapshot(snapshot(number=4, **later))
     assert picture(panel) != before
+
+
+def test_another_session_begins_without_a_picture_and_with_its_own_gate(
+    panel: CameraPanel, snapshot: Maker
+) -> None:
+    panel.set_mode(Mode.DEPTH)
+    empty = picture(panel, "depth")
+    panel.show_snapshot(snapshot())
+    hand_in_gate = picture(panel, "depth")
+    panel.begin(SegmentSettings(depth_min_m=0.6, depth_max_m=0.9))
+    assert picture(panel, "depth") == empty
+    legend = panel.findChild(DepthLegend)
+    assert legend is not None
+    assert "0.60 to 0.90 m" in legend.toolTip()
+    panel.show_snapshot(snapshot())
+    assert picture(panel, "depth") != hand_in_gate
 
 
 def test_a_picture_can_be_saved(panel: CameraPanel, snapshot: Maker, tmp_path: Path) -> None:
