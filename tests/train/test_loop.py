@@ -1,0 +1,91 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+import torch
+
+from handcal.evaluate.annotations import Photo
+from handcal.files import make_folder, write_json
+from handcal.train.loop import Pace, Training, TrainSettings, split
+from handcal.train.model import HandNet
+from handcal.train.samples import SampleSettings
+
+SETTINGS = TrainSettings(
+    steps=4,
+    batch=2,
+    validated=0.25,
+    samples=SampleSettings(side_px=64, simulated=0.0, pasted=0.0),
+)
+PACE = Pace(checkpoint_s=0.0, validate_steps=100, workers=0)
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory: pytest.TempPathFactory) -> list[Photo]:
+    folder = tmp_path_factory.mktemp("photos")
+    rng = np.random.default_rng(0)
+    written = []
+    for number in range(4):
+        path = folder / f"{number}.png"
+        cv2.imwrite(str(path), rng.integers(0, 256, (64, 96, 3), np.uint8))
+        box = np.array([[10.0, 10.0, 50.0, 40.0]])
+        quad = np.array([[[10.0, 10.0], [50.0, 10.0], [50.0, 40.0], [10.0, 40.0]]])
+        written.append(Photo(path, 96, 64, box, quad, np.ones(1, bool)))
+    write_json(folder / "boxes.json", {})
+    return written
+
+
+def training(folder: Path) -> Training:
+    torch.manual_seed(0)
+    return Training(HandNet(), make_folder(folder), SETTINGS, PACE)
+
+
+def trained(folder: Path, photos: list[Photo]) -> dict[str, Any]:
+    return training(folder).run(photos, photos[0].path.parent).state_dict()
+
+
+def test_an_interrupted_training_ends_as_an_uninterrupted_one(
+    tmp_path: Path, photos: list[Photo], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = trained(tmp_path / "whole", photos)
+
+    learn, steps = Training._learn, list[int]()
+
+    def interrupted(self: Training, *batch: Any) -> list[float]:
+        if len(steps) == 2:
+            raise KeyboardInterrupt
+        steps.append(1)
+        return learn(self, *batch)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "_learn", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            trained(tmp_path / "parts", photos)
+    resumed = trained(tmp_path / "parts", photos)
+    assert all((resumed[name] == value).all() for name, value in whole.items())
+
+
+def test_progress_is_logged(tmp_path: Path, photos: list[Photo]) -> None:
+    trained(tmp_path, photos)
+    lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert lines[-1]["step"] == 4
+    assert 0.0 <= lines[-1]["ap50"] <= 1.0
+
+
+def test_the_weights_that_are_trained_change(tmp_path: Path, photos: list[Photo]) -> None:
+    torch.manual_seed(0)
+    start = HandNet().state_dict()
+    end = trained(tmp_path, photos)
+    assert (start["blocks.12.pointwise.weight"] != end["blocks.12.pointwise.weight"]).any()
+    assert (start["blocks.0.pointwise.weight"] == end["blocks.0.pointwise.weight"]).all()
+
+
+def test_the_same_tenth_is_kept_aside_every_time(photos: list[Photo]) -> None:
+    many = photos * 10
+    trained_on, aside = split(many, 0.1)
+    assert (len(trained_on), len(aside)) == (36, 4)
+    assert split(many, 0.1)[1] == aside
