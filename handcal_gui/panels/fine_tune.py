@@ -84,7 +84,7 @@ class FineTunePanel(QWidget):
         self._sign_name = "wait"
         self._stream = ShiftStream(self)
         self._stream.sent.connect(self.shift_changed)
-        self._stream.settled.connect(self._settle)
+        self._stream.settled.connect(self._end_burst)
         self._make_editors()
         self._make_actions()
         self._make_depths()
@@ -94,10 +94,35 @@ class FineTunePanel(QWidget):
         self._say("wait", self._why_not)
         self._refresh()
 
+    @property
+    def step_m(self) -> float:
+        """By how much the arrows move, in metres."""
+        step_m: float = self._steps.checkedAction().data()
+        return step_m
+
+    def set_step_m(self, step_m: float) -> None:
+        """Take the nearest of the steps that there are."""
+        min(self._steps.actions(), key=lambda step: abs(step.data() - step_m)).trigger()
+
     def set_rig(self, rig: Rig) -> None:
-        """Take the offline calibration whose displays draw."""
+        """Begin with another wearer or headset.
+
+        Parameters
+        ----------
+        rig : Rig
+            The offline calibration whose displays draw.
+        """
         self._rig = rig
+        self._begin(_OFFLINE)
         self._refresh()
+
+    def settle(self) -> None:
+        """Let the headset have φ as set, at once: nothing waits, nothing else is shown."""
+        if self._shown() is not None:
+            self._stop_showing()
+            self._stream.preview(self._history.present)
+            self._refresh()
+        self._stream.flush()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show what the headset renders with, unless it was set here, and whether it has it."""
@@ -106,9 +131,7 @@ class FineTunePanel(QWidget):
         why_not = _why_not(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
-            self._history = ShiftHistory(snapshot.procedure.applied_shift_m)
-            self._burst = None
-            self._stop_showing()
+            self._begin(snapshot.procedure.applied_shift_m)
         if is_new or why_not != self._why_not or not same_shifts(solved, self._solved):
             self._why_not, self._solved = why_not, solved
             self._refresh()
@@ -122,16 +145,12 @@ class FineTunePanel(QWidget):
         elif self._is_editable():
             axis, direction = move
             eye = next(eye for eye in EYES if self._editors[eye].chosen.isChecked())
-            self._move(eye, axis, 1e-3 * direction * self._step_mm())
+            self._move(eye, axis, direction * self.step_m)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Leave the headset with φ as set."""
         super().hideEvent(event)
-        if self._shown() is not None:
-            self._stop_showing()
-            self._stream.preview(self._history.present)
-            self._refresh()
-        self._stream.flush()
+        self.settle()
 
     def changeEvent(self, event: QEvent) -> None:
         """Redraw the icons when the colours change."""
@@ -143,6 +162,11 @@ class FineTunePanel(QWidget):
         for action, name in ((self._undo, "undo"), (self._redo, "redo")):
             action.setIcon(icon(name))
         self._sign.setPixmap(icon(self._sign_name).pixmap(2 * SPACING_PX))
+
+    def _begin(self, shifts_m: Shifts) -> None:
+        self._history = ShiftHistory(shifts_m)
+        self._burst = None
+        self._stop_showing()
 
     def _edit(self, eye: Eye, axis: int, value_m: float) -> None:
         self._move(eye, axis, value_m - float(self._history.present[eye][axis]))
@@ -169,7 +193,7 @@ class FineTunePanel(QWidget):
         self._stream.put(self._history.present)
         self._refresh()
 
-    def _settle(self) -> None:
+    def _end_burst(self) -> None:
         self._burst = None
         self.shift_settled.emit()
 
@@ -191,10 +215,6 @@ class FineTunePanel(QWidget):
         for action in (self._show_solved, self._show_offline):
             action.setChecked(False)
 
-    def _step_mm(self) -> float:
-        step_mm: float = self._steps.checkedAction().data()
-        return step_mm
-
     def _is_editable(self) -> bool:
         return not self._why_not and self._shown() is None
 
@@ -209,7 +229,8 @@ class FineTunePanel(QWidget):
         self._reset_offline.setEnabled(is_editable)
         self._reset_solved.setEnabled(is_editable and bool(self._solved))
         self._show_offline.setEnabled(is_ready)
-        self._show_solved.setEnabled(is_ready and bool(self._solved))
+        can_end = self._show_solved.isChecked()
+        self._show_solved.setEnabled(is_ready and (bool(self._solved) or can_end))
         self._against.setText(f"against the {'solved' if self._solved else 'offline'} φ")
 
     def _effect(self, eye: Eye) -> DrawnMove | None:
@@ -262,7 +283,7 @@ class FineTunePanel(QWidget):
         for key, step_mm in enumerate(_STEPS_MM, 1):
             step = add(f"{step_mm:g}", str(key), f"Arrows move by {step_mm:g} mm")
             step.setCheckable(True)
-            step.setData(step_mm)
+            step.setData(1e-3 * step_mm)
             self._steps.addAction(step)
         add("Other eye", "E", "").triggered.connect(self._change_eye)
 
@@ -276,7 +297,7 @@ class FineTunePanel(QWidget):
 
     def _set_step(self) -> None:
         for editor in self._editors.values():
-            editor.set_step_mm(self._step_mm())
+            editor.set_step_mm(1e3 * self.step_m)
 
     def _make_depths(self) -> None:
         self._depth = QComboBox()

@@ -204,6 +204,20 @@ def test_the_step_is_that_of_the_fields_too(qtbot: QtBot, panel: FineTunePanel, 
     assert field(panel, "left", 1).value() == 2.5
 
 
+def test_takes_the_nearest_step(panel: FineTunePanel) -> None:
+    panel.set_step_m(4e-4)
+    assert panel.step_m == 5e-4
+    assert action(panel, "0.5").isChecked()
+
+
+def test_begins_anew_with_another_wearer(panel: FineTunePanel, show: Show, rig: Rig) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    panel.set_rig(rig)
+    assert fields_mm(panel, "left") == [0.0, 0.0, 0.0]
+    assert not action(panel, "Undo").isEnabled()
+
+
 def test_undo_and_redo(
     qtbot: QtBot, panel: FineTunePanel, show: Show, results: Results, sent: list[Shifts]
 ) -> None:
@@ -295,6 +309,29 @@ def test_only_one_is_shown_instead(
     assert not action(panel, "Show offline").isChecked()
     solved_m = {eye: results.shifts[eye].shift_m for eye in EYES}
     qtbot.waitUntil(lambda: bool(sent) and same_shifts(sent[-1], solved_m))
+
+
+def test_showing_solved_can_be_ended_when_nothing_is_solved_any_more(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, sent: list[Shifts]
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    QTest.keyClick(panel, Qt.Key.Key_S)
+    qtbot.waitUntil(lambda: len(sent) > 1)
+    show(procedure={"results": None, "applied_shift_m": sent[-1]})
+    action(panel, "Show solved").trigger()
+    qtbot.waitUntil(lambda: sent[-1]["left"][0] == pytest.approx(0.004))
+    assert field(panel, "left", 1).isEnabled()
+
+
+def test_settles_at_once_before_a_trial(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, sent: list[Shifts]
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    with qtbot.waitSignal(panel.shift_settled):
+        panel.settle()
+    assert [shifts_m["left"][0] for shifts_m in sent] == pytest.approx([0.004])
 
 
 def test_a_hidden_panel_leaves_the_headset_with_what_was_set(
