@@ -38,7 +38,10 @@ def write_archive(
     """
     folder = record.path.absolute()
     try:
-        sizes = {file: file.stat().st_size for file in _files(folder, excluded.absolute())}
+        sizes = {
+            found: 0 if found.is_dir() else found.stat().st_size
+            for found in _contents(folder, excluded.absolute())
+        }
         sizes[folder / "journal.jsonl"] = record.journal_bytes
         total_bytes = sum(sizes.values())
         if total_bytes > MAX_ARCHIVE_BYTES:
@@ -49,9 +52,12 @@ def write_archive(
         with path.open("xb") as stream:
             done_bytes = 0
             with zipfile.ZipFile(stream, "w") as archive:
-                for file, left_bytes in sizes.items():
-                    entry = _entry(file.relative_to(folder.parent))
-                    with file.open("rb") as source, archive.open(entry, "w") as target:
+                for found, left_bytes in sizes.items():
+                    name = found.relative_to(folder.parent).as_posix()
+                    if found.is_dir():
+                        archive.writestr(_entry(f"{name}/"), b"")
+                        continue
+                    with found.open("rb") as source, archive.open(_entry(name), "w") as target:
                         while chunk := source.read(min(left_bytes, _CHUNK_BYTES)):
                             target.write(chunk)
                             left_bytes -= len(chunk)
@@ -63,19 +69,20 @@ def write_archive(
         raise FileError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def _files(folder: Path, excluded: Path) -> Iterator[Path]:
-    """Yield the files of a session, in order."""
+def _contents(folder: Path, excluded: Path) -> Iterator[Path]:
+    """Yield what is in a session's folder, in order."""
     for path in sorted(folder.iterdir()):
-        if path.is_symlink() or path.name.startswith(".") or path.absolute() == excluded:
+        if path.is_symlink() or path.name.startswith(".") or path == excluded:
             continue
         if path.is_dir():
-            yield from _files(path, excluded)
+            yield path
+            yield from _contents(path, excluded)
         elif path.is_file() and path.name != "lock":
             yield path
 
 
-def _entry(name: Path) -> zipfile.ZipInfo:
-    entry = zipfile.ZipInfo(name.as_posix())  # of 1980: equal bytes whenever it is written
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name)  # of 1980: equal bytes whenever it is written
     entry.compress_type = zipfile.ZIP_DEFLATED
-    entry.external_attr = 0o644 << 16
+    entry.external_attr = (0o40755 << 16) | 0x10 if entry.is_dir() else 0o100644 << 16
     return entry

@@ -18,7 +18,7 @@ from handcal.conventions import (
     openxr_view,
     unity_world_to_camera,
 )
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, Outcome, printable
 from handcal.files import write_atomic, write_json
 from handcal.rig.rig_file import quoted
 from handcal.types import EYES, Eye, Projection
@@ -82,7 +82,7 @@ def write_calibration_json(path: Path, outcome: Outcome, near_m: float, far_m: f
 def _whose(outcome: Outcome) -> dict[str, str]:
     return {
         "session": outcome.name,
-        "wearer": outcome.record.wearer,
+        "wearer": printable(outcome.record.wearer),
         "started_utc": outcome.started,
         "rig": outcome.record.rig.name,
         "handcal_version": version("handcal"),

@@ -20,6 +20,7 @@ Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 
 # Solved again by another version of NumPy, φ differs by rounding.
 _SAME_M = 1e-7
+_MAX_CHARACTERS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,12 +47,12 @@ class Outcome:
     @property
     def name(self) -> str:
         """The session's name: that of its folder."""
-        return self.record.path.absolute().name
+        return printable(self.record.path.absolute().name)
 
     @property
     def started(self) -> str:
         """When the session was created, UTC, ISO 8601."""
-        return self.record.events[0].time
+        return printable(self.record.events[0].time)
 
     def final(self, eye: Eye) -> Origin:
         """Return which φ is the eye's final one."""
@@ -91,6 +92,11 @@ def conclude(record: SessionRecord) -> Outcome:
     return Outcome(
         record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
     )
+
+
+def printable(text: str) -> str:
+    """Return a text from elsewhere as one line that every format can hold."""
+    return "".join(char if char.isprintable() else "\ufffd" for char in text[:_MAX_CHARACTERS])
 
 
 def _shifts_m(record: SessionRecord, results: Results | None, eye: Eye) -> dict[Origin, Float64]:

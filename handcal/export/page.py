@@ -29,6 +29,8 @@ _GREY = "0.45"
 _NO_BREAK = "\u00a0"
 # So many characters of a cell count for its column's width.
 _MEASURED = 300
+# So many lines are shown of a cell.
+_CELL_LINES = 20
 _CAPTION_MM = 9.0
 # Inside a cell of axes: room for tick labels and titles.
 _AXES_LEFT_MM, _AXES_RIGHT_MM, _AXES_TOP_MM, _AXES_BOTTOM_MM = 13.0, 3.0, 6.0, 10.0
@@ -158,7 +160,7 @@ class Document:
         left_mm = _MARGIN_MM
         for column, width_mm, cell in zip(columns, widths_mm, cells, strict=True):
             x_mm = left_mm + (width_mm - _CELL_PAD_MM if column.align == "right" else _CELL_PAD_MM)
-            lines = _wrap(cell, _TABLE_PT, weight, width_mm - 2 * _CELL_PAD_MM)
+            lines = _cell_lines(cell, weight, width_mm)
             for number, line in enumerate(lines):
                 y_mm = self._y_mm + _CELL_PAD_MM + number * _line_mm(_TABLE_PT)
                 style = {"weight": weight, "ha": column.align}
@@ -220,10 +222,10 @@ def _column_widths_mm(columns: Sequence[Column], rows: Sequence[Sequence[str]]) 
         least_mm.append(pad_mm + max((_width_mm(w, _TABLE_PT, "bold") for w in words), default=0.0))
         most_mm.append(pad_mm + max(_width_mm(text, _TABLE_PT, "bold") for text in texts))
     left_mm = CONTENT_MM - sum(most_mm)
+    if sum(least_mm) > CONTENT_MM:
+        return [CONTENT_MM * width_mm / sum(least_mm) for width_mm in least_mm]
     if left_mm < 0.0:
         share = (CONTENT_MM - sum(least_mm)) / (sum(most_mm) - sum(least_mm))
-        if share < 0.0:
-            return [CONTENT_MM * width_mm / sum(least_mm) for width_mm in least_mm]
         pairs = zip(least_mm, most_mm, strict=True)
         return [least + share * (most - least) for least, most in pairs]
     if columns[-1].align == "left":
@@ -231,11 +233,16 @@ def _column_widths_mm(columns: Sequence[Column], rows: Sequence[Sequence[str]]) 
     return [width_mm + left_mm / len(columns) for width_mm in most_mm]
 
 
+def _cell_lines(cell: str, weight: str, width_mm: float) -> list[str]:
+    lines = _wrap(cell, _TABLE_PT, weight, width_mm - 2 * _CELL_PAD_MM)
+    return lines if len(lines) <= _CELL_LINES else [*lines[: _CELL_LINES - 1], "…"]
+
+
 def _row_height_mm(
     widths_mm: Sequence[float], cells: Sequence[str], weight: str = "normal"
 ) -> float:
     lines = max(
-        len(_wrap(cell, _TABLE_PT, weight, width_mm - 2 * _CELL_PAD_MM))
+        len(_cell_lines(cell, weight, width_mm))
         for cell, width_mm in zip(cells, widths_mm, strict=True)
     )
     return lines * _line_mm(_TABLE_PT) + 2 * _CELL_PAD_MM

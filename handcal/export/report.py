@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib
 import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
 
 from handcal.export import figures
 from handcal.export.definitions import DEFINITIONS
@@ -52,21 +53,27 @@ def write_report(path: Path, outcome: Outcome, checkpoint: Callable[[float], Non
     checkpoint : callable
         Told the share done, many times a second; what it raises ends the writing.
     """
+    pages = compose(outcome, lambda share: checkpoint(0.4 * share))
+    stream = _CheckedStream(checkpoint, 0.4)
     # TrueType rather than Type 3, which publishers refuse; pictures at 200 dots an inch.
     with matplotlib.rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
-        document = Document(f"{outcome.name} · {outcome.record.wearer or 'wearer not named'}")
-        sections = list(_sections(document, outcome))
-        for done, section in enumerate(sections):
-            checkpoint(0.4 * done / len(sections))
-            section()
-        pages = document.finish()
-        stream = _CheckedStream(checkpoint, 0.4)
-        with PdfPages(stream, metadata=_metadata(outcome)) as pdf:
-            for done, page in enumerate(pages):
-                stream.share = 0.4 + 0.5 * done / len(pages)
-                pdf.savefig(page)
-            stream.share = 0.9
+        pdf: Any = PdfPages(stream, metadata=_metadata(outcome))
+        for done, page in enumerate(pages):
+            stream.share = 0.4 + 0.5 * done / len(pages)
+            pdf.savefig(page)
+        stream.share = 0.9
+        pdf.close()  # not after an error: it would go on writing
     write_atomic(path, stream.getvalue())
+
+
+def compose(outcome: Outcome, checkpoint: Callable[[float], None]) -> list[Figure]:
+    """Return the report's pages; arguments as `write_report`."""
+    document = Document(f"{outcome.name} · {outcome.record.wearer or 'wearer not named'}")
+    sections = list(_sections(document, outcome))
+    for done, section in enumerate(sections):
+        checkpoint(done / len(sections))
+        section()
+    return document.finish()
 
 
 class _CheckedStream(io.BytesIO):

@@ -1,0 +1,206 @@
+"""A whole export: all of it or nothing, whatever happens in between."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.config import read_settings, settings_json
+from handcal.errors import CancelledError, FileError
+from handcal.export.export import ExportSettings, export_session
+from handcal.export.formats import FORMATS, Format
+from handcal.session import SessionRecord
+
+resource = pytest.importorskip("resource")
+
+ALL_FILES = {
+    "report.pdf",
+    "parameters.csv",
+    "trials.csv",
+    "calibration.yaml",
+    "calibration.json",
+    "clouds/alignment-1-cursor.ply",
+    "clouds/alignment-1-hand.ply",
+    "clouds/alignment-3-cursor.ply",
+    "clouds/alignment-3-hand.ply",
+    "session.zip",
+}
+LIGHT: tuple[Format, ...] = ("csv", "yaml", "json", "ply", "zip")
+# Exports a session, and is killed when half of it is done.
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from handcal.export.export import ExportSettings, export_session
+from handcal.session import Session
+
+def report(what, share):
+    if share > 0.5:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+settings = ExportSettings(("csv", "yaml", "json", "ply", "zip"))
+export_session(Session.open(Path(sys.argv[1])), Path(sys.argv[2]), settings, report, lambda: False)
+"""
+
+
+def ignore(_what: str, _share: float) -> None:
+    """Go on."""
+
+
+def never() -> bool:
+    return False
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_everything_is_exported_and_told(tmp_path: Path, record: SessionRecord) -> None:
+    told: list[tuple[str, float]] = []
+    asked_s = [time.process_time()]
+
+    def ask() -> bool:
+        asked_s.append(time.process_time())
+        return False
+
+    files = export_session(
+        record, tmp_path / "out", ExportSettings(), lambda *step: told.append(step), ask
+    )
+    assert {path.relative_to(tmp_path / "out").as_posix() for path in files} == ALL_FILES
+    assert set(tree(tmp_path)) == {f"out/{name}" for name in ALL_FILES}
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert {what for what, _ in told} > {info.title for info in FORMATS.values()}
+    assert np.diff(asked_s).max() < 2.0  # about 0.3 s of work; matplotlib's import takes longest
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_a_format_writes_what_its_patterns_say(
+    tmp_path: Path, record: SessionRecord, name: Format
+) -> None:
+    files = export_session(record, tmp_path, ExportSettings((name,)), ignore, never)
+    matched = [path for pattern in FORMATS[name].patterns for path in tmp_path.glob(pattern)]
+    assert sorted(matched) == sorted(files)
+    assert set(tree(tmp_path)) <= ALL_FILES
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_giving_up_at_any_time_leaves_all_as_it_was(
+    tmp_path: Path, record: SessionRecord, name: Format
+) -> None:
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "report.pdf").write_text("old")
+    before = tree(tmp_path)
+    for after in (0, 1, 2):
+        for folder in (tmp_path / "old", tmp_path / "new"):
+            give_up = partial(next, iter([False] * after), True)
+            with pytest.raises(CancelledError, match="nothing has changed"):
+                export_session(record, folder, ExportSettings((name,)), ignore, give_up)
+    assert tree(tmp_path) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_full_disk_leaves_all_as_it_was(tmp_path: Path, record: SessionRecord) -> None:
+    export_session(record, tmp_path / "out", ExportSettings(("csv",)), ignore, never)
+    before = tree(tmp_path)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        for name in ("ply", "zip"):
+            settings = ExportSettings(("csv", name))
+            with pytest.raises(FileError, match="cannot write"):
+                export_session(record, tmp_path / "out", settings, ignore, never)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert tree(tmp_path) == before
+
+
+def test_a_killed_export_leaves_nothing_that_is_seen_and_the_next_cleans_up(
+    tmp_path: Path, record: SessionRecord
+) -> None:
+    folder = tmp_path / "out"
+    export_session(record, folder, ExportSettings(("csv",)), ignore, never)
+    before = tree(folder)
+    (tmp_path / "new").mkdir()
+    for target in (folder, tmp_path / "new" / "one"):
+        run = subprocess.run(
+            [sys.executable, "-c", KILLED, str(record.path), str(target)],
+            check=False,
+            env=os.environ | {"OMP_NUM_THREADS": "1"},
+        )
+        assert run.returncode == -signal.SIGKILL
+    seen = {name: text for name, text in tree(folder).items() if not name.startswith(".")}
+    assert seen == before
+    assert all(path.name.startswith(".") for path in (tmp_path / "new").iterdir())
+    export_session(record, folder, ExportSettings(("json",)), ignore, never)
+    assert set(tree(folder)) == {*before, "calibration.json"}
+
+
+def test_a_new_export_replaces_the_old_one_of_its_formats(
+    tmp_path: Path, record: SessionRecord
+) -> None:
+    export_session(record, tmp_path, ExportSettings(("csv", "ply")), ignore, never)
+    fewer = replace(record, alignments=record.alignments[:1], alignment_numbers=(1,))
+    export_session(fewer, tmp_path, ExportSettings(("ply",)), ignore, never)
+    assert set(tree(tmp_path)) == {
+        "clouds/alignment-1-cursor.ply",
+        "clouds/alignment-1-hand.ply",
+        "parameters.csv",
+        "trials.csv",
+    }
+
+
+def test_a_session_without_alignments_is_exported_too(tmp_path: Path, empty: SessionRecord) -> None:
+    export_session(empty, tmp_path, ExportSettings(), ignore, never)
+    assert set(tree(tmp_path)) == {name for name in ALL_FILES if "clouds" not in name}
+
+
+def test_what_cannot_be_solved_is_not_exported(tmp_path: Path, record: SessionRecord) -> None:
+    bare = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
+    broken = replace(record, alignments=(bare,), alignment_numbers=(1,))
+    with pytest.raises(FileError, match="cannot be solved"):
+        export_session(broken, tmp_path / "out", ExportSettings(), ignore, never)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_session_itself_stays_as_it_is(tmp_path: Path, record: SessionRecord) -> None:
+    before = tree(record.path)
+    export_session(record, tmp_path, ExportSettings(LIGHT), ignore, never)
+    assert tree(record.path) == before
+
+
+def test_settings_come_back_from_json() -> None:
+    settings = ExportSettings(("csv", "json"), near_m=0.2, far_m=20.0)
+    stored = json.loads(json.dumps(settings_json(settings)))
+    assert read_settings(ExportSettings, stored) == settings
+
+
+@pytest.mark.parametrize(
+    ("formats", "near_m", "far_m", "problem"),
+    [
+        ((), 0.1, 1.0, "choose formats from report, csv"),
+        (("docx",), 0.1, 1.0, "choose formats"),
+        (("csv",), 0.0, 1.0, "near_m < far_m is needed, got 0 and 1"),
+        (("csv",), 1.0, 0.5, "near_m < far_m"),
+        (("csv",), 1.0, float("inf"), "near_m < far_m"),
+    ],
+)
+def test_bad_settings_are_refused(
+    formats: tuple[Format, ...], near_m: float, far_m: float, problem: str
+) -> None:
+    with pytest.raises(ValueError, match=problem):
+        ExportSettings(formats, near_m, far_m)

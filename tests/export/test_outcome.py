@@ -1,0 +1,59 @@
+"""What is solved again, and which φ is final."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.display import projection_matrix
+from handcal.errors import FileError
+from handcal.export.outcome import Outcome, conclude
+from handcal.results import results_json
+from handcal.session import SessionRecord
+
+
+def test_the_session_is_solved_to_what_it_was(outcome: Outcome) -> None:
+    assert outcome.results is not None
+    assert results_json(outcome.results) == outcome.record.results
+
+
+def test_what_was_tuned_by_hand_is_final_and_what_was_solved_otherwise(outcome: Outcome) -> None:
+    assert list(outcome.shifts_m["left"]) == ["fine_tuned", "solved", "offline"]
+    assert list(outcome.shifts_m["right"]) == ["solved", "offline"]
+    assert (outcome.final("left"), outcome.final("right")) == ("fine_tuned", "solved")
+    moved_m = outcome.final_shift_m("left") - outcome.shifts_m["left"]["solved"]
+    np.testing.assert_allclose(moved_m, [0.001, 0.0, 0.0], atol=1e-15)
+
+
+def test_applied_is_what_the_headset_rendered_with_in_the_end(outcome: Outcome) -> None:
+    assert outcome.is_applied("left", "fine_tuned")
+    assert not outcome.is_applied("left", "solved")
+    assert outcome.is_applied("right", "solved")
+    assert not outcome.is_applied("right", "offline")
+    never = conclude(replace(outcome.record, applied_shift_m={}, fine_tuned=None))
+    assert never.final("left") == "solved"
+    assert not never.is_applied("left", "solved")
+    assert never.is_applied("left", "offline")
+
+
+def test_projections_are_those_of_each_shift(outcome: Outcome) -> None:
+    display = outcome.record.rig.eyes["left"]
+    for origin, shift_m in outcome.shifts_m["left"].items():
+        projection = outcome.projection("left", origin)
+        assert np.array_equal(projection.P, projection_matrix(display, shift_m))
+        assert projection.width_px == display.width_px
+
+
+def test_without_alignments_there_is_only_the_offline_calibration(empty: SessionRecord) -> None:
+    outcome = conclude(empty)
+    assert outcome.results is None
+    assert outcome.final("left") == "offline"
+    assert outcome.is_applied("left", "offline")
+
+
+def test_what_cannot_be_solved_is_refused_in_one_line(record: SessionRecord) -> None:
+    few = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
+    with pytest.raises(FileError, match=r"one cannot be solved: hand_m has 5 points"):
+        conclude(replace(record, alignments=(few,), alignment_numbers=(1,)))

@@ -1,0 +1,107 @@
+"""Pages on which everything fits, whatever is written on them."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from handcal.export.page import CONTENT_MM, WIDTH_MM, Column, Document, plain
+
+LOREM = "When the wearer confirmed, the hand covered the cursor; $x_1$ is no formula. " * 12
+
+
+def text_boxes(page: Figure) -> list[Bbox]:
+    """Return the places of a page's own texts, in pixels."""
+    FigureCanvasAgg(page)
+    with rc_context({"text.hinting": "none"}):  # as in a PDF
+        return [text.get_window_extent() for text in page.texts if text.get_text().strip()]
+
+
+def assert_in_order(page: Figure) -> None:
+    """Check that a page's texts lie between its margins and apart from one another."""
+    width_px, height_px = page.bbox.size
+    margin_px = width_px * (WIDTH_MM - CONTENT_MM) / 2.0 / WIDTH_MM
+    boxes = text_boxes(page)
+    for box in boxes:
+        assert margin_px - 1.0 <= box.x0
+        assert box.x1 <= width_px - margin_px + 1.0
+        assert 0.0 < box.y0 < box.y1 < height_px
+    for one, other in combinations(boxes, 2):
+        overlap = Bbox.intersection(one, other)
+        assert overlap is None or min(overlap.width, overlap.height) < 1.0
+
+
+def lines(pages: list[Figure]) -> list[str]:
+    return [text.get_text() for page in pages for text in page.texts]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [LOREM, "x" * 10_000, "W" * 500, "i" * 2000, "a\nb\n\n\tc", "", "\u202e\x00abc", "🙂" * 99],
+    ids=str.__len__,
+)
+def test_any_text_fits(text: str) -> None:
+    document = Document(text)
+    document.title(text)
+    document.text(text)
+    for page in document.finish():
+        assert_in_order(page)
+
+
+def test_no_word_is_lost_and_nothing_is_set_as_mathematics() -> None:
+    document = Document("footer")
+    document.text(LOREM)
+    pages = document.finish()
+    assert " ".join(lines(pages)[:-2]).split() == LOREM.split()
+    assert not any(text.get_parse_math() for page in pages for text in page.texts)
+
+
+def test_what_the_font_lacks_is_replaced() -> None:
+    assert plain("Zoë φ₁ ± 2′ \u00a0") == "Zoë φ₁ ± 2′ \u00a0"
+    assert plain("a\nb\tc\x00d🙂e中") == "a b c\ufffdd\ufffde\ufffd"
+
+
+def test_a_long_table_goes_on_with_its_head_on_every_page() -> None:
+    document = Document("footer")
+    rows = [[str(number), LOREM[: number % 300], f"{number:.3f}"] for number in range(150)]
+    document.table([Column("number"), Column("what", "left"), Column("value")], rows)
+    pages = document.finish()
+    assert len(pages) > 2
+    for page in pages:
+        assert_in_order(page)
+        assert lines([page]).count("value") == 1
+    assert [line for line in lines(pages) if line.isdigit()] == [str(n) for n in range(150)]
+
+
+@pytest.mark.parametrize("cell", ["x" * 10_000, LOREM, ""])
+def test_a_table_takes_any_cell(cell: str) -> None:
+    document = Document("footer")
+    columns = [Column("one"), Column("another", "left"), Column("third")]
+    document.table(columns, [[cell, "2.41 ± 1.10", cell], ["1", cell, "3"]])
+    for page in document.finish():
+        assert_in_order(page)
+
+
+def test_axes_have_their_place_between_the_margins() -> None:
+    document = Document("footer")
+    for _ in range(5):
+        for axes in document.axes(70.0, 2):
+            axes.plot([0.0, 1.0])
+    pages = document.finish()
+    assert [len(page.axes) for page in pages] == [6, 4]
+    for page in pages:
+        bounds = np.array([axes.get_position().extents for axes in page.axes])
+        assert (bounds > 0.05).all()
+        assert (bounds < 0.95).all()
+
+
+def test_pages_are_numbered() -> None:
+    document = Document("footer")
+    document.new_page()
+    assert lines(document.finish()) == ["footer", "1 / 2", "footer", "2 / 2"]

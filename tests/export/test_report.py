@@ -1,0 +1,121 @@
+"""The report: its numbers, its places, and the file itself."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from handcal.errors import CancelledError
+from handcal.export.outcome import Outcome, conclude
+from handcal.export.report import compose, write_report
+from handcal.register.verdict import expected_error_arcmin
+from handcal.session import SessionRecord
+
+HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
+
+
+def ignore(_share: float) -> None:
+    """Go on."""
+
+
+@pytest.fixture(scope="module")
+def pages(outcome: Outcome) -> list[Figure]:
+    return compose(outcome, ignore)
+
+
+def texts(pages: list[Figure]) -> list[str]:
+    return [text.get_text() for page in pages for text in page.texts]
+
+
+def mm(value_m: float) -> str:
+    return f"{1e3 * value_m:.2f}".replace("-", "−")
+
+
+def test_it_says_what_was_found(pages: list[Figure], outcome: Outcome) -> None:
+    found = texts(pages)
+    assert outcome.results is not None
+    for eye, shift in outcome.results.shifts.items():
+        for value, sigma in zip(shift.shift_m, np.sqrt(np.diag(shift.covariance_m2)), strict=True):
+            assert f"{mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}" in found
+        expected = expected_error_arcmin(outcome.record.rig.eyes[eye], shift)
+        assert f"{expected:.1f}" in found
+    for value in outcome.final_shift_m("left"):
+        assert mm(value) in found
+    assert outcome.results.eye_distance_m is not None
+    assert f"Implied eye distance: {1e3 * outcome.results.eye_distance_m:.1f} mm." in found
+    assert "=P-07, $x_" in found
+    assert "50 % humidity: $\\frac{1}{2" in found
+    assert "1335" in found
+    assert f"{outcome.record.trials[0].error_arcmin.mean():.2f}" in found
+    headings = ["Eye shift φ", "Alignments", "Convergence", "User test", "Notes", "Definitions"]
+    large = [text for page in pages for text in page.texts if text.get_fontsize() == 12.5]
+    assert [text.get_text() for text in large if text.get_text() in headings] == headings
+
+
+def test_nothing_overlaps_or_leaves_its_page(pages: list[Figure]) -> None:
+    for page in pages:
+        page.draw_without_rendering()
+        boxes = [text.get_window_extent() for text in page.texts if text.get_text()]
+        boxes += [box for axes in page.axes if (box := axes.get_tightbbox()) is not None]
+        for number, box in enumerate(boxes):
+            assert page.bbox.x0 < box.x0 < box.x1 < page.bbox.x1
+            for other in boxes[:number]:
+                overlap = Bbox.intersection(box, other)
+                assert overlap is None or min(overlap.width, overlap.height) < 1.5
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: str) -> None:
+    hostile = replace(empty, wearer=text, notes=text, settings={text: {text: [text]}})
+    outcome = replace(conclude(empty), record=hostile)
+    write_report(tmp_path / "report.pdf", outcome, ignore)
+    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
+
+
+def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
+    found = texts(compose(conclude(empty), ignore))
+    assert "Nothing is solved: the session holds no alignment." in found
+    assert "Convergence" not in found
+
+
+def test_the_file_is_a4_with_its_fonts_and_all_pages(
+    tmp_path: Path, outcome: Outcome, pages: list[Figure]
+) -> None:
+    shares: list[float] = []
+    path = tmp_path / "report.pdf"
+    write_report(path, outcome, shares.append)
+    assert shares == sorted(shares)
+    content = path.read_bytes()
+    assert len(re.findall(rb"/Type /Page\b", content)) == len(pages)
+    sizes = set(re.findall(rb"/MediaBox \[ 0 0 (595\.27\d*) (841\.88\d*) \]", content))
+    assert len(sizes) == 1
+    assert b"/FontFile2" in content
+    assert b"/Type3" not in content
+    assert b"handcal" in content
+    if shutil.which("pdftotext"):
+        run = subprocess.run(["pdftotext", "-layout", path, "-"], capture_output=True, check=True)
+        assert "Eye-display calibration" in run.stdout.decode()
+
+
+@pytest.mark.parametrize("after", [0, 5, 200])
+def test_giving_up_at_any_time_leaves_no_file(tmp_path: Path, outcome: Outcome, after: int) -> None:
+    asked = 0
+
+    def give_up(_share: float) -> None:
+        nonlocal asked
+        asked += 1
+        if asked > after:
+            raise CancelledError("enough")
+
+    with pytest.raises(CancelledError):
+        write_report(tmp_path / "report.pdf", outcome, give_up)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,110 @@
+"""Files that appear together or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from handcal.errors import FileError
+from handcal.export.staging import Staging
+
+
+def tree(folder: Path) -> dict[str, str]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_text()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def write(staging: Staging, **texts: str) -> None:
+    for name, text in texts.items():
+        (staging.path / name).write_text(text)
+
+
+def test_a_new_folder_appears_with_all_its_files(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    with Staging(folder) as staging:
+        (staging.path / "clouds").mkdir()
+        (staging.path / "clouds" / "x").write_text("1")
+        write(staging, y="2")
+        assert not (tmp_path / "a").exists()
+        assert staging.publish([]) == (folder / "clouds" / "x", folder / "y")
+    assert tree(tmp_path) == {"a/b/clouds/x": "1", "a/b/y": "2"}
+
+
+def test_an_existing_folder_keeps_what_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "clouds").mkdir()
+    for name in ("clouds/1.ply", "clouds/2.ply", "clouds/mine.txt", "report.pdf", "notes.txt"):
+        (tmp_path / name).write_text("old")
+    with Staging(tmp_path) as staging:
+        (staging.path / "clouds").mkdir()
+        (staging.path / "clouds" / "1.ply").write_text("new")
+        write(staging, **{"trials.csv": "new"})
+        staging.publish(["clouds/*.ply", "trials.csv"])
+    assert tree(tmp_path) == {
+        "clouds/1.ply": "new",
+        "clouds/mine.txt": "old",
+        "report.pdf": "old",
+        "notes.txt": "old",
+        "trials.csv": "new",
+    }
+
+
+def test_what_is_not_published_leaves_no_trace(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "x").write_text("old")
+    for name in ("out", "new"):
+        with Staging(tmp_path / name) as staging:
+            write(staging, x="new")
+    assert tree(tmp_path) == {"out/x": "old"}
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_if_one_file_cannot_be_replaced_none_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "c", "old.ply"):
+        (tmp_path / name).write_text("old")
+    replace = Path.replace
+
+    def refuse_c(path: Path, target: Path) -> Path:
+        if target.name == "c" and path.parent.name == "new":
+            raise PermissionError(13, "Permission denied", str(target))
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", refuse_c)
+    with Staging(tmp_path) as staging:
+        write(staging, a="new", b="new", c="new")
+        with pytest.raises(FileError, match=r"cannot write to .*: Permission denied \(c\)"):
+            staging.publish(["*.ply"])
+    assert tree(tmp_path) == {"a": "old", "c": "old", "old.ply": "old"}
+
+
+def test_two_at_once_are_refused(tmp_path: Path) -> None:
+    with Staging(tmp_path / "out") as first:
+        with pytest.raises(FileError, match="in use by process"):
+            Staging(tmp_path / "out")
+        write(first, x="1")
+        first.publish([])
+    assert tree(tmp_path) == {"out/x": "1"}
+
+
+def test_what_a_killed_program_left_is_removed(tmp_path: Path) -> None:
+    leftover = tmp_path / ".out.handcal-export" / "new"
+    leftover.mkdir(parents=True)
+    (leftover / "half").write_text("half")
+    with Staging(tmp_path / "out") as staging:
+        write(staging, x="1")
+        staging.publish([])
+    assert tree(tmp_path) == {"out/x": "1"}
+
+
+def test_a_file_in_the_way_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file")
+    with Staging(tmp_path / "out") as staging:
+        write(staging, x="1")
+        with pytest.raises(FileError, match="cannot create the folder"):
+            staging.publish([])
+    assert tree(tmp_path) == {"out": "a file"}

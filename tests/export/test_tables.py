@@ -1,0 +1,99 @@
+"""The CSV files, as another program reads them."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.export.outcome import Origin, Outcome
+from handcal.export.tables import write_parameters, write_trials
+from handcal.types import Eye, Float64
+
+
+def read(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, strict=True))
+
+
+def triple(row: dict[str, str], name: str) -> list[float]:
+    return [float(row[name.format(axis)]) for axis in (1, 2, 3)]
+
+
+def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
+    tmp_path: Path, outcome: Outcome
+) -> None:
+    write_parameters(tmp_path / "p.csv", outcome)
+    rows = read(tmp_path / "p.csv")
+    assert [(row["source"], row["alignment"], row["eye"]) for row in rows] == [
+        ("alignment", "1", "left"),
+        ("alignment", "1", "right"),
+        ("alignment", "3", "left"),
+        ("fused", "", "left"),
+        ("fused", "", "right"),
+        ("fine-tuned", "", "left"),
+    ]
+    assert [(row["final"], row["applied"]) for row in rows[3:]] == [
+        ("no", "no"),
+        ("yes", "yes"),
+        ("yes", "yes"),
+    ]
+    assert outcome.results is not None
+    alone, fused = outcome.results.alignments[1]["left"], outcome.results.shifts["right"]
+    assert triple(rows[2], "phi{}_mm") == (1e3 * alone.shift_m).tolist()
+    assert triple(rows[4], "sigma{}_mm") == np.sqrt(np.diag(1e6 * fused.covariance_m2)).tolist()
+    assert float(rows[4]["covariance23_mm2"]) == 1e6 * fused.covariance_m2[1, 2]
+    assert float(rows[2]["rms_mm"]) == 1e3 * alone.rms_m
+    assert int(rows[2]["iterations"]) == alone.iterations
+    assert (rows[0]["eyes_open"], rows[2]["eyes_open"]) == ("left right", "left")
+    assert rows[4]["verdict"] == outcome.results.verdicts["right"].name
+    assert triple(rows[5], "phi{}_mm") == (1e3 * outcome.final_shift_m("left")).tolist()
+    assert rows[5]["sigma1_mm"] == ""
+
+
+def test_trials_hold_every_corner(tmp_path: Path, outcome: Outcome) -> None:
+    write_trials(tmp_path / "t.csv", outcome)
+    rows = read(tmp_path / "t.csv")
+    trials = outcome.record.trials
+    assert len(rows) == 4 * len(trials)
+    row, trial = rows[4 * 2 + 3], trials[2]
+    assert (row["trial"], row["corner"], row["eye"]) == ("3", "4", trial.eye)
+    assert float(row["target_depth_m"]) == trial.target_depth_m
+    assert [float(row["truth_x_px"]), float(row["truth_y_px"])] == trial.truth_px[3].tolist()
+    assert float(row["error_arcmin"]) == trial.error_arcmin[3]
+    assert triple(row, "adjusted_phi{}_mm") == (1e3 * trial.adjusted_shift_m).tolist()
+
+
+def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
+    tmp_path: Path, outcome: Outcome
+) -> None:
+    wearer = 'a,"b"\r\n=1+1 φ'
+    write_trials(
+        tmp_path / "t.csv", replace(outcome, record=replace(outcome.record, wearer=wearer))
+    )
+    content = (tmp_path / "t.csv").read_bytes()
+    assert not content.startswith(b"\xef\xbb\xbf")
+    assert content.endswith(b"\r\n")
+    assert {row["wearer"] for row in read(tmp_path / "t.csv")} == {wearer}
+
+
+@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
+def test_no_text_becomes_a_formula(tmp_path: Path, outcome: Outcome, start: str) -> None:
+    wearer = f'{start}HYPERLINK("x")'
+    write_parameters(
+        tmp_path / "p.csv", replace(outcome, record=replace(outcome.record, wearer=wearer))
+    )
+    assert {row["wearer"] for row in read(tmp_path / "p.csv")} == {f"'{wearer}"}
+
+
+def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: Outcome) -> None:
+    shifts_m: dict[Eye, dict[Origin, Float64]] = {
+        "left": {"fine_tuned": np.full(3, -0.001), "offline": np.zeros(3)},
+        "right": {},
+    }
+    write_parameters(tmp_path / "p.csv", replace(outcome, results=None, shifts_m=shifts_m))
+    (row,) = read(tmp_path / "p.csv")
+    assert triple(row, "phi{}_mm") == [-1.0, -1.0, -1.0]
