@@ -1,4 +1,4 @@
-"""One line beside a choice: whether it will do, and what to do about it."""
+"""One line that says how it stands with something, and what to do about it."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class FindingLine(QWidget):
         super().__init__(parent)
         self.setObjectName(f"{name}Finding")
         self._finding: Finding | None = None
-        self._mend: Callable[[], None] | None = None
+        self._mend: Callable[[], object] | None = None
         self._icon = named(QLabel(), f"{name}Health")
         self._icon.setFixedSize(2 * SPACING_PX, 2 * SPACING_PX)
-        self._text = paragraph(f"{name}Found", "Checking…")
+        self._text = paragraph(f"{name}Found")
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._button = button(f"{name}Fix")
         self._button.hide()
@@ -38,12 +38,11 @@ class FindingLine(QWidget):
         layout.addWidget(self._button, 0, Qt.AlignmentFlag.AlignTop)
 
     def show_finding(
-        self, finding: Finding, fix: str = "", mend: Callable[[], None] | None = None
+        self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
     ) -> None:
         """Show a finding; `fix` labels the button that calls `mend`."""
         self._finding, self._mend = finding, mend
-        advice = f" {_sentence(finding.advice)}" if finding.advice else ""
-        self._text.setText(_sentence(finding.found) + advice)
+        self._text.setText(" ".join(map(_sentence, filter(None, (finding.found, finding.advice)))))
         self._button.setText(fix)
         self._button.setVisible(bool(fix))
         self._refresh()

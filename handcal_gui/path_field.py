@@ -25,6 +25,7 @@ class PathField(QWidget):
 
     Attributes
     ----------
+    name : str
     changed : Signal()
     """
 
@@ -39,7 +40,8 @@ class PathField(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._name, self._kind, self._pattern = name, kind, pattern
+        self.name = name
+        self._kind, self._pattern = kind, pattern
         self._line = QLineEdit(placeholderText=empty, clearButtonEnabled=bool(empty))
         self._line.setAccessibleName(name)
         self._line.textChanged.connect(self.changed)
@@ -61,8 +63,8 @@ class PathField(QWidget):
     def choose(self) -> None:
         """Ask for a path in the system's dialog."""
         if self._kind == "folder":
-            chosen = QFileDialog.getExistingDirectory(self, self._name, self.path)
+            chosen = QFileDialog.getExistingDirectory(self, self.name, self.path)
         else:
-            chosen, _ = QFileDialog.getOpenFileName(self, self._name, self.path, self._pattern)
+            chosen, _ = QFileDialog.getOpenFileName(self, self.name, self.path, self._pattern)
         if chosen:
             self.set_path(chosen)

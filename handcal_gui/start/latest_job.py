@@ -50,8 +50,9 @@ class LatestJob(QObject):
 
     def _start(self) -> None:
         question = self._next.pop()
+        # Without a parent: should this object be destroyed, the job's thread keeps the job alive.
         self._question = question
-        self._job = Job(lambda _report, _is_cancelled: self._work(question), self)
+        self._job = Job(lambda _report, _is_cancelled: self._work(question))
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
         self._job.start()
@@ -68,7 +69,6 @@ class LatestJob(QObject):
     def _end(self) -> None:
         assert self._job is not None
         self._job.wait()
-        self._job.deleteLater()
         self._job = None
         if self._next:
             self._start()

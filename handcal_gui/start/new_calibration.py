@@ -100,8 +100,9 @@ class NewCalibration(Card):
         self.check()
 
     def check(self) -> None:
-        """Look at the station as it is set up now."""
-        self._check.ask(self._question())
+        """Look at the station as it is set up now, unless it may be in use: out of sight."""
+        if self.isVisible():
+            self._check.ask(self._question())
 
     def start(self) -> None:
         """Look once more, and start if all is well."""
@@ -133,7 +134,7 @@ class NewCalibration(Card):
         self._again.start()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Leave the station alone: it may be in use."""
+        """Leave the station alone."""
         super().hideEvent(event)
         self._settle.stop()
         self._again.stop()

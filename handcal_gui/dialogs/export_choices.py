@@ -1,0 +1,117 @@
+"""What to export of a session, and where to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QVBoxLayout, QWidget
+
+from handcal.export.export import ExportSettings
+from handcal.export.formats import FORMATS, Format
+from handcal_gui.fields import named, number
+from handcal_gui.path_field import PathField
+from handcal_gui.theme import SPACING_PX
+
+_PURPOSES: dict[Format, str] = {
+    "report": "Verdict, eye shifts, figures and settings, to read and to file",
+    "csv": "One row for each eye, alignment and trial, for statistics",
+    "yaml": "Projection, K, H0 and φ of each eye, read by cv2.FileStorage",
+    "json": "The projections as each system wants them",
+    "ply": "Cursor and hand of each alignment, with residuals",
+    "zip": "All that was recorded, to archive or to open elsewhere",
+}
+
+
+class ExportChoices(QWidget):
+    """Formats, clipping distances and folder.
+
+    Parameters
+    ----------
+    settings : ExportSettings
+    folder : Path
+        Proposed; the files go into a folder of the session's own in it.
+    name : str
+        Of that folder.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self, settings: ExportSettings, folder: Path, name: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._settings, self._name = settings, name
+        self._boxes = {kind: named(QCheckBox(info.title), kind) for kind, info in FORMATS.items()}
+        self._near = number("near", 0.01, 1.0, 0.05, " m", "Nothing nearer is drawn.")
+        self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Nothing farther is drawn.")
+        self._near.setValue(settings.near_m)
+        self._far.setValue(settings.far_m)
+        self._folder = PathField("Export folder", "folder")
+        self._folder.set_path(str(folder))
+        self._lay_out()
+        for kind, box in self._boxes.items():
+            box.setChecked(kind in settings.formats)
+            box.toggled.connect(self._refresh)
+        self._folder.changed.connect(self._refresh)
+        self._refresh()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether there is anything to export, and a place for it."""
+        return bool(self._formats()) and bool(self._folder.path)
+
+    @property
+    def settings(self) -> ExportSettings:
+        """The settings as shown; only if `is_complete`."""
+        return replace(
+            self._settings,
+            formats=self._formats(),
+            near_m=self._near.value(),
+            far_m=self._far.value(),
+        )
+
+    @property
+    def folder(self) -> Path:
+        """The folder as shown, in which the session's own will be."""
+        return Path(self._folder.path).expanduser().absolute()
+
+    @property
+    def target(self) -> Path:
+        """Where the files go."""
+        return self.folder / self._name
+
+    def _formats(self) -> tuple[Format, ...]:
+        return tuple(kind for kind, box in self._boxes.items() if box.isChecked())
+
+    def _refresh(self) -> None:
+        for field in (self._near, self._far):
+            field.setEnabled(self._boxes["json"].isChecked())
+        self.changed.emit()
+
+    def _lay_out(self) -> None:
+        formats = QGridLayout()
+        formats.setHorizontalSpacing(2 * SPACING_PX)
+        formats.setVerticalSpacing(SPACING_PX)
+        formats.setColumnStretch(1, 1)
+        for row, (kind, box) in enumerate(self._boxes.items()):
+            formats.addWidget(box, row, 0)
+            formats.addWidget(QLabel(_PURPOSES[kind]), row, 1)
+        form = QFormLayout()
+        form.setHorizontalSpacing(2 * SPACING_PX)
+        form.setVerticalSpacing(SPACING_PX)
+        form.addRow("Near plane (OpenGL, Unity)", self._near)
+        form.addRow("Far plane (OpenGL, Unity)", self._far)
+        form.addRow("Into", self._folder)
+        form.addRow("", QLabel(f"A folder {self._name} is made there."))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(3 * SPACING_PX)
+        layout.addLayout(formats)
+        layout.addLayout(form)
+        layout.addStretch(1)

@@ -1,0 +1,74 @@
+"""How an export goes, and what became of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QLabel, QListWidget, QProgressBar, QVBoxLayout, QWidget
+
+from handcal.doctor import Finding, Health
+from handcal_gui.fields import named
+from handcal_gui.finding_line import FindingLine
+from handcal_gui.theme import SPACING_PX
+
+_WHOLE = 1000
+_UNCHANGED = "the session and earlier exports are as they were"
+
+
+class ExportProgress(QWidget):
+    """A bar while files are being made, then the files, or why there are none."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._doing = named(QLabel(), "doing")
+        self._bar = named(QProgressBar(maximum=_WHOLE), "progress", "Progress")
+        self._end = FindingLine("exportEnd")
+        self._files = named(QListWidget(), "files", "Files")
+        self._files.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        for widget in (self._doing, self._bar, self._end):
+            layout.addWidget(widget)
+        layout.addWidget(self._files, 1)
+        layout.addStretch(0)
+
+    def begin(self) -> None:
+        """Show an export that has just begun."""
+        self._end.hide()
+        self._files.clear()
+        self._files.hide()
+        self.show_progress("Beginning", 0.0)
+
+    def show_progress(self, doing: str, share: float) -> None:
+        """Show what is being made, and which share of all is done, 0..1."""
+        self._doing.setText(f"{doing}…")
+        self._bar.setValue(round(_WHOLE * share))
+
+    def show_files(self, folder: Path, files: Sequence[Path]) -> None:
+        """Show what was made."""
+        self._doing.setText("Done.")
+        self._bar.setValue(_WHOLE)
+        self._files.addItems([str(path.relative_to(folder)) for path in files])
+        self._files.show()
+        count = f"{len(files)} file{'' if len(files) == 1 else 's'} in {folder}"
+        url = QUrl.fromLocalFile(str(folder))
+        self._end.show_finding(
+            Finding("", Health.GOOD, count), "Open folder", lambda: QDesktopServices.openUrl(url)
+        )
+        self._end.show()
+
+    def show_failure(self, why: str) -> None:
+        """Show why nothing was made."""
+        self._doing.setText("Nothing was exported.")
+        self._end.show_finding(Finding("", Health.BROKEN, why, _UNCHANGED))
+        self._end.show()
+
+    def show_cancelled(self) -> None:
+        """Show that nothing was made because it was cancelled."""
+        self._doing.setText("Nothing was exported.")
+        self._end.show_finding(Finding("", Health.LIMITED, "cancelled", _UNCHANGED))
+        self._end.show()

@@ -1,0 +1,63 @@
+"""What has no better place to be changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+
+from handcal_gui.calibration_fields import CalibrationFields
+from handcal_gui.fields import choice
+from handcal_gui.path_field import PathField
+from handcal_gui.preferences import Preferences, Theme
+from handcal_gui.theme import SPACING_PX
+
+_THEMES: dict[Theme, str] = {"system": "As the system", "light": "Light", "dark": "Dark"}
+
+
+class PreferencesDialog(QDialog):
+    """Theme, session folder, and how calibrations run from the next on.
+
+    Parameters
+    ----------
+    preferences : Preferences
+        As they are now.
+    """
+
+    def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("preferencesDialog")
+        self.setWindowTitle("Preferences")
+        self._preferences = preferences
+        self._theme = choice("theme", "Theme", _THEMES)
+        self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
+        self._sessions = PathField("Session folder", "folder")
+        self._sessions.set_path(preferences.station.sessions)
+        self._sessions.setMinimumWidth(45 * SPACING_PX)
+        self._calibration = CalibrationFields()
+        self._calibration.show_settings(preferences.station.calibration)
+        self._calibration.add_row("Theme", self._theme)
+        self._calibration.add_row("Session folder", self._sessions)
+        buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
+        )
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(2 * SPACING_PX)
+        layout.addWidget(self._calibration)
+        layout.addWidget(buttons)
+
+    def preferences(self) -> Preferences:
+        """Return the preferences with what is shown."""
+        station = self._preferences.station
+        return replace(
+            self._preferences,
+            theme=self._theme.currentData(),
+            station=replace(
+                station,
+                sessions=self._sessions.path or station.sessions,
+                calibration=self._calibration.take(station.calibration),
+            ),
+        )

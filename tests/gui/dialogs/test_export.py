@@ -1,0 +1,195 @@
+"""The export dialog: what is asked for is made, or nothing changes and the reason is told."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QLabel,
+    QListWidget,
+    QProgressBar,
+    QPushButton,
+)
+from pytestqt.qtbot import QtBot
+
+from handcal.errors import CancelledError, FileError
+from handcal.export.export import ExportSettings
+from handcal.session import SessionRecord
+from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.path_field import PathField
+
+
+class Exporter:
+    """Stands in for the export: waits to be let on, fails if told, and can be cancelled."""
+
+    def __init__(self) -> None:
+        self.may_end = threading.Event()
+        self.failure = ""
+        self.folders: list[Path] = []
+        self.settings: list[ExportSettings] = []
+
+    def __call__(
+        self,
+        _: SessionRecord,
+        folder: Path,
+        settings: ExportSettings,
+        report: Callable[[str, float], None],
+        is_cancelled: Callable[[], bool],
+    ) -> tuple[Path, ...]:
+        self.folders.append(folder)
+        self.settings.append(settings)
+        report("Report (PDF)", 0.25)
+        while not self.may_end.wait(0.01):
+            if is_cancelled():
+                raise CancelledError("cancelled")
+        if self.failure:
+            raise FileError(self.failure)
+        return folder / "a.csv", folder / "clouds" / "b.ply"
+
+
+@pytest.fixture
+def exporter() -> Iterator[Exporter]:
+    exporter = Exporter()
+    yield exporter
+    exporter.may_end.set()
+
+
+@pytest.fixture
+def dialog(
+    qtbot: QtBot, record: SessionRecord, tmp_path: Path, exporter: Exporter
+) -> Iterator[ExportDialog]:
+    settings = ExportSettings(("report", "csv"))
+    dialog = ExportDialog(record, settings, tmp_path / "out", export=exporter)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    yield dialog
+    exporter.may_end.set()
+    qtbot.waitUntil(lambda: press(dialog, "close").text() == "Close")
+
+
+def press(dialog: ExportDialog, name: str) -> QPushButton:
+    found = dialog.findChild(QPushButton, name)
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def box(dialog: ExportDialog, name: str) -> QCheckBox:
+    found = dialog.findChild(QCheckBox, name)
+    assert isinstance(found, QCheckBox)
+    return found
+
+
+def text(dialog: ExportDialog, name: str) -> str:
+    found = dialog.findChild(QLabel, name)
+    assert isinstance(found, QLabel)
+    return found.text()
+
+
+def files(dialog: ExportDialog) -> list[str]:
+    found = dialog.findChild(QListWidget, "files")
+    assert isinstance(found, QListWidget)
+    return [found.item(row).text() for row in range(found.count())]
+
+
+def test_what_is_chosen_is_exported_and_remembered(
+    qtbot: QtBot,
+    dialog: ExportDialog,
+    exporter: Exporter,
+    record: SessionRecord,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    far = dialog.findChild(QDoubleSpinBox, "far")
+    assert isinstance(far, QDoubleSpinBox)
+    assert not far.isEnabled()
+    box(dialog, "csv").click()
+    box(dialog, "json").click()
+    assert far.isEnabled()
+    far.setValue(50.0)
+    with qtbot.waitSignal(dialog.remembered) as remembered:
+        press(dialog, "export").click()
+    expected = ExportSettings(("report", "json"), far_m=50.0)
+    assert remembered.args == [expected, tmp_path / "out"]
+    bar = dialog.findChild(QProgressBar, "progress")
+    assert isinstance(bar, QProgressBar)
+    qtbot.waitUntil(lambda: bar.value() == bar.maximum() // 4)
+    assert text(dialog, "doing") == "Report (PDF)…"
+    exporter.may_end.set()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.")
+    target = tmp_path / "out" / f"{record.path.name}-export"
+    assert (exporter.folders, exporter.settings) == ([target], [expected])
+    assert files(dialog) == ["a.csv", str(Path("clouds") / "b.ply")]
+    assert str(target) in text(dialog, "exportEndFound")
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    press(dialog, "exportEndFix").click()
+    assert [url.toLocalFile() for url in opened] == [str(target)]
+
+
+def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog) -> None:
+    for name in ("report", "csv"):
+        box(dialog, name).click()
+    assert not press(dialog, "export").isEnabled()
+    box(dialog, "zip").click()
+    assert press(dialog, "export").isEnabled()
+    folder = dialog.findChild(PathField)
+    assert isinstance(folder, PathField)
+    folder.set_path("")
+    assert not press(dialog, "export").isEnabled()
+
+
+def test_a_failure_is_told_and_can_be_tried_again(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    exporter.failure = "cannot write /x: No space left on device"
+    exporter.may_end.set()
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: "No space left on device" in text(dialog, "exportEndFound"))
+    assert files(dialog) == []
+    exporter.failure = ""
+    press(dialog, "back").click()
+    assert press(dialog, "export").isVisible()
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: len(files(dialog)) == 2)
+
+
+def test_cancel_stops_the_export_and_keeps_the_dialog(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: bool(exporter.folders))
+    started_s = time.perf_counter()
+    press(dialog, "close").click()
+    qtbot.waitUntil(lambda: "Cancelled" in text(dialog, "exportEndFound"))
+    assert time.perf_counter() - started_s < 0.5
+    assert dialog.isVisible()
+    press(dialog, "close").click()
+    assert not dialog.isVisible()
+
+
+def test_closing_while_it_runs_cancels_and_then_closes(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: bool(exporter.folders))
+    with qtbot.waitSignal(dialog.rejected):
+        dialog.close()
+    assert not [t for t in threading.enumerate() if t.name == "handcal job"]
+
+
+def test_a_real_session_is_exported(qtbot: QtBot, record: SessionRecord, tmp_path: Path) -> None:
+    dialog = ExportDialog(record, ExportSettings(("csv", "yaml")), tmp_path / "out")
+    qtbot.addWidget(dialog)
+    dialog.start()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.", timeout=20_000)
+    target = tmp_path / "out" / f"{record.path.name}-export"
+    made = sorted(path.name for path in target.iterdir())
+    assert made == ["calibration.yaml", "parameters.csv", "trials.csv"] == sorted(files(dialog))

@@ -1,0 +1,47 @@
+"""The preferences dialog changes what it shows and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox
+from pytestqt.qtbot import QtBot
+
+from handcal.station_settings import StationSettings
+from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.path_field import PathField
+from handcal_gui.preferences import Preferences
+
+BEFORE = Preferences(
+    station=StationSettings(source="realsense", port=50_000, sessions="/a"),
+    wearers=("Ada",),
+    theme="light",
+)
+
+
+def test_untouched_preferences_stay_as_they_are(qtbot: QtBot) -> None:
+    dialog = PreferencesDialog(BEFORE)
+    qtbot.addWidget(dialog)
+    assert dialog.preferences() == BEFORE
+
+
+def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
+    dialog = PreferencesDialog(BEFORE)
+    qtbot.addWidget(dialog)
+    theme, folder = dialog.findChild(QComboBox, "theme"), dialog.findChild(PathField)
+    guard = dialog.findChild(QDoubleSpinBox, "guard")
+    assert isinstance(theme, QComboBox)
+    assert isinstance(folder, PathField)
+    assert isinstance(guard, QDoubleSpinBox)
+    theme.setCurrentIndex(theme.findData("dark"))
+    folder.set_path("/b")
+    guard.setValue(10.5)
+    after = dialog.preferences()
+    assert after.theme == "dark"
+    assert after.station.sessions == "/b"
+    assert np.degrees(after.station.calibration.guard.limit_rad) == 10.5
+    station = replace(after.station, sessions="/a", calibration=BEFORE.station.calibration)
+    assert replace(after, theme="light", station=station) == BEFORE
+    folder.set_path("")  # no folder is no choice
+    assert dialog.preferences().station.sessions == "/a"

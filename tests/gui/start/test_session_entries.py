@@ -1,0 +1,54 @@
+"""What the start page says of sessions that can be resumed, opened, or neither."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from handcal.rig.example import example_rig
+from handcal.session import Session
+from handcal.types import Alignment
+from handcal_gui.start.session_entries import find_offers
+
+
+def make(folder: Path, wearer: str, alignments: Sequence[Alignment], *, is_done: bool) -> Path:
+    with Session.create(folder, example_rig(), {}, name=f"s-{wearer}", wearer=wearer) as session:
+        for alignment in alignments:
+            session.save_alignment(alignment)
+        if is_done:
+            session.finish()
+    return session.path
+
+
+def test_unfinished_sessions_are_told_by_wearer_time_and_alignments(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    path = make(tmp_path, "Ada", [alignment], is_done=False)
+    make(tmp_path, "Bea", [alignment], is_done=True)
+    (entry,) = find_offers(tmp_path, ()).unfinished
+    assert entry.path == path
+    assert entry.is_enabled
+    assert entry.text.startswith(f"Ada · {datetime.now().astimezone():%d %b %Y}")
+    assert entry.text.endswith(" · 1 alignment")
+
+
+def test_a_damaged_session_is_told_with_the_reason(tmp_path: Path, alignment: Alignment) -> None:
+    path = make(tmp_path, "Ada", [alignment, alignment], is_done=False)
+    (path / "rig.yaml").write_text("nonsense")
+    (entry,) = find_offers(tmp_path, ()).unfinished
+    assert not entry.is_enabled
+    assert "rig.yaml is damaged" in entry.text
+
+
+def test_recent_sessions_that_are_gone_are_left_out(tmp_path: Path) -> None:
+    nameless = make(tmp_path, "", [], is_done=True)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    recent = find_offers(tmp_path / "nowhere", [tmp_path / "gone", nameless, empty]).recent
+    assert [(entry.path, entry.is_enabled) for entry in recent] == [
+        (nameless, True),
+        (empty, False),
+    ]
+    assert recent[0].text.startswith("No name · ")
+    assert "journal.jsonl" in recent[1].text
