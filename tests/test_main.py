@@ -278,6 +278,22 @@ def test_a_session_that_cannot_be_solved_says_why(
     assert "settings.solve.method must be one of paper, linear" in fails("solve", odd)[1]
 
 
+def test_a_session_is_exported_in_the_formats_asked_for(
+    handcal: Callable[..., None], fails: Callable[..., tuple[int, str]], tmp_path: Path
+) -> None:
+    with Session.create(tmp_path, example_rig(), {}, name="one") as session:
+        pass
+    output = tmp_path / "out"
+    handcal("export", session.path, "--output", output, "--format", "yaml", "--format", "csv")
+    assert sorted(path.name for path in output.iterdir()) == [
+        "calibration.yaml",
+        "parameters.csv",
+        "trials.csv",
+    ]
+    arguments = "export", session.path, "--output", output
+    assert "near_m < far_m is needed" in fails(*arguments, "--near-m", 2, "--far-m", 1)[1]
+
+
 def test_a_folder_that_cannot_be_made_is_one_line(
     fails: Callable[..., tuple[int, str]], pictures: Path
 ) -> None:
