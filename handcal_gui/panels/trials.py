@@ -159,7 +159,8 @@ class TrialsPanel(QWidget):
         self._record_action = QAction("Record trial", self)
         self._record_action.setToolTip("Record by how much the solved φ misses the one set (T)")
         self._record_action.setShortcut(Qt.Key.Key_T)
-        self._record_action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        # Also from the fine-tune panel, where the study leader's hands are.
+        self._record_action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
         self._record_action.triggered.connect(self._ask)
         self.addAction(self._record_action)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QToolButton
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
@@ -90,6 +90,21 @@ def test_asks_for_a_trial_by_key(
     with qtbot.waitSignal(panel.trial_requested) as asked:
         QTest.keyClick(panel, Qt.Key.Key_T)
     assert asked.args == ["right", 0.6]
+
+
+def test_the_key_works_beside_the_panel(
+    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
+) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    beside = QPushButton("Beside", window)
+    panel.setParent(window)
+    window.show()
+    panel.show()
+    panel.show_snapshot(snapshot(State.APPLIED))
+    beside.setFocus()
+    with qtbot.waitSignal(panel.trial_requested):
+        QTest.keyClick(beside, Qt.Key.Key_T)
 
 
 def test_takes_the_eyes_in_turn(
