@@ -21,10 +21,12 @@ class Banner(QWidget):
         self._message = ""
         self._condition = ""
         self._icon = QLabel()
-        self._text = QLabel(objectName="bannerText", wordWrap=True)
+        self._text = QLabel(wordWrap=True)
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        close = QToolButton(objectName="bannerClose", text="Close", autoRaise=True)
+        close = QToolButton(autoRaise=True)
+        close.setText("Close")
+        close.setObjectName("bannerClose")
         close.setToolTip("Close this message (Esc)")
         close.clicked.connect(self.clear)
         self._close = close

@@ -29,6 +29,8 @@ class Live(QObject):
 
     Attributes
     ----------
+    opened : Signal(Path)
+        A station runs; its session's folder.
     ended : Signal(str)
         The engine ended, and why; empty if it was closed.
     polled : Signal(Snapshot)
@@ -36,6 +38,7 @@ class Live(QObject):
     export_requested, next_wearer_requested : Signal()
     """
 
+    opened = Signal(object)
     ended = Signal(str)
     polled = Signal(object)
     export_requested = Signal()
@@ -50,6 +53,7 @@ class Live(QObject):
         self._comparison = comparison
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
+        self._is_watching = False
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -63,6 +67,7 @@ class Live(QObject):
     def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
         """Run a station, after ending the present one."""
         self.stop()
+        self._is_watching = False
         self._wizard_panel.start(Wizard(plan))
         self._stream = Stream(open_station, self)
         self._stream.opened.connect(self._take_station)
@@ -139,7 +144,9 @@ class Live(QObject):
                 self._ask_number("restore the trial", lambda s: s.session.restore_trial)
             )
         session.notes_changed.connect(
-            lambda text: self._ask("save the notes", lambda station: station.session.save_notes(text))
+            lambda text: self._ask(
+                "save the notes", lambda station: station.session.save_notes(text)
+            )
         )
 
     def _ask(self, name: str, command: Command) -> None:
@@ -159,16 +166,20 @@ class Live(QObject):
         snapshot = self._stream.newest() if self._stream is not None else None
         if snapshot is None or snapshot is self._snapshot:
             return
+        if self._snapshot is None or snapshot.record is not self._snapshot.record:
+            self._comparison.use(
+                snapshot.record.alignments, snapshot.record.rig, self._solve_settings
+            )
         self._snapshot = snapshot
         panels = self._window.panels
         for panel in panels.all():
-            if self._window.is_visible(panel):
+            if not panel.visibleRegion().isEmpty():
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
             snapshot.problem or snapshot.camera.problem or snapshot.link_problem
         )
-        self._watch_views(self._window.is_visible(panels.wearer_view))
+        self._watch_views(not panels.wearer_view.visibleRegion().isEmpty())
         self.polled.emit(snapshot)
 
     def _watch_views(self, wanted: bool) -> None:
@@ -179,17 +190,21 @@ class Live(QObject):
 
     def _take_station(self, station: Station) -> None:
         panels = self._window.panels
-        self._is_watching = False
-        panels.fine_tune.set_rig(station.rig)
+        self._solve_settings = station.settings.calibration.solve
         host, port = station.address
+        panels.camera.begin(station.settings.calibration.segment)
+        panels.fine_tune.set_rig(station.rig)
+        panels.results.show_results(None, (), station.rig)
+        panels.session.set_read_only(False)
+        panels.trials.set_read_only(False)
         panels.link.show_pairing(
             f"{host}:{port}", station.pairing_key, is_virtual=station.settings.headset == "virtual"
         )
-        self._solve_settings = station.settings.calibration.solve
-        self._rig = station.rig
         self._window.show_page("live")
+        self.opened.emit(station.session.path)
 
     def _take_answer(self, name: str, _answer: object) -> None:
+        self._window.banner.clear()
         if name == Action.FINISH and self._snapshot is not None:
             self._wizard_panel.wizard.move(Action.FINISH, self._snapshot)
 

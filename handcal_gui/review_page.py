@@ -6,10 +6,11 @@ from datetime import datetime
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.results import Results
 from handcal.session import SessionRecord
+from handcal_gui.fields import button
 from handcal_gui.theme import SPACING_PX
 
 
@@ -28,18 +29,19 @@ class ReviewPage(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("reviewPage")
-        self._title = QLabel(objectName="reviewTitle")
+        self._title = QLabel()
         font = self._title.font()
         font.setPointSizeF(1.6 * font.pointSizeF())
         font.setBold(True)
         self._title.setFont(font)
-        self._text = QLabel(objectName="reviewText", wordWrap=True)
+        self._text = QLabel(wordWrap=True)
+        self._text.setObjectName("reviewText")
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._text.setTextFormat(Qt.TextFormat.PlainText)
-        self._export = QPushButton("&Export…", objectName="reviewExport")
-        self._resume = QPushButton("&Go on with this session", objectName="reviewResume")
+        self._export = button("reviewExport", "&Export…")
+        self._resume = button("reviewResume", "&Go on with this session")
         self._resume.setToolTip("Open camera and headset, and add alignments, φ or trials to it")
-        close = QPushButton("&Close session", objectName="reviewClose")
+        close = button("reviewClose", "&Close session")
         self._export.setDefault(True)
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Literal, Protocol
 
 from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
+from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence, QRegion
 from PySide6.QtWidgets import (
     QAbstractButton,
     QDockWidget,
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.snapshot import Snapshot
 from handcal_gui.banner import Banner
 from handcal_gui.panels.camera import CameraPanel
 from handcal_gui.panels.cloud import CloudPanel
@@ -62,6 +63,16 @@ _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
 }
 
 
+class Panel(Protocol):
+    """What every panel can do."""
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show what there is of it."""
+
+    def visibleRegion(self) -> QRegion:
+        """Return what can be seen of the panel."""
+
+
 @dataclass(frozen=True, slots=True)
 class Panels:
     """Every panel of the window."""
@@ -75,6 +86,10 @@ class Panels:
     trials: TrialsPanel
     session: SessionPanel
     link: LinkPanel
+
+    def all(self) -> Iterator[Panel]:
+        """Give every panel."""
+        return (getattr(self, field.name) for field in fields(self))
 
 
 class MainWindow(QMainWindow):
@@ -128,6 +143,11 @@ class MainWindow(QMainWindow):
         self.show_page("start")
 
     @property
+    def docks(self) -> Mapping[str, QDockWidget]:
+        """The docks by the names of their panels."""
+        return self._docks
+
+    @property
     def page(self) -> Page:
         """The page shown."""
         return self._page
@@ -170,18 +190,16 @@ class MainWindow(QMainWindow):
         page, self._page = self._page, "start"
         self.show_page(page)
 
-    def is_visible(self, panel: QWidget) -> bool:
-        """Tell whether any of a panel can be seen."""
-        return not panel.visibleRegion().isEmpty()
-
     def add_action(self, menu: str, text: str, keys: str, do: Callable[[], object]) -> QAction:
         """Add an action to one of the menus File, View and Help."""
         action = QAction(text, self)
         if keys:
             action.setShortcut(QKeySequence(keys))
         action.triggered.connect(lambda _checked=False: do())
-        before = self._dock_actions_start if menu == "View" else None
-        self._menus[menu].insertAction(before, action)
+        if menu == "View":
+            self._menus[menu].insertAction(self._dock_actions_start, action)
+        else:
+            self._menus[menu].addAction(action)
         return action
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

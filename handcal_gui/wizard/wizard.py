@@ -7,13 +7,13 @@ from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
 from handcal.snapshot import Snapshot
+from handcal_gui.fields import button
 from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard
 
@@ -43,17 +43,19 @@ class WizardPanel(QWidget):
         self.wizard = Wizard()
         self.shown: View | None = None
         self._rail = _Rail()
-        self._title = QLabel(objectName="wizardTitle")
-        self._sentence = QLabel(objectName="wizardSentence", wordWrap=True)
+        self._title = QLabel()
+        self._sentence = QLabel(wordWrap=True)
         self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
-        self._note = QLabel(objectName="wizardNote", wordWrap=True)
-        self._main = QPushButton(objectName="wizardMain")
-        self._others = [QPushButton(objectName=f"wizardOther{i}") for i in range(_MOST_OTHERS)]
-        self._plan = QComboBox(objectName="wizardPlan")
+        self._note = QLabel(wordWrap=True)
+        self._note.setObjectName("wizardNote")
+        self._main = button("wizardMain", "")
+        self._others = [button(f"wizardOther{i}", "") for i in range(_MOST_OTHERS)]
+        self._plan = QComboBox()
+        self._plan.setObjectName("wizardPlan")
         self._lay_out()
         self._main.clicked.connect(lambda: self._ask(self.shown.main if self.shown else None))
-        for i, button in enumerate(self._others):
-            button.clicked.connect(lambda _checked=False, i=i: self._ask_other(i))
+        for i, other in enumerate(self._others):
+            other.clicked.connect(lambda _checked=False, i=i: self._ask_other(i))
         self._plan.currentIndexChanged.connect(self._choose_plan)
 
     def start(self, wizard: Wizard) -> None:
@@ -112,8 +114,8 @@ class WizardPanel(QWidget):
         plan.addWidget(plan_label)
         plan.addWidget(self._plan)
         others = QHBoxLayout()
-        for button in self._others:
-            others.addWidget(button)
+        for other in self._others:
+            others.addWidget(other)
         others.addStretch()
         others.addStrut(self._others[0].sizeHint().height())
         layout = QVBoxLayout(self)
@@ -142,11 +144,11 @@ class WizardPanel(QWidget):
         self._main.setText(view.main.label)
         self._main.setEnabled(view.main.is_enabled)
         self._main.setToolTip("Space bar")
-        for i, button in enumerate(self._others):
-            button.setVisible(i < len(view.others))
+        for i, other in enumerate(self._others):
+            other.setVisible(i < len(view.others))
             if i < len(view.others):
-                button.setText(view.others[i].label)
-                button.setEnabled(view.others[i].is_enabled)
+                other.setText(view.others[i].label)
+                other.setEnabled(view.others[i].is_enabled)
         self._plan.setEnabled(view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR))
 
     def _ask(self, offer: Offer | None) -> None:

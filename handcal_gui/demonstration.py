@@ -1,0 +1,76 @@
+"""A calibration of a simulated wearer that operates itself, from the start page to the export."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QApplication
+
+from handcal.station_settings import StationSettings
+from handcal_gui.autopilot import Autopilot
+from handcal_gui.program import Program
+from handcal_gui.screenshots import Screenshots
+from handcal_gui.wizard.steps import Step, View
+
+
+class Demonstration(QObject):
+    """Calibrates, exports, and ends the program.
+
+    Parameters
+    ----------
+    program : Program
+    output : Path
+        Where the session, and beside it the export, go.
+    screenshots : Path or None
+        Where a picture of every step and panel goes.
+
+    Attributes
+    ----------
+    complaint : str or None
+        Why it did not succeed; None once it has.
+    """
+
+    def __init__(self, program: Program, output: Path, screenshots: Path | None) -> None:
+        super().__init__(program)
+        self.complaint: str | None = "ended before the calibration was complete"
+        self._program = program
+        self._output = output.absolute()
+        self._screenshots = Screenshots(program.window, screenshots) if screenshots else None
+        self._autopilot = Autopilot(program.live, program.wizard_panel, self._look)
+        self._autopilot.finished.connect(self._export)
+        self._autopilot.stuck.connect(self._give_up)
+        program.live.ended.connect(self._give_up)
+
+    def start(self, settings: StationSettings) -> None:
+        """Begin."""
+        if self._screenshots:
+            self._screenshots.save("start")
+        station = replace(settings, sessions=str(self._output))
+        self._program.start_calibration(station, "Demonstration")
+
+    def _look(self, view: View) -> None:
+        if self._screenshots:
+            self._screenshots.save_step(view)
+            if view.step is Step.SAVE:
+                self._screenshots.save_panels()
+
+    def _export(self) -> None:
+        dialog = self._program.export(self._output)
+        if dialog is None:
+            self._give_up("there was nothing to export")
+            return
+        if self._screenshots:
+            self._screenshots.save("export", dialog)
+        dialog.succeeded.connect(self._finish)
+        dialog.failed.connect(self._give_up)
+        dialog.start()
+
+    def _finish(self) -> None:
+        self.complaint = None
+        QApplication.quit()
+
+    def _give_up(self, why: str) -> None:
+        self.complaint = why or self.complaint
+        QApplication.exit(1)

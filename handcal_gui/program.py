@@ -1,0 +1,273 @@
+"""The program: window, pages and panels built, wired to each other, and closed again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QFileDialog, QMessageBox
+
+from handcal.errors import FileError
+from handcal.export.export import ExportSettings
+from handcal.session import SessionRecord
+from handcal.station import Station
+from handcal.station_settings import StationSettings
+from handcal_gui.compare import Comparison
+from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.live import Live
+from handcal_gui.panels.camera import CameraPanel
+from handcal_gui.panels.cloud import CloudPanel
+from handcal_gui.panels.fine_tune import FineTunePanel
+from handcal_gui.panels.link import LinkPanel
+from handcal_gui.panels.results import ResultsPanel
+from handcal_gui.panels.rotation import RotationPanel
+from handcal_gui.panels.session import SessionPanel
+from handcal_gui.panels.trials import TrialsPanel
+from handcal_gui.panels.wearer_view import WearerViewPanel
+from handcal_gui.preferences import Preferences, PreferencesFile
+from handcal_gui.review import Review
+from handcal_gui.review_page import ReviewPage
+from handcal_gui.start_page import StartPage
+from handcal_gui.theme import use_theme
+from handcal_gui.window import MainWindow, Page, Panels
+from handcal_gui.wizard.wizard import WizardPanel
+
+_FIRST_SIZE = QSize(1600, 1000)
+_KEYS = """
+<table cellspacing="6">
+<tr><td><b>Space</b></td><td>What the wizard's large button says</td></tr>
+<tr><td><b>Esc</b></td><td>Close the message at the top</td></tr>
+<tr><td><b>F</b></td><td>Freeze the camera's picture</td></tr>
+<tr><td><b>1, 2, 3, R</b></td><td>Hand cloud: front, side, top, reset</td></tr>
+<tr><td><b>Arrows, Page Up, Page Down</b></td><td>φ1, φ2, φ3 of the eye chosen (fine-tune)</td></tr>
+<tr><td><b>Ctrl+Z, Ctrl+Shift+Z</b></td><td>Undo and redo (fine-tune, session)</td></tr>
+<tr><td><b>T</b></td><td>Record a trial</td></tr>
+<tr><td><b>Ctrl+N</b></td><td>Next wearer</td></tr>
+<tr><td><b>Ctrl+O</b></td><td>Open a session</td></tr>
+<tr><td><b>Ctrl+E</b></td><td>Export</td></tr>
+</table>
+"""
+
+
+class Program(QObject):
+    """Everything behind the window, which it owns.
+
+    Parameters
+    ----------
+    file : PreferencesFile
+
+    Attributes
+    ----------
+    window : MainWindow
+    wizard_panel : WizardPanel
+    live : Live
+    review : Review
+    start : StartPage
+    """
+
+    def __init__(self, file: PreferencesFile) -> None:
+        super().__init__()
+        self._file = file
+        self._preferences, complaint = file.load()
+        use_theme(self._preferences.theme)
+        self._pairing_key = file.pairing_key()
+        panels = Panels(
+            camera=CameraPanel(),
+            cloud=CloudPanel(),
+            wearer_view=WearerViewPanel(),
+            rotation=RotationPanel(),
+            results=ResultsPanel(),
+            fine_tune=FineTunePanel(),
+            trials=TrialsPanel(),
+            session=SessionPanel(),
+            link=LinkPanel(),
+        )
+        self.start = StartPage(self._preferences, self._pairing_key)
+        self.wizard_panel = WizardPanel()
+        review_page = ReviewPage()
+        self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
+        comparison = Comparison(panels.results)
+        self.live = Live(self.window, self.wizard_panel, comparison)
+        self.review = Review(self.window, review_page, comparison)
+        self._connect(review_page)
+        self._make_menus()
+        self._restore()
+        self.show_start()
+        self.window.banner.show_message(complaint)
+
+    @property
+    def preferences(self) -> Preferences:
+        """What is remembered."""
+        return self._preferences
+
+    def start_calibration(self, settings: StationSettings, wearer: str) -> None:
+        """Open a station for a wearer."""
+        self._remember(replace(self._preferences.with_wearer(wearer), station=settings))
+        self._run(lambda: Station(settings, wearer, pairing_key=self._pairing_key))
+
+    def resume_session(self, path: Path) -> None:
+        """Go on with a session, at the station that was used last."""
+        settings = self._preferences.station
+        self._run(lambda: Station(settings, resume=path, pairing_key=self._pairing_key))
+
+    def open_session(self, path: Path) -> None:
+        """Look at a stored session."""
+        self.live.stop()
+        self.review.open(path)
+
+    def show_start(self) -> None:
+        """End what runs, and show the start page."""
+        self.live.stop()
+        self.review.close()
+        self.start.show_preferences(self._preferences)
+        self.window.show_page("start")
+
+    def export(self, folder: Path | None = None) -> ExportDialog | None:
+        """Ask what to export of the session shown; None without an alignment.
+
+        Parameters
+        ----------
+        folder : Path, optional
+            Proposed for the files; by default where the last went.
+        """
+        record = self._record()
+        if record is None or not record.alignments:
+            self.window.banner.show_message("There is no alignment to export yet.")
+            return None
+        folder = folder or Path(self._preferences.export_folder or record.path.parent)
+        dialog = ExportDialog(record, self._preferences.export, folder, self.window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.remembered.connect(self._remember_export)
+        dialog.open()
+        return dialog
+
+    def close(self) -> None:
+        """Remember the window, end what runs; safe to call twice."""
+        layouts = self.window.layouts()
+        self._remember(
+            replace(
+                self._preferences,
+                geometry=self.window.saveGeometry().toBase64().toStdString(),
+                live_layout=layouts.get("live", ""),
+                review_layout=layouts.get("review", ""),
+            )
+        )
+        self.live.stop()
+        self.review.close()
+        self.start.stop()
+
+    def _connect(self, review_page: ReviewPage) -> None:
+        self.start.start_requested.connect(self.start_calibration)
+        self.start.resume_requested.connect(self.resume_session)
+        self.start.open_requested.connect(self.open_session)
+        self.live.ended.connect(self._take_end)
+        self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
+        self.live.export_requested.connect(lambda: self.export())
+        self.live.next_wearer_requested.connect(self.show_start)
+        self.review.opened.connect(
+            lambda path: self._remember(self._preferences.with_session(path))
+        )
+        self.review.failed.connect(self._take_end)
+        review_page.export_requested.connect(lambda: self.export())
+        review_page.resume_requested.connect(self._resume_reviewed)
+        review_page.close_requested.connect(self.show_start)
+        self.wizard_panel.plan_changed.connect(
+            lambda plan: self._remember(replace(self._preferences, plan=plan))
+        )
+        panels = self.window.panels
+        panels.session.export_requested.connect(lambda: self.export())
+        panels.link.new_key_requested.connect(self._renew_key)
+        self.window.closing.connect(self.close)
+
+    def _make_menus(self) -> None:
+        add = self.window.add_action
+        add("File", "&Next wearer", "Ctrl+N", self.show_start)
+        add("File", "&Open session…", "Ctrl+O", self._browse)
+        add("File", "&Export…", "Ctrl+E", self.export)
+        add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
+        add("File", "&Quit", "Ctrl+Q", self.window.close)
+        add("View", "&Reset layout", "", self.window.reset_layout)
+        add("Help", "&Keys", "F1", self._show_keys)
+        add("Help", "&About handcal", "", self._show_about)
+
+    def _restore(self) -> None:
+        preferences = self._preferences
+        if preferences.geometry:
+            self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
+        else:
+            screen = QGuiApplication.primaryScreen().availableSize()
+            self.window.resize(screen.boundedTo(_FIRST_SIZE))
+        layouts: dict[Page, str] = {
+            "live": preferences.live_layout,
+            "review": preferences.review_layout,
+        }
+        self.window.restore_layouts({page: text for page, text in layouts.items() if text})
+
+    def _run(self, open_station: Callable[[], Station]) -> None:
+        self.review.close()
+        self.window.banner.clear()
+        self.live.start(open_station, self._preferences.plan)
+
+    def _browse(self) -> None:
+        folder = QFileDialog.getExistingDirectory(
+            self.window, "Open a session's folder", self._preferences.station.sessions
+        )
+        if folder:
+            self.open_session(Path(folder))
+
+    def _resume_reviewed(self) -> None:
+        if self.review.record is not None:
+            self.resume_session(self.review.record.path)
+
+    def _record(self) -> SessionRecord | None:
+        """Return the session shown, as it is on the disk."""
+        if self.live.snapshot is not None:
+            return self.live.snapshot.record
+        return self.review.record
+
+    def _take_end(self, why: str) -> None:
+        if why:
+            self.show_start()
+            self.window.banner.show_message(why)
+
+    def _renew_key(self) -> None:
+        self._pairing_key = self._file.renew_pairing_key()
+        self.start.set_pairing_key(self._pairing_key)
+        self.window.banner.show_message(
+            "There is a new pairing key; it holds from the next calibration on, and the headset "
+            "must be given it."
+        )
+
+    def _edit_preferences(self) -> None:
+        dialog = PreferencesDialog(self._preferences, self.window)
+        if dialog.exec():
+            self._remember(dialog.preferences())
+            use_theme(self._preferences.theme)
+            self.start.show_preferences(self._preferences)
+
+    def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
+        self._remember(replace(self._preferences, export=settings, export_folder=str(folder)))
+
+    def _remember(self, preferences: Preferences) -> None:
+        self._preferences = preferences
+        try:
+            self._file.save(preferences)
+        except FileError as error:
+            self.window.banner.show_message(f"The preferences cannot be saved: {error}")
+
+    def _show_keys(self) -> None:
+        QMessageBox.information(self.window, "Keys", _KEYS)
+
+    def _show_about(self) -> None:
+        QMessageBox.about(
+            self.window,
+            "About handcal",
+            f"<b>handcal {version('handcal')}</b><p>Calibrates an optical see-through headset with "
+            "the wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR 2021."
+            "<p>Apache-2.0",
+        )

@@ -1,0 +1,213 @@
+"""The program as its user has it: a real window on an X server, driven by keys."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from handcal.errors import FileError
+from handcal.session import Session, SessionRecord
+
+ARTEFACTS = Path(__file__).parents[2] / "artefacts"
+PATIENCE_S = 90.0
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    """Start an X server without a screen and return its name."""
+    if shutil.which("Xvfb") is None or shutil.which("xdotool") is None:
+        pytest.skip("Xvfb and xdotool are not installed")
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    with os.fdopen(read) as pipe:
+        number = pipe.readline().strip()
+    assert number
+    yield f":{number}"
+    server.terminate()
+    server.wait(10)
+
+
+class Window:
+    """A running program, and the technician's hands."""
+
+    def __init__(self, display: str, *arguments: str | Path) -> None:
+        self._environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+        command = [sys.executable, "-m", "handcal_gui", *map(str, arguments)]
+        self.process = subprocess.Popen(
+            command, env=self._environment, stderr=subprocess.PIPE, text=True
+        )
+
+    def find(self) -> None:
+        """Wait for the window and give it the keyboard."""
+        found = self._xdotool("search", "--sync", "--onlyvisible", "--name", "handcal")
+        self._xdotool("windowfocus", "--sync", found.split()[0])
+
+    def press(self, *keys: str) -> None:
+        self._xdotool("key", *keys)
+
+    def type(self, text: str) -> None:
+        self._xdotool("type", text)
+
+    def shoot(self, name: str) -> None:
+        """Keep a picture of the whole screen."""
+        ARTEFACTS.mkdir(exist_ok=True)
+        code = (
+            "import sys; from PySide6.QtGui import QGuiApplication as A; a = A([]); "
+            "sys.exit(not a.primaryScreen().grabWindow(0).save(sys.argv[1]))"
+        )
+        path = ARTEFACTS / f"{name}.png"
+        subprocess.run([sys.executable, "-c", code, path], env=self._environment, check=True)
+
+    def end(self) -> tuple[int, str]:
+        """Wait for the end; return the exit status and what was complained of."""
+        _, errors = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, errors
+
+    def _xdotool(self, *arguments: str) -> str:
+        return subprocess.run(
+            ["xdotool", *arguments],
+            env=self._environment,
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_S,
+        ).stdout
+
+
+def wait_for(what: str, condition: Callable[[], bool], window: Window) -> None:
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert window.process.poll() is None, window.end()
+        assert time.monotonic() < deadline_s, f"{what} did not come"
+        time.sleep(0.2)
+
+
+@pytest.fixture
+def preferences(tmp_path: Path) -> Path:
+    path = tmp_path / "config" / "preferences.json"
+    path.parent.mkdir()
+    station = {"sessions": str(tmp_path / "sessions"), "seed": 1}
+    export = {"formats": ["report", "csv"]}
+    path.write_text(
+        json.dumps({"station": station, "export": export, "export_folder": str(tmp_path / "out")})
+    )
+    return path
+
+
+def test_a_technician_calibrates_with_the_keyboard_alone(
+    display: str, tmp_path: Path, preferences: Path
+) -> None:
+    window = Window(display, "--preferences", preferences)
+
+    def record() -> SessionRecord | None:
+        folders = list((tmp_path / "sessions").glob("*"))
+        try:
+            return Session.open(folders[0]) if folders else None
+        except FileError:
+            return None  # being created
+
+    def events(name: str) -> int:
+        session = record()
+        return sum(event.name == name for event in session.events) if session else 0
+
+    def press_space_until(name: str, count: int) -> None:
+        """Press the space bar as one who watches the screen: no faster than it changes."""
+
+        def tried() -> bool:
+            if events(name) >= count:
+                return True
+            window.press("space")
+            time.sleep(0.8)
+            return events(name) >= count
+
+        wait_for(f"{name} {count}", tried, window)
+
+    try:
+        window.find()
+        time.sleep(2.0)
+        window.type("Ada")
+        window.shoot("real-1-start")
+        window.press("Return")
+        wait_for("a session", lambda: record() is not None, window)
+        for eye in (1, 2):
+            press_space_until("cursor_made", eye)
+            window.shoot(f"real-2-align-{eye}")
+            # The wearer confirms in the headset.
+            wait_for("an alignment", lambda eye=eye: events("alignment_saved") >= eye, window)
+            press_space_until("applied", eye)
+            window.shoot(f"real-3-applied-{eye}")
+        press_space_until("finished", 1)
+        window.press("ctrl+e")
+        time.sleep(1.5)
+        window.shoot("real-4-export")
+        window.press("Return")
+        wait_for("the report", lambda: (tmp_path / "out" / "report.pdf").exists(), window)
+        time.sleep(1.0)
+        window.shoot("real-5-exported")
+        window.press("Escape")
+        time.sleep(0.5)
+        window.press("ctrl+q")
+        code, errors = window.end()
+    finally:
+        window.process.kill()
+        window.process.wait()
+    assert (code, errors) == (0, "")
+    session = record()
+    assert session is not None
+    assert session.wearer == "Ada"
+    assert session.is_finished
+    assert {eye for alignment in session.alignments for eye in alignment.eyes} == {"left", "right"}
+    assert (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert json.loads(preferences.read_text())["wearers"] == ["Ada"]
+
+
+def test_the_autopilot_calibrates_exports_and_takes_pictures(
+    display: str, tmp_path: Path, preferences: Path
+) -> None:
+    pictures = ARTEFACTS / "autopilot"
+    window = Window(
+        display,
+        "--source",
+        "simulator",
+        "--autopilot",
+        "--output",
+        tmp_path / "result",
+        "--screenshots",
+        pictures,
+        "--preferences",
+        preferences,
+    )
+    assert window.end() == (0, "")
+    assert (tmp_path / "result" / "export" / "report.pdf").exists()
+    names = {path.stem for path in pictures.glob("*.png")}
+    assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
+    assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names
+
+
+def test_the_autopilot_says_where_it_got_stuck(display: str, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.yaml"
+    rig.write_text("%YAML:1.0\n")
+    window = Window(
+        display,
+        "--autopilot",
+        "--rig",
+        rig,
+        "--output",
+        tmp_path / "result",
+        "--preferences",
+        tmp_path / "preferences.json",
+    )
+    code, errors = window.end()
+    assert code == 1
+    assert errors.count("\n") == 1
+    assert "rig" in errors
