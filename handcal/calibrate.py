@@ -136,6 +136,8 @@ class Observation:
         Why there is no hand; empty if there is one.
     is_steady : bool
         Whether a cursor may be made now.
+    cloud : HandCloud or None
+        The hand in the step's own frame, whether or not its place is known.
     rotation_rad : (3,) float64 or None
         From the cursor to the live hand, about D's axes, while aligning.
     is_red : bool
@@ -148,6 +150,7 @@ class Observation:
     hand: PlacedHand | None
     problem: str
     is_steady: bool
+    cloud: HandCloud | None = None
     rotation_rad: Float64 | None = None
     is_red: bool = False
     segment_ms: float | None = None
@@ -256,6 +259,7 @@ class Calibration:
         started_s = time.perf_counter()
         self._seen_ns = self._clock.exposure_ns(frame)
         problem = ""
+        cloud: HandCloud | None = None
         try:
             cloud = segment_hand(frame, self._settings.segment)
             self._unplaced.append((cloud, self._seen_ns))
@@ -266,7 +270,7 @@ class Calibration:
         hand, not_placed = self._place_hands()
         problem = "" if hand else problem or not_placed
         observation = Observation(
-            self.state, hand, problem, self._is_steady(), segment_ms=segment_ms
+            self.state, hand, problem, self._is_steady(), cloud, segment_ms=segment_ms
         )
         if self.state is State.ALIGN:
             observation = self._guide(observation)

@@ -186,11 +186,11 @@ class _Pictures(QWidget):
         self._depth.show_image(frame.depth)
 
     def show_hand(self, frame: Frame, seen: Observation) -> None:
-        if seen.hand is None:
+        if seen.cloud is None:
             self._color.show_overlay(None)
             self._depth.show_overlay(None)
             return
-        cloud = seen.hand.cloud
+        cloud = seen.cloud
         depth_px, color_px = contour_px(cloud, frame)
         self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_red).draw)
         if color_px is not None:

@@ -184,6 +184,7 @@ def _observe(state: State, shots: Shots) -> Observation:
         shots.live,
         problem="",
         is_steady=True,
+        cloud=shots.live.cloud,
         rotation_rad=shots.rotation_rad if is_aligning else None,
         segment_ms=4.2,
         guard_ms=3.1 if is_aligning else None,

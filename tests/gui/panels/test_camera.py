@@ -106,7 +106,7 @@ def _corner(view: ImageView) -> QPoint:
 def test_the_hand_is_drawn_in_both_pictures(panel: CameraPanel, snapshot: Maker) -> None:
     panel.set_mode(Mode.BOTH)
     for name in ("colour", "depth"):
-        panel.show_snapshot(snapshot(observation={"hand": None}))
+        panel.show_snapshot(snapshot(observation={"hand": None, "cloud": None}))
         without = picture(panel, name)
         panel.show_snapshot(snapshot())
         blue = picture(panel, name)
@@ -122,7 +122,11 @@ def test_a_turned_hand_is_called_so_in_words(panel: CameraPanel, snapshot: Maker
 
 
 def test_a_lost_hand_is_explained(panel: CameraPanel, snapshot: Maker) -> None:
-    lost = {"hand": None, "problem": "hand cut by the image border; move it toward the middle"}
+    lost = {
+        "hand": None,
+        "cloud": None,
+        "problem": "hand cut by the image border; move it toward the middle",
+    }
     panel.show_snapshot(snapshot(observation=lost))
     assert view(panel, "colour").caption.startswith("Hand cut by the image border")
 
