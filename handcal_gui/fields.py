@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeVar
+from typing import TypeVar, cast
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
@@ -58,6 +58,7 @@ def choice(name: str, label: str, options: Mapping[Option, str], help_text: str 
         field.addItem(text, option)
     field.setSizePolicy(_FIXED, _FIXED)
     field.setMinimumWidth(20 * SPACING_PX)
+    _CalmWheel(field)
     return field
 
 
@@ -89,4 +90,20 @@ def _settle(field: Spin) -> Spin:
     field.setAlignment(Qt.AlignmentFlag.AlignRight)
     field.setSizePolicy(_FIXED, _FIXED)
     field.setMinimumWidth(12 * SPACING_PX)
+    _CalmWheel(field)
     return field
+
+
+class _CalmWheel(QObject):
+    """Lets the wheel scroll the page, not the value, unless the field has the focus."""
+
+    def __init__(self, field: QWidget) -> None:
+        super().__init__(field)
+        field.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # which the wheel does not give
+        field.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        is_meant = event.type() != QEvent.Type.Wheel or cast(QWidget, watched).hasFocus()
+        if not is_meant:
+            event.ignore()
+        return not is_meant

@@ -1,0 +1,48 @@
+"""Dark and light, also where the display itself knows neither."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.theme import colors, icon, is_dark, use_theme
+
+
+@pytest.fixture
+def themes(qtbot: QtBot) -> Iterator[None]:
+    yield
+    use_theme("system")
+
+
+def middle(one: QIcon) -> QColor:
+    """Return the colour of the stroke, wherever it is most opaque."""
+    image = one.pixmap(24).toImage()
+    pixels = [image.pixelColor(x, y) for x in range(24) for y in range(24)]
+    return max(pixels, key=QColor.alpha)
+
+
+@pytest.mark.usefixtures("themes")
+def test_dark_is_dark_and_gives_way_again() -> None:
+    use_theme("light")
+    light, before = colors(), QGuiApplication.palette()
+    use_theme("dark")
+    assert is_dark()
+    assert colors() != light
+    palette = QGuiApplication.palette()
+    text, ground = (
+        palette.color(role) for role in (QPalette.ColorRole.Text, QPalette.ColorRole.Base)
+    )
+    assert text.lightness() - ground.lightness() > 128
+    assert middle(icon("check")).lightness() > 128
+    use_theme("light")
+    assert not is_dark()
+    assert QGuiApplication.palette() == before
+    assert middle(icon("check")).lightness() < 128
+
+
+def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:
+    red = middle(icon("check", "#ff0000"))
+    assert (red.red(), red.green(), red.blue()) == (255, 0, 0)
