@@ -92,15 +92,13 @@ def test_asks_for_a_trial_by_key(
     assert asked.args == ["right", 0.6]
 
 
-def test_the_key_works_beside_the_panel(
-    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
-) -> None:
+def test_the_key_works_beside_the_panel(qtbot: QtBot, snapshot: Callable[..., Snapshot]) -> None:
     window = QWidget()
     qtbot.addWidget(window)
-    beside = QPushButton("Beside", window)
-    panel.setParent(window)
-    window.show()
-    panel.show()
+    beside, panel = QPushButton("Beside", window), TrialsPanel(window)
+    with qtbot.waitActive(window):
+        window.show()
+        window.activateWindow()
     panel.show_snapshot(snapshot(State.APPLIED))
     beside.setFocus()
     with qtbot.waitSignal(panel.trial_requested):
