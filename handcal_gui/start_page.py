@@ -84,7 +84,7 @@ class StartPage(QWidget):
         self.show_preferences(preferences)
 
     def show_preferences(self, preferences: Preferences) -> None:
-        """Show what is remembered, and ask for the next wearer."""
+        """Show what is remembered, for the next wearer."""
         self._recent = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
         self._look_for_sessions()

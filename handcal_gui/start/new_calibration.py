@@ -69,7 +69,7 @@ class NewCalibration(Card):
         self._lay_out()
         self._check = LatestJob(lambda question: check(*question), self)
         self._check.answered.connect(self._take_findings)
-        self._check.failed.connect(self._problem.setText)
+        self._check.failed.connect(self._give_up)
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
         self._again = QTimer(self, interval=_AGAIN_MS)
         self._settle.timeout.connect(self.check)
@@ -85,13 +85,12 @@ class NewCalibration(Card):
         return self._form.settings
 
     def show_preferences(self, preferences: Preferences) -> None:
-        """Show what is remembered, and ask for the next wearer."""
+        """Show what is remembered, for the next wearer."""
         self._form.show_settings(preferences.station)
         self._wearer.clear()
         self._wearer.addItems(list(preferences.wearers))
         self._wearer.setCurrentIndex(-1)
         self._wearer.clearEditText()
-        self._wearer.setFocus()
 
     def set_pairing_key(self, pairing_key: str) -> None:
         """Take another key for network headsets."""
@@ -128,8 +127,9 @@ class NewCalibration(Card):
             super().keyPressEvent(event)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Look at the station from now on."""
+        """Look at the station from now on, and ask for the wearer."""
         super().showEvent(event)
+        self._wearer.setFocus()
         self.check()
         self._again.start()
 
@@ -153,6 +153,10 @@ class NewCalibration(Card):
         if wearer is not None and is_ready(findings):
             self._again.start()  # not while the station is being opened
             self.start_requested.emit(self._form.settings, wearer)
+
+    def _give_up(self, why: str) -> None:
+        self._starting = None
+        self._problem.setText(why)
 
     def _lay_out(self) -> None:
         last = QHBoxLayout()

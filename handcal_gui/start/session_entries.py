@@ -38,9 +38,16 @@ class Offers:
 
 
 def find_offers(folder: Path, recent: Sequence[Path]) -> Offers:
-    """Look through the folder of the sessions, and at those opened last; takes a while."""
+    """Look through the folder of the sessions, and at those opened last; takes a while.
+
+    An unfinished session that holds nothing yet is not worth resuming.
+    """
     return Offers(
-        unfinished=tuple(_unfinished(session) for session in unfinished_sessions(folder)),
+        unfinished=tuple(
+            _unfinished(session)
+            for session in unfinished_sessions(folder)
+            if session.problem or session.alignments or session.trials
+        ),
         recent=tuple(_recent(path) for path in recent if path.exists()),
     )
 

@@ -318,3 +318,19 @@ def test_a_hidden_page_leaves_the_station_alone(
     choose(page, "source", "realsense")
     qtbot.wait(400)
     assert len(inspector.asked) == asked
+
+
+def test_a_check_that_breaks_down_is_told_and_starts_nothing(
+    qtbot: QtBot,
+    inspector: Inspector,
+    open_page: Callable[..., StartPage],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = open_page()
+    monkeypatch.setattr(inspector, "healths", None)
+    button(page, "start").click()
+    qtbot.waitUntil(lambda: "broke down" in text(page, "startProblem"))
+    monkeypatch.undo()
+    with qtbot.assertNotEmitted(page.start_requested, wait=50):
+        page.new.check()
+        qtbot.waitUntil(button(page, "start").isEnabled)

@@ -26,6 +26,7 @@ def test_unfinished_sessions_are_told_by_wearer_time_and_alignments(
 ) -> None:
     path = make(tmp_path, "Ada", [alignment], is_done=False)
     make(tmp_path, "Bea", [alignment], is_done=True)
+    make(tmp_path, "Cid", [], is_done=False)
     (entry,) = find_offers(tmp_path, ()).unfinished
     assert entry.path == path
     assert entry.is_enabled
