@@ -121,6 +121,8 @@ class Live(QObject):
         panels.fine_tune.shift_settled.connect(
             lambda: self._ask("record φ", lambda station: station.calibration.record_shift())
         )
+        # What is shown for a comparison only is not the φ that a trial is about.
+        panels.trials.trial_requested.connect(panels.fine_tune.settle)
         panels.trials.trial_requested.connect(
             lambda eye, depth_m: self._ask(
                 "record the trial", lambda station: station.save_trial(eye, depth_m)

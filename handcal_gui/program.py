@@ -155,6 +155,7 @@ class Program(QObject):
                 geometry=self.window.saveGeometry().toBase64().toStdString(),
                 live_layout=layouts.get("live", ""),
                 review_layout=layouts.get("review", ""),
+                fine_tune_step_m=self.window.panels.fine_tune.step_m,
             )
         )
         self.live.stop()
@@ -197,6 +198,7 @@ class Program(QObject):
 
     def _restore(self) -> None:
         preferences = self._preferences
+        self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
         if preferences.geometry:
             self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
         else:
