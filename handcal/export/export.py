@@ -17,6 +17,8 @@ from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
 from handcal.session import SessionRecord
 
+_SOLVING = "Solving the alignments again"
+
 
 @dataclass(frozen=True, slots=True)
 class ExportSettings:
@@ -65,7 +67,7 @@ def export_session(
     report : callable
         Told what is being made and which share of the whole is done, 0..1.
     is_cancelled : callable
-        Asked many times a second whether to give up.
+        Asked many times a second whether to give up; while solving, before each alignment.
 
     Raises
     ------
@@ -86,12 +88,12 @@ def export_session(
 
     formats = [name for name in FORMATS if name in settings.formats]
     with Staging(folder) as staging:
-        checkpoint("Solving the alignments again", 0.0)
-        outcome = conclude(record)
+        parts = 1 + len(formats)
+        outcome = conclude(record, lambda share: checkpoint(_SOLVING, share / parts))
         for done, name in enumerate(formats, 1):
 
             def part(share: float, done: int = done, name: Format = name) -> None:
-                checkpoint(FORMATS[name].title, (done + share) / (len(formats) + 1))
+                checkpoint(FORMATS[name].title, (done + share) / parts)
 
             part(0.0)
             _write(name, outcome, staging.path, folder, settings, part)

@@ -244,7 +244,7 @@ def _ellipse(ax: Axes, shift: EyeShift, color: str, linewidth: float) -> None:
 
 
 def _color_bar(ax: Axes, colored: ScalarMappable) -> None:
-    inset = ax.inset_axes((0.93, 0.1, 0.025, 0.8))
+    inset = ax.inset_axes((0.9, 0.1, 0.025, 0.8))
     bar = ax.figure.colorbar(colored, cax=inset, extend="max")
     bar.ax.tick_params(labelsize=6.0, pad=1, length=2)
     bar.set_label("mm", fontsize=6.0, labelpad=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -74,8 +74,16 @@ class Outcome:
         return Projection(eye, P, display.width_px, display.height_px)
 
 
-def conclude(record: SessionRecord) -> Outcome:
+def conclude(
+    record: SessionRecord, checkpoint: Callable[[float], None] = lambda _share: None
+) -> Outcome:
     """Solve a session's alignments again, with its own settings.
+
+    Parameters
+    ----------
+    record : SessionRecord
+    checkpoint : callable
+        Told the share done, before each alignment; what it raises ends the solving.
 
     Raises
     ------
@@ -86,7 +94,9 @@ def conclude(record: SessionRecord) -> Outcome:
     results = None
     if record.alignments:
         try:
-            results = solve_session(record.alignments, record.rig, settings)
+            results = solve_session(
+                record.alignments, record.rig, settings, lambda _what, share: checkpoint(share)
+            )
         except ValueError as error:
             raise FileError(f"{record.path} cannot be solved: {error}") from error
     return Outcome(

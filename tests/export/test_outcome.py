@@ -53,6 +53,12 @@ def test_without_alignments_there_is_only_the_offline_calibration(empty: Session
     assert outcome.is_applied("left", "offline")
 
 
+def test_it_tells_how_far_it_is(record: SessionRecord) -> None:
+    shares: list[float] = []
+    conclude(record, shares.append)
+    assert shares == [0.0, 0.5]
+
+
 def test_what_cannot_be_solved_is_refused_in_one_line(record: SessionRecord) -> None:
     few = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
     with pytest.raises(FileError, match=r"one cannot be solved: hand_m has 5 points"):
