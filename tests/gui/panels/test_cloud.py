@@ -3,6 +3,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QImage
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -41,12 +43,11 @@ def _legend(panel: CloudPanel) -> list[str]:
 
 def _count(widget: QWidget, color: str) -> int:
     """Return how many pixels of a widget have nearly a colour, at most a third faded."""
-    image = widget.grab().toImage().convertToFormat(widget.grab().toImage().Format.Format_RGB888)
-    pixels = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
-    pixels = pixels[:, : 3 * image.width()].reshape(image.height(), image.width(), 3)
+    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGBA8888)
+    pixels = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4)
     wanted, canvas = np.array(rgb(color), float), np.array(rgb(colors().canvas), float)
     faded = [wanted + part * (canvas - wanted) for part in np.linspace(0.0, 0.35, 8)]
-    near = [np.abs(pixels - shade).max(axis=2) < 8 for shade in faded]
+    near = [np.abs(pixels[..., :3] - shade).max(axis=2) < 8 for shade in faded]
     return int(np.count_nonzero(np.any(near, axis=0)))
 
 
@@ -160,12 +161,12 @@ def test_residual_colors_tell_distances_and_outliers_apart() -> None:
     ],
 )
 def test_buttons_and_keys_look_from_a_side(
-    qtbot: QtBot, panel: CloudPanel, name: str, key: Qt.Key, yaw_deg: float, pitch_deg: float
+    panel: CloudPanel, name: str, key: Qt.Key, yaw_deg: float, pitch_deg: float
 ) -> None:
     view, button = _view(panel), panel.findChild(QToolButton, f"cloud-{name}")
     assert button is not None
-    for look in (button.click, lambda: qtbot.keyClick(view, key)):
-        qtbot.keyClick(view, Qt.Key.Key_R)
+    for look in (button.click, lambda: QTest.keyClick(view, key)):
+        QTest.keyClick(view, Qt.Key.Key_R)
         assert view.orbit.yaw_rad not in (0.0, np.radians(90.0))
         look()
         assert np.degrees([view.orbit.yaw_rad, view.orbit.pitch_rad]) == pytest.approx(
@@ -173,18 +174,16 @@ def test_buttons_and_keys_look_from_a_side(
         )
 
 
-def test_mouse_turns_moves_and_goes_back(
-    qtbot: QtBot, panel: CloudPanel, snapshot: MakeSnapshot
-) -> None:
+def test_mouse_turns_moves_and_goes_back(panel: CloudPanel, snapshot: MakeSnapshot) -> None:
     view = _view(panel)
     panel.show_snapshot(snapshot())
     panel.grab()
     start = view.orbit
 
     def drag(button: Qt.MouseButton) -> None:
-        qtbot.mousePress(view, button, pos=QPoint(100, 100))
-        qtbot.mouseMove(view, QPoint(130, 110))
-        qtbot.mouseRelease(view, button, pos=QPoint(130, 110))
+        QTest.mousePress(view, button, pos=QPoint(100, 100))
+        QTest.mouseMove(view, QPoint(130, 110))
+        QTest.mouseRelease(view, button, pos=QPoint(130, 110))
 
     drag(Qt.MouseButton.LeftButton)
     assert view.orbit.yaw_rad == pytest.approx(start.yaw_rad - 0.3)
@@ -192,11 +191,11 @@ def test_mouse_turns_moves_and_goes_back(
     before = view.orbit
     drag(Qt.MouseButton.RightButton)
     assert view.orbit.centre_mm != before.centre_mm
-    qtbot.keyClick(view, Qt.Key.Key_Plus)
+    QTest.keyClick(view, Qt.Key.Key_Plus)
     assert view.orbit.px_per_mm == pytest.approx(1.2 * before.px_per_mm)
     panel.grab()  # a chosen size is kept
     assert view.orbit.px_per_mm == pytest.approx(1.2 * before.px_per_mm)
-    qtbot.mouseDClick(view, Qt.MouseButton.LeftButton)
+    QTest.mouseDClick(view, Qt.MouseButton.LeftButton)
     panel.grab()
     assert view.orbit == start
 

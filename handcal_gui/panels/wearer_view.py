@@ -1,0 +1,152 @@
+"""The wearer's view panel: hand and cursor as each eye sees them through its display."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Eye
+from handcal.wearer_view import EyeView, Overlay
+from handcal_gui.eye_canvas import LINES, EyeCanvas
+from handcal_gui.legend import LegendEntry
+from handcal_gui.theme import SPACING_PX, number_font
+
+_TITLES: dict[Eye, str] = {"left": "Left eye", "right": "Right eye"}
+_EMPTY = "What this eye sees will appear here. Hold a hand up before the depth camera."
+_CLOSED = "Closed: this alignment is for the other eye."
+_ERROR = (
+    "Mean distance between the hand's outline as the eye sees it and as {}, "
+    "in the display's pixels and in minutes of arc (′)"
+)
+_LEGEND = {
+    "hand": ("Hand", "The hand's outline as the eye sees it"),
+    "drawn": ("Drawn", "The hand's outline as the headset draws it: on the hand if φ is right"),
+    "cursor": ("Cursor", "The frozen hand as the headset draws it"),
+    "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
+}
+
+
+class WearerViewPanel(QWidget):
+    """Both eyes side by side: what calibration did is seen here.
+
+    With the simulator the pictures are what the true eyes see; with a real headset they are
+    predicted from the solved eye shift.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("wearer-view-panel")
+        self._eyes = {eye: _EyeColumn(_TITLES[eye]) for eye in EYES}
+        self._entries = {
+            what: LegendEntry(name, *LINES[what], tooltip)
+            for what, (name, tooltip) in _LEGEND.items()
+        }
+        whole, before = QCheckBox("Whole display"), QCheckBox("Before")
+        whole.setObjectName("wearer-view-whole")
+        whole.setToolTip("Show all of each display instead of the part that holds the hand")
+        before.setObjectName("wearer-view-before")
+        before.setToolTip(_LEGEND["offline"][1])
+        before.toggled.connect(self._entries["offline"].setVisible)
+        self._entries["offline"].hide()
+        for column in self._eyes.values():
+            whole.toggled.connect(column.canvas.show_whole)
+            before.toggled.connect(column.canvas.show_offline)
+        self._lay_out(whole, before)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show what the eyes see, which eye is closed, or why there is nothing to see."""
+        seen, procedure = snapshot.observation, snapshot.procedure
+        problem = snapshot.camera.problem or (seen.problem if seen else "")
+        for eye, column in self._eyes.items():
+            is_closed = procedure.cursor is not None and eye not in procedure.eyes
+            message = _CLOSED if is_closed else problem[:1].upper() + problem[1:]
+            is_solved = procedure.results is not None and eye in procedure.results.shifts
+            column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
+
+    def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:
+        options, eyes, legend = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
+        for row in (options, eyes, legend):
+            row.setSpacing(SPACING_PX)
+        options.addWidget(whole)
+        options.addWidget(before)
+        options.addStretch()
+        for column in self._eyes.values():
+            eyes.addWidget(column, 1)
+        for entry in self._entries.values():
+            legend.addWidget(entry)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(options)
+        layout.addLayout(eyes, 1)
+        layout.addLayout(legend)
+
+
+class _EyeColumn(QWidget):
+    """One eye's title, picture and errors."""
+
+    def __init__(self, title: str) -> None:
+        super().__init__()
+        self._name = title
+        self._title = QLabel(title)
+        self.canvas = EyeCanvas(title)
+        self._now = _ErrorRow("Now", _ERROR.format("the headset draws it"))
+        self._before = _ErrorRow("Before", _ERROR.format("drawn before calibration (φ = 0)"))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(self._title)
+        layout.addWidget(self.canvas, 1)
+        layout.addWidget(self._now)
+        layout.addWidget(self._before)
+        self.show_view(None, "", is_solved=False)
+
+    def show_view(self, view: EyeView | None, message: str, *, is_solved: bool) -> None:
+        """Show a view, or why there is none; errors only where the eye's place is known."""
+        self.canvas.show_view(view, message or ("" if view else _EMPTY))
+        self._title.setText(f"{self._name}{_origin(view, is_solved=is_solved)}")
+        is_known = view is not None and (view.is_true or is_solved) and not message
+        self._now.show_overlay(view.drawn if view and is_known else None)
+        self._before.show_overlay(view.offline if view and is_known else None)
+
+
+def _origin(view: EyeView | None, *, is_solved: bool) -> str:
+    """Return where the knowledge of the eye's place comes from."""
+    if view is None:
+        return ""
+    if view.is_true:
+        return ", simulated"
+    return ", predicted" if is_solved else ", not solved yet"
+
+
+class _ErrorRow(QWidget):
+    """By how much a drawn outline misses the hand, in numbers that do not jump."""
+
+    def __init__(self, name: str, tooltip: str) -> None:
+        super().__init__()
+        self.setToolTip(tooltip)
+        self._px, self._arcmin = QLabel(), QLabel()
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(QLabel(name), 1)
+        for label, widest in ((self._px, "999.9 px"), (self._arcmin, "999.9′")):
+            label.setFont(number_font(0.85))
+            label.setMinimumWidth(label.fontMetrics().horizontalAdvance(widest))
+            label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            layout.addWidget(label)
+
+    @property
+    def text(self) -> str:
+        """Both numbers."""
+        return f"{self._px.text()} {self._arcmin.text()}"
+
+    def show_overlay(self, overlay: Overlay | None) -> None:
+        """Show an overlay's errors, if there is one with an outline."""
+        if overlay is None or overlay.error_px is None:
+            self._px.setText("– px")
+            self._arcmin.setText("–′")
+        else:
+            self._px.setText(f"{overlay.error_px:.1f} px")
+            self._arcmin.setText(f"{overlay.error_arcmin:.1f}′")

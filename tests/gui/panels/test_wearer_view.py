@@ -1,0 +1,144 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from PySide6.QtWidgets import QCheckBox, QLabel
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.results import Results
+from handcal.snapshot import Snapshot
+from handcal.types import EYES, Eye
+from handcal.wearer_view import EyeView
+from handcal_gui.eye_canvas import EyeCanvas
+from handcal_gui.legend import LegendEntry
+from handcal_gui.panels.wearer_view import WearerViewPanel
+
+MakeSnapshot = Callable[..., Snapshot]
+UNKNOWN = ["– px", "–′"] * 2
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> WearerViewPanel:
+    panel = WearerViewPanel()
+    qtbot.addWidget(panel)
+    panel.resize(380, 300)
+    panel.show()
+    return panel
+
+
+def _canvas(panel: WearerViewPanel, eye: Eye) -> EyeCanvas:
+    canvas = panel.findChild(EyeCanvas, f"{eye}-eye")
+    assert canvas is not None
+    return canvas
+
+
+def _texts(panel: WearerViewPanel, eye: Eye) -> list[str]:
+    """Return the title and the numbers of an eye, now and before."""
+    column = _canvas(panel, eye).parentWidget()
+    assert column is not None
+    texts = [label.text() for label in column.findChildren(QLabel)]
+    return [text for text in texts if text not in ("Now", "Before")]
+
+
+def _predicted(snapshot: Snapshot) -> dict[Eye, EyeView]:
+    return {eye: replace(view, is_true=False) for eye, view in snapshot.views.items()}
+
+
+def test_empty_it_says_what_will_appear(panel: WearerViewPanel) -> None:
+    for eye in EYES:
+        assert "will appear here" in _canvas(panel, eye).accessibleDescription()
+        assert _texts(panel, eye)[1:] == UNKNOWN
+
+
+def test_simulated_eyes_show_their_errors(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
+    now = snapshot()
+    panel.show_snapshot(now)
+    for eye in EYES:
+        drawn = now.views[eye].drawn
+        assert drawn.error_px is not None
+        assert drawn.error_px > 1.0
+        title, px, arcmin, *before = _texts(panel, eye)
+        assert title == f"{eye.capitalize()} eye, simulated"
+        assert px == f"{drawn.error_px:.1f} px"
+        assert arcmin == f"{drawn.error_arcmin:.1f}′"
+        assert before == [px, arcmin]  # nothing is applied yet
+        assert _canvas(panel, eye).accessibleDescription() == ""
+
+
+def test_eye_that_is_not_known_has_no_error(
+    panel: WearerViewPanel, snapshot: MakeSnapshot, results: Results
+) -> None:
+    panel.show_snapshot(snapshot(views=_predicted(snapshot())))
+    assert _texts(panel, "left") == ["Left eye, not solved yet", *UNKNOWN]
+    solved = snapshot(State.SOLVED, procedure={"results": results}, views=_predicted(snapshot()))
+    panel.show_snapshot(solved)
+    title, px, *_ = _texts(panel, "left")
+    assert title == "Left eye, predicted"
+    assert px == f"{solved.views['left'].drawn.error_px:.1f} px"
+
+
+def test_eye_that_is_closed_says_so(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
+    panel.show_snapshot(snapshot(procedure={"eyes": ("left",)}))
+    assert _canvas(panel, "left").accessibleDescription() == ""
+    assert "Closed" in _canvas(panel, "right").accessibleDescription()
+    assert _texts(panel, "right")[1:] == UNKNOWN
+    # Without a cursor both eyes are open.
+    panel.show_snapshot(snapshot(State.SHOW_HAND, procedure={"eyes": ("left",)}))
+    assert _canvas(panel, "right").accessibleDescription() == ""
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"observation": {"hand": None, "problem": "no hand in view"}},
+        {"observation": None, "camera": {"problem": "no hand in view"}},
+    ],
+    ids=["lost hand", "camera"],
+)
+def test_problem_takes_the_place_of_the_view(
+    panel: WearerViewPanel, snapshot: MakeSnapshot, changes: dict[str, object]
+) -> None:
+    panel.show_snapshot(snapshot())
+    panel.show_snapshot(snapshot(**changes))
+    for eye in EYES:
+        assert _canvas(panel, eye).accessibleDescription() == "No hand in view"
+        assert _texts(panel, eye)[1:] == UNKNOWN
+
+
+def test_options_change_both_eyes(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
+    panel.show_snapshot(snapshot())
+    crops = [_canvas(panel, eye).crop_px for eye in EYES]
+    before = panel.findChild(LegendEntry, "legend-before")
+    assert before is not None
+    assert not before.isVisible()
+    for name in ("wearer-view-whole", "wearer-view-before"):
+        option = panel.findChild(QCheckBox, name)
+        assert option is not None
+        option.click()
+    assert before.isVisible()
+    for eye, crop in zip(EYES, crops, strict=True):
+        assert _canvas(panel, eye).crop_px != crop
+        assert _canvas(panel, eye).crop_px.width() == snapshot().views[eye].width_px
+
+
+def test_it_fits_into_a_small_dock_and_does_not_jump(
+    panel: WearerViewPanel, snapshot: MakeSnapshot
+) -> None:
+    empty = panel.minimumSizeHint()
+    panel.show_snapshot(snapshot())
+    assert panel.minimumSizeHint() == empty
+    assert empty.width() <= 300
+    assert empty.height() <= 210
+
+
+def test_numbers_of_three_digits_have_room(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
+    """Thirty millimetres of eye shift move the outline by more than a hundred pixels."""
+    width = panel.minimumSizeHint().width()
+    views = {
+        eye: replace(view, drawn=replace(view.drawn, error_px=123.4, error_arcmin=172.5))
+        for eye, view in snapshot().views.items()
+    }
+    panel.show_snapshot(snapshot(views=views))
+    assert _texts(panel, "left")[1:3] == ["123.4 px", "172.5′"]
+    assert panel.minimumSizeHint().width() == width
