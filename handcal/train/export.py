@@ -1,8 +1,13 @@
-"""The trained network as ONNX: in 32-bit floats, and quantised to 8-bit integers."""
+"""The trained network as ONNX: in 32-bit floats, and quantised to 8-bit integers.
+
+``python -m handcal.train.export --data DIR``
+"""
 
 from __future__ import annotations
 
+import argparse
 import tempfile
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,11 +23,29 @@ from onnxruntime.quantization import (
 from onnxruntime.quantization.shape_inference import quant_pre_process
 from torch import Tensor, nn
 
-from handcal.evaluate.annotations import Photo, read_image
+from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
+from handcal.evaluate.annotations import Photo, read_annotations, read_image
 from handcal.hand.detect import DetectSettings, letterbox
+from handcal.train.loop import read_average
 from handcal.train.model import HandNet
 
 _OPSET = 17
+_CALIBRATED = 200
+
+
+def main() -> None:
+    """Export the averaged weights of the last checkpoint."""
+    parser = argparse.ArgumentParser(prog="python -m handcal.train.export", description=__doc__)
+    parser.add_argument("--data", type=Path, required=True, help="oxford_hands: train and val")
+    parser.add_argument("--folder", type=Path, default=Path(".training"), help="working files")
+    parser.add_argument("--output", type=Path, default=Path("resources"))
+    arguments = parser.parse_args()
+    net = read_average(arguments.folder)
+    export_float(net, arguments.output / FLOAT_MODEL)
+    train = arguments.data / "train"
+    photos = read_annotations(train, train / "annotations.json")
+    chosen = photos[:: len(photos) // _CALIBRATED]
+    export_integer(arguments.output / FLOAT_MODEL, arguments.output / INTEGER_MODEL, chosen)
 
 
 class _Camera(nn.Module):
@@ -39,16 +62,18 @@ class _Camera(nn.Module):
 
 def export_float(net: HandNet, path: Path) -> None:
     """Write the network with input ``image`` (1, H, W, 3) uint8 and output ``raw`` (5, N)."""
-    torch.onnx.export(
-        _Camera(net).eval().cpu(),
-        (torch.zeros(1, 256, 320, 3, dtype=torch.uint8),),
-        str(path),
-        input_names=["image"],
-        output_names=["raw"],
-        dynamic_axes={"image": {1: "height", 2: "width"}, "raw": {1: "points"}},
-        opset_version=_OPSET,
-        dynamo=False,
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # this exporter is the old one, but needs fewer packages
+        torch.onnx.export(
+            _Camera(net).eval().cpu(),
+            (torch.zeros(1, 256, 320, 3, dtype=torch.uint8),),
+            str(path),
+            input_names=["image"],
+            output_names=["raw"],
+            dynamic_axes={"image": {1: "height", 2: "width"}, "raw": {1: "points"}},
+            opset_version=_OPSET,
+            dynamo=False,
+        )
 
 
 def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> None:
@@ -88,3 +113,7 @@ class _Calibration(CalibrationDataReader):  # type: ignore[misc]
         for photo in photos:
             canvas, _ = letterbox(read_image(photo.path), DetectSettings().pixels)
             yield {"image": np.ascontiguousarray(canvas[None])}
+
+
+if __name__ == "__main__":
+    main()

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.utils.data import DataLoader
 
+from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo, read_image
 from handcal.evaluate.detector import SCORE_MIN, summary
 from handcal.evaluate.precision import ImageResult
@@ -21,6 +22,8 @@ from handcal.hand.detect import DetectSettings, decode, letterbox, points
 from handcal.train.loss import Grid, detection_loss
 from handcal.train.model import HandNet
 from handcal.train.samples import Samples, SampleSettings, collate
+
+_CHECKPOINT = "checkpoint.pt"
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +109,7 @@ class Training:
         self._folder = folder
         self._settings = settings
         self._pace = pace
-        self._checkpoint = folder / "checkpoint.pt"
+        self._checkpoint = folder / _CHECKPOINT
         if self._checkpoint.exists():
             self._restore()
 
@@ -211,6 +214,29 @@ class Training:
         line = json.dumps({"step": self._step, "time": time.strftime("%H:%M:%S"), **values})
         with (self._folder / "log.jsonl").open("a") as file:
             file.write(line + "\n")
+
+
+def read_average(folder: Path) -> HandNet:
+    """Return the averaged network of the checkpoint in a folder.
+
+    Raises
+    ------
+    FileError
+        If there is none.
+    """
+    path = folder / _CHECKPOINT
+    if not path.exists():
+        raise FileError(f"{path} is missing; train first")
+    average = torch.load(path, map_location="cpu", weights_only=True)["average"]
+    net = HandNet()
+    net.load_state_dict(
+        {
+            name.removeprefix("module."): value
+            for name, value in average.items()
+            if name.startswith("module.")
+        }
+    )
+    return net.eval()
 
 
 def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[Photo]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -12,14 +13,50 @@ from handcal.geometry import rigid, transform
 from handcal.sim.hand import HandModel, HandSettings, make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.render import World, render
-from handcal.sim.room import make_room
-from handcal.types import Float64, Intrinsics
+from handcal.sim.room import Room, make_room
+from handcal.types import Bool, Float64, Intrinsics, UInt8
 
 # A third of the colour image of an Intel RealSense D415, 69° across.
 CAMERA = Intrinsics(width=424, height=240, fx=306.0, fy=306.0, cx=211.5, cy=119.5)
 _FIRST_SEED = 1_000_000  # tests and benchmarks count from 0
 _HANDS_PER_ROOM = 25
 _GRID_M = 0.003
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A simulated hand in a simulated room.
+
+    Attributes
+    ----------
+    color : (H, W, 3) uint8
+        RGB.
+    is_hand : (H, W) bool
+        The hand and its forearm.
+    box : (4,) float64
+        x0, y0, x1, y1 about the hand without its forearm, px; may reach beyond the image.
+    skin : (3,) float64
+        Mean colour of the skin in even light, RGB of 0 to 255.
+    """
+
+    color: UInt8
+    is_hand: Bool
+    box: Float64
+    skin: Float64
+
+
+def picture(seed: int, room: Room, camera: Intrinsics, settings: HandSettings) -> Picture:
+    """Draw the hand of a seed, raised somewhere before a camera in a room."""
+    rng = np.random.default_rng(seed)
+    hand = make_hand(seed, settings)
+    T_W_D = rigid([rng.normal(0.0, 0.2), rng.uniform(-3.1, 3.1), 0.0])
+    T_D_hand = _raised(rng, camera)
+    _, color = render(World(hand, room), T_W_D, T_W_D @ T_D_hand, camera)
+    drawn = draw_hand(hand, T_D_hand, camera)
+    rows, columns = drawn.depth_m.shape
+    is_hand = np.zeros(color.shape[:2], bool)
+    is_hand[drawn.y0 : drawn.y0 + rows, drawn.x0 : drawn.x0 + columns] = np.isfinite(drawn.depth_m)
+    return Picture(color, is_hand, _hand_box(hand, T_D_hand, camera), hand.colors.mean(0))
 
 
 def render_hands(folder: Path, count: int) -> None:
@@ -35,36 +72,27 @@ def render_hands(folder: Path, count: int) -> None:
         seed = _FIRST_SEED + number
         if number % _HANDS_PER_ROOM == 0:
             room = make_room(seed)
-        rng = np.random.default_rng(seed)
-        hand = make_hand(seed, HandSettings(grid_m=_GRID_M))
-        T_W_D = rigid([rng.normal(0.0, 0.2), rng.uniform(-3.1, 3.1), 0.0])
-        T_D_hand = _raised(rng)
-        _, color = render(World(hand, room), T_W_D, T_W_D @ T_D_hand, CAMERA)
-        drawn = draw_hand(hand, T_D_hand, CAMERA)
-        rows, columns = drawn.depth_m.shape
-        alpha = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
-        alpha[drawn.y0 : drawn.y0 + rows, drawn.x0 : drawn.x0 + columns][
-            np.isfinite(drawn.depth_m)
-        ] = 255
+        drawn = picture(seed, room, CAMERA, HandSettings(grid_m=_GRID_M))
         name = f"{number:05}.png"
-        boxes[name] = hand_box(hand, T_D_hand, CAMERA).tolist()
-        cv2.imwrite(str(folder / name), np.dstack([color[..., ::-1], alpha]))
+        boxes[name] = drawn.box.round(1).tolist()
+        alpha = np.where(drawn.is_hand, np.uint8(255), np.uint8(0))
+        cv2.imwrite(str(folder / name), np.dstack([drawn.color[..., ::-1], alpha]))
     write_json(listing, boxes)
 
 
-def hand_box(hand: HandModel, T_D_hand: Float64, camera: Intrinsics) -> Float64:
+def _hand_box(hand: HandModel, T_D_hand: Float64, camera: Intrinsics) -> Float64:
     """Return x0, y0, x1, y1 about the hand, its forearm left out, in pixels; (4,) float64."""
     beyond_wrist = (hand.vertices_m - hand.wrist_m) @ hand.arm_axis < 0.0
     x, y, z = transform(T_D_hand, hand.vertices_m[beyond_wrist].astype(np.float64)).T
     u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-    return np.array([u.min(), v.min(), u.max(), v.max()]).round(1)
+    return np.array([u.min(), v.min(), u.max(), v.max()])
 
 
-def _raised(rng: np.random.Generator) -> Float64:
+def _raised(rng: np.random.Generator, camera: Intrinsics) -> Float64:
     """Return the pose of a hand in view, within arm's reach, palm or back to the camera."""
     z = rng.uniform(0.3, 0.7)
-    x = z * rng.uniform(0.15, 0.85) * CAMERA.width / CAMERA.fx - z * CAMERA.cx / CAMERA.fx
-    y = z * rng.uniform(0.3, 0.75) * CAMERA.height / CAMERA.fy - z * CAMERA.cy / CAMERA.fy
+    x = z * rng.uniform(0.15, 0.85) * camera.width / camera.fx - z * camera.cx / camera.fx
+    y = z * rng.uniform(0.3, 0.75) * camera.height / camera.fy - z * camera.cy / camera.fy
     facing = rigid([0.0, np.pi * rng.integers(2), 0.0])
     tilted = rigid([rng.normal(0.0, 0.35), rng.normal(0.0, 0.4), 0.0])
     rolled = rigid([0.0, 0.0, rng.normal(0.0, 0.6)])

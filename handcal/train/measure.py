@@ -1,0 +1,108 @@
+"""The figures of the model card: ``python -m handcal.train.measure --data DIR``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
+from handcal.evaluate.annotations import read_annotations
+from handcal.evaluate.detector import SCORE_MIN, detect_all, summary
+from handcal.hand.detect import DetectSettings, HandDetector, overlaps
+from handcal.resources import resource_path
+from handcal.sim.hand import HandSettings
+from handcal.sim.raster import D415
+from handcal.sim.room import make_room
+from handcal.train.simulated import Picture, picture
+from handcal.types import UInt8
+
+_OVERLAP = 0.5
+# Luminance of the skin in even light that parts three groups of about the same size.
+_TONES = {"dark": 0.0, "medium": 117.0, "light": 157.0}
+_RUNS = 50
+
+
+def main() -> None:
+    """Measure both models and print JSON."""
+    parser = argparse.ArgumentParser(prog="python -m handcal.train.measure", description=__doc__)
+    parser.add_argument("--data", type=Path, required=True, help="oxford_hands: train and val")
+    parser.add_argument("--seeds", type=int, default=200, help="simulated frames")
+    arguments = parser.parse_args()
+    pictures = list(simulated_pictures(arguments.seeds))
+    for model in (FLOAT_MODEL, INTEGER_MODEL):
+        path = resource_path(model)
+        figures = {
+            "model": model,
+            "photographs": photographed(path, arguments.data / "val"),
+            "simulated": simulated(HandDetector(path), pictures),
+            "median_ms": latency_ms(HandDetector(path), pictures[0].color),
+        }
+        print(json.dumps(figures))  # noqa: T201
+
+
+def photographed(model: Path, folder: Path) -> dict[str, float | None]:
+    """Return the average precisions on a folder of annotated photographs."""
+    photos = read_annotations(folder, folder / "annotations.json")
+    detector = HandDetector(model, DetectSettings(score_min=SCORE_MIN))
+    return summary(photos, detect_all(photos, detector))
+
+
+def simulated_pictures(seeds: int) -> Iterator[Picture]:
+    """Yield a hand, wholly in view, and a room for each seed, as a D415 sees them."""
+    for seed in range(seeds):
+        room = make_room(seed)
+        attempt = 0
+        while _shown(found := picture(seed + 10_000 * attempt, room, D415, HandSettings())) < 1.0:
+            attempt += 1
+        yield found
+
+
+def simulated(detector: HandDetector, pictures: list[Picture]) -> dict[str, Any]:
+    """Return the share of simulated hands that are found, over all and by skin tone.
+
+    Found is a hand whose box the best detection overlaps by half.
+    """
+    tones: dict[str, list[bool]] = {tone: [] for tone in _TONES}
+    for drawn in pictures:
+        boxes = detector.detect(drawn.color).boxes_px[:1]
+        found = bool((overlaps(boxes, drawn.box[None]) >= _OVERLAP).any())
+        luminance = drawn.skin @ [0.299, 0.587, 0.114]
+        tone = [name for name, least in _TONES.items() if luminance >= least][-1]
+        tones[tone].append(found)
+    everything = [found for group in tones.values() for found in group]
+    return {
+        "found": np.mean(everything),
+        **{
+            tone: {"found": np.mean(group), "frames": len(group)}
+            for tone, group in tones.items()
+            if group
+        },
+    }
+
+
+def latency_ms(detector: HandDetector, color: UInt8) -> float:
+    """Return the median time of one detection, from the camera's image to boxes."""
+    times_ms = []
+    for _ in range(_RUNS):
+        started_s = time.perf_counter()
+        detector.detect(color)
+        times_ms.append(1e3 * (time.perf_counter() - started_s))
+    return float(np.median(times_ms))
+
+
+def _shown(drawn: Picture) -> float:
+    """Return which share of a hand's box is within the image."""
+    height, width = drawn.color.shape[:2]
+    cut = drawn.box.clip(0.0, [width, height, width, height])
+    whole, shown = (np.prod(box[2:] - box[:2]) for box in (drawn.box, cut))
+    return float(shown / whole)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("onnx")
+import onnxruntime
+import torch
+
+from handcal.errors import FileError
+from handcal.evaluate.annotations import Photo
+from handcal.hand.detect import points
+from handcal.train.export import export_float, export_integer
+from handcal.train.loop import read_average
+from handcal.train.model import HandNet
+from handcal.types import Float32, UInt8
+
+RNG = np.random.default_rng(0)
+IMAGE: UInt8 = RNG.integers(0, 256, (1, 96, 64, 3), np.uint8)
+
+
+@pytest.fixture(scope="module")
+def net() -> HandNet:
+    torch.manual_seed(0)
+    return HandNet().eval()
+
+
+@pytest.fixture(scope="module")
+def float_model(net: HandNet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("models") / "float.onnx"
+    export_float(net, path)
+    return path
+
+
+def run(model: Path) -> Float32:
+    session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
+    [raw] = session.run(["raw"], {"image": IMAGE})
+    return np.asarray(raw, np.float32)
+
+
+def test_the_exported_network_computes_the_same(net: HandNet, float_model: Path) -> None:
+    with torch.inference_mode():
+        expected = net(torch.from_numpy(IMAGE).permute(0, 3, 1, 2).float())[0].numpy()
+    raw = run(float_model)
+    assert raw.shape == (5, len(points(96, 64)[0]))
+    assert raw == pytest.approx(expected, abs=1e-4)
+
+
+def test_integers_come_close_in_a_quarter_of_the_bytes(float_model: Path, tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), IMAGE[0])
+    photo = Photo(
+        tmp_path / "a.png", 64, 96, np.zeros((0, 4)), np.zeros((0, 4, 2)), np.zeros(0, bool)
+    )
+    integer_model = tmp_path / "integer.onnx"
+    export_integer(float_model, integer_model, [photo])
+    assert integer_model.stat().st_size < 0.35 * float_model.stat().st_size
+    difference = np.abs(run(integer_model) - run(float_model))
+    assert difference.mean() < 0.1
+
+
+def test_without_training_there_is_nothing_to_export(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="train first"):
+        read_average(tmp_path)
