@@ -11,7 +11,7 @@ from handcal_gui.jobs import Job
 
 
 class LatestJob(QObject):
-    """Calls `work` in a job, one at a time; of the questions asked meanwhile the last is kept.
+    """Calls `work` in a job, one at a time, and answers only what nothing was asked after.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class LatestJob(QObject):
         self._next: list[object] = []
 
     def ask(self, question: object) -> None:
-        """Ask, at once or after the answer to the present question."""
+        """Ask, at once or when the job that runs has ended."""
         self._next = [question]
         if self._job is None:
             self._start()
@@ -50,25 +50,27 @@ class LatestJob(QObject):
 
     def _start(self) -> None:
         question = self._next.pop()
-        # Without a parent: should this object be destroyed, the job's thread keeps the job alive.
         self._question = question
+        # Without a parent: should this object be destroyed, the job's thread keeps the job alive.
         self._job = Job(lambda _report, _is_cancelled: self._work(question))
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
         self._job.start()
 
     def _succeed(self, answer: object) -> None:
-        question = self._question
-        self._end()
-        self.answered.emit(question, answer)
+        if self._is_newest():
+            self.answered.emit(self._question, answer)
 
     def _fail(self, why: str) -> None:
-        self._end()
-        self.failed.emit(why)
+        if self._is_newest():
+            self.failed.emit(why)
 
-    def _end(self) -> None:
+    def _is_newest(self) -> bool:
+        """End the job; start the next, and return False, if more was asked meanwhile."""
         assert self._job is not None
         self._job.wait()
         self._job = None
         if self._next:
             self._start()
+            return False
+        return True
