@@ -563,14 +563,17 @@ class Calibration:
 
     def _is_steady(self) -> bool:
         """Tell whether a hand is in view, placed, and has hardly moved for a while."""
-        settings = self._settings
-        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > 1e9 * settings.steady_s:
+        steady_ns = round(1e9 * self._settings.steady_s)
+        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > steady_ns:
             return False
-        since_ns = self._seen_ns - round(1e9 * settings.steady_s)
-        if self._hands[0].t_host_ns > since_ns:
-            return False
-        places = [hand.middle_W_m for hand in self._hands if hand.t_host_ns >= since_ns]
-        return len(places) > 2 and float(np.ptp(places, axis=0).max()) < settings.steady_m
+        since_ns = self._seen_ns - steady_ns
+        before = [hand.middle_W_m for hand in self._hands if hand.t_host_ns <= since_ns]
+        after = [hand.middle_W_m for hand in self._hands if hand.t_host_ns > since_ns]
+        # From the last before on, so that a slow camera shows enough of them too.
+        places = before[-1:] + after
+        return (
+            bool(before and after) and float(np.ptp(places, axis=0).max()) < self._settings.steady_m
+        )
 
     def _guide(self, observation: Observation) -> Observation:
         """Show the live hand in its colour and take a confirmation."""
