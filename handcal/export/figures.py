@@ -26,6 +26,8 @@ _COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
 _MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
 _LINES: Mapping[Eye, str] = {"left": "-", "right": "--"}
 _HAND, _CURSOR = "#0072B2", "#D55E00"
+# No scale ends below, lest rounding look like a finding.
+_LEAST_MM = 0.01
 _LABEL_PT, _TITLE_PT = 7.5, 8.5
 # Side of a cell of the residual map, and the colour of one without inliers.
 _CELL_MM = 2.5
@@ -44,7 +46,7 @@ def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Resu
                 rms_mm = 1e3 * np.sqrt(shifts[eye].history_m2)
                 steps = np.arange(1, len(rms_mm) + 1)
                 ax.plot(steps, rms_mm, ".-", linewidth=0.8, markersize=3, label=f"{number}")
-        ax.set_ylim(bottom=0.0)
+        ax.set_ylim(0.0, max(_LEAST_MM, ax.get_ylim()[1]))
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         _name(ax, f"{eye} eye", "iteration", "RMS pair distance, mm")
         if 0 < len(ax.lines) <= 8:
@@ -54,6 +56,8 @@ def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Resu
 def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> None:
     """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
     count = len(results.alignments)
+    room = max(1.0, 0.24 * count)  # for the names below
+    fused, tuned = count + room, count + 2.0 * room
     is_tuned = any("fine_tuned" in outcome.shifts_m[eye] for eye in EYES)
     for component, ax in enumerate(axes):
         for eye in EYES:
@@ -64,7 +68,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
                 if eye in shifts
             }
             if eye in results.shifts:
-                each[count + 1 + offset] = results.shifts[eye]
+                each[fused + offset] = results.shifts[eye]
             ax.errorbar(
                 list(each),
                 [1e3 * shift.shift_m[component] for shift in each.values()],
@@ -78,15 +82,16 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
             )
             if "fine_tuned" in outcome.shifts_m[eye]:
                 tuned_mm = 1e3 * outcome.shifts_m[eye]["fine_tuned"][component]
-                ax.plot(count + 2 + offset, tuned_mm, _MARKERS[eye], color=_COLORS[eye], mfc="none")
+                ax.plot(tuned + offset, tuned_mm, _MARKERS[eye], color=_COLORS[eye], mfc="none")
         ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
         ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
-        ends = ["fused", "tuned"] if is_tuned else ["fused"]
-        ax.set_xlim(0.5, count + len(ends) + 0.5)
-        shown = range(0, count, max(1, -(-count // 8)))
-        names = [str(outcome.record.alignment_numbers[index]) for index in shown]
-        places = [*(index + 1 for index in shown), *range(count + 1, count + 1 + len(ends))]
-        ax.set_xticks(places, [*names, *ends])
+        numbers = outcome.record.alignment_numbers
+        names: dict[float, str] = {
+            index + 1: str(numbers[index]) for index in range(0, count, -(-count // 6))
+        }
+        names |= {fused: "fused", tuned: "tuned"} if is_tuned else {fused: "fused"}
+        ax.set_xticks(list(names), list(names.values()))
+        ax.set_xlim(0.5, max(names) + 0.5 * room)
         _name(ax, f"φ{'₁₂₃'[component]}", "alignment", "mm")
     axes[0].legend(fontsize=6.5, frameon=False)
 
@@ -114,7 +119,7 @@ def draw_residuals(
 ) -> None:
     """Draw the hand as the eye faces it, coloured by the mean residual in each cell.
 
-    Cells in which all points are outliers are grey.
+    Colours reach to `most_mm`; cells in which all points are outliers are grey.
     """
     hand_mm = 1e3 * transform(alignment.T_E_W[eye], alignment.hand_m)[:, :2]
     corner_mm = hand_mm.min(axis=0)
@@ -127,7 +132,7 @@ def draw_residuals(
     )
     residuals_mm = 1e3 * shift.residuals_m[is_inlier]
     sums_mm = np.bincount(cells[is_inlier], residuals_mm, minlength=width * height)
-    colors = ScalarMappable(Normalize(0.0, most_mm, clip=True), "viridis")
+    colors = ScalarMappable(Normalize(0.0, max(_LEAST_MM, most_mm), clip=True), "viridis")
     picture = colors.to_rgba(sums_mm / np.maximum(inliers, 1))
     picture[inliers == 0] = _OUTLIER
     picture[points == 0] = 0.0
