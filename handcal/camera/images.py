@@ -8,19 +8,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from handcal.errors import FileError
-from handcal.files import read_json, read_limited
+from handcal.files import read_json
+from handcal.image_file import MAX_SIDE_PX, read_image
 from handcal.types import Frame, Intrinsics
-
-_MAX_FILE_BYTES = 64 * 2**20
-_MAX_SIDE_PX = 8192
-_MAX_PIXELS = 16 * 2**20
-_PNG = b"\x89PNG\r\n\x1a\n"
-_JPEG = b"\xff\xd8"
-# Start-of-frame segments, which hold a JPEG's size; C4, C8 and CC among them are something else.
-_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
@@ -42,10 +34,10 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
         If a file is missing, malformed, too large, or they do not belong together.
     """
     camera, depth_scale_m = _read_intrinsics(intrinsics)
-    depth_image = _read_image(depth, cv2.IMREAD_UNCHANGED)
+    depth_image = read_image(depth, cv2.IMREAD_UNCHANGED)
     if depth_image.dtype != np.uint16 or depth_image.ndim != 2:
         raise FileError(f"{depth} must be a 16-bit image of one channel")
-    color_image = _read_image(color, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+    color_image = read_image(color, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
     for path, image in ((depth, depth_image), (color, color_image)):
         height, width = image.shape[:2]
         if (width, height) != (camera.width, camera.height):
@@ -67,7 +59,7 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
 
 def _read_intrinsics(path: Path) -> tuple[Intrinsics, float]:
     values = read_json(path)
-    width, height = (_number(values, path, key, 1, _MAX_SIDE_PX) for key in ("width", "height"))
+    width, height = (_number(values, path, key, 1, MAX_SIDE_PX) for key in ("width", "height"))
     if width != int(width) or height != int(height):
         raise FileError(f"{path}: width and height must be whole numbers")
     camera = Intrinsics(
@@ -88,30 +80,3 @@ def _number(values: dict[str, Any], path: Path, key: str, low: float, high: floa
     if not low <= value <= high:
         raise FileError(f"{path}: {key} is {value:g}, but must lie between {low:g} and {high:g}")
     return float(value)
-
-
-def _read_image(path: Path, flags: int) -> NDArray[Any]:
-    data = read_limited(path, _MAX_FILE_BYTES)
-    width, height = _image_size(data, path)
-    if width * height > _MAX_PIXELS or max(width, height) > _MAX_SIDE_PX:
-        raise FileError(f"{path} is {width}x{height} pixels, more than is allowed")
-    try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error as error:
-        raise FileError(f"{path} cannot be decoded: {error.err}") from error
-    if image is None:
-        raise FileError(f"{path} is damaged")
-    return image
-
-
-def _image_size(data: bytes, path: Path) -> tuple[int, int]:
-    """Return the size that an image says it has, before any memory is given to it."""
-    if data.startswith(_PNG) and len(data) >= 24:
-        return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
-    if data.startswith(_JPEG):
-        at = 2
-        while at + 9 <= len(data) and data[at] == 0xFF:
-            if data[at + 1] in _JPEG_FRAMES:
-                return int.from_bytes(data[at + 7 : at + 9]), int.from_bytes(data[at + 5 : at + 7])
-            at += 2 + int.from_bytes(data[at + 2 : at + 4])
-    raise FileError(f"{path} is neither a PNG nor a JPEG image")

@@ -9,16 +9,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import cv2
-import numpy as np
 
 from handcal.errors import FileError
 from handcal.files import read_limited, write_atomic
 from handcal.rig.check import check_rig, require
-from handcal.types import EYES, EyeDisplay, Float64, Intrinsics, Rig
+from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
+from handcal.types import EYES, EyeDisplay, Intrinsics, Rig
 
 RIG_VERSION = 1
-# A rig takes 3 kB. OpenCV's parser recurses with the nesting and overflows the stack at 65 kB.
-MAX_RIG_BYTES = 2**14
+MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB
 
 
 def write_rig(path: Path, rig: Rig) -> None:
@@ -72,13 +71,9 @@ def read_rig(path: Path) -> Rig:
     """
     data = read_limited(path, MAX_RIG_BYTES)
     try:
-        rig = _parse(data.decode())
-        check_rig(rig)
+        return parse_storage(data.decode(), _parse)
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
-    except (cv2.error, SystemError) as error:  # SystemError: how OpenCV reports unparsable text
-        raise FileError(f"{path} is not valid FileStorage YAML") from error
-    return rig
 
 
 def quoted(text: str) -> str:
@@ -87,22 +82,21 @@ def quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
-def _parse(text: str) -> Rig:
-    require(text.startswith("%YAML"), "not a FileStorage YAML file")
-    storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    root = _Fields("", storage.root())
+def _parse(root: Fields) -> Rig:
     version = root.integer("handcal_rig")
     require(version == RIG_VERSION, f"rig version {version} is not {RIG_VERSION}, the one known")
     eyes = {eye: _parse_display(root.section(eye)) for eye in EYES}
-    return Rig(
+    rig = Rig(
         name=root.text("name"),
         eyes=eyes,
         T_H_D=root.matrix("T_H_D", 4, 4),
         depth_intrinsics=_parse_depth_camera(root.section("depth_camera")),
     )
+    check_rig(rig)
+    return rig
 
 
-def _parse_display(fields: _Fields) -> EyeDisplay:
+def _parse_display(fields: Fields) -> EyeDisplay:
     return EyeDisplay(
         K=fields.matrix("K", 3, 3),
         H0=fields.matrix("H0", 3, 3),
@@ -114,7 +108,7 @@ def _parse_display(fields: _Fields) -> EyeDisplay:
     )
 
 
-def _parse_depth_camera(fields: _Fields) -> Intrinsics:
+def _parse_depth_camera(fields: Fields) -> Intrinsics:
     return Intrinsics(
         width=fields.integer("width_px"),
         height=fields.integer("height_px"),
@@ -124,52 +118,3 @@ def _parse_depth_camera(fields: _Fields) -> Intrinsics:
         cy=fields.number("cy"),
         distortion=fields.numbers("distortion"),
     )
-
-
-class _Fields:
-    """A map node whose fields are fetched by kind, with a ValueError that names the bad one."""
-
-    def __init__(self, name: str, node: cv2.FileNode) -> None:
-        require(node.isMap(), f"{name or 'the file'} must be a map of fields")
-        self._prefix = f"{name}." if name else ""
-        self._node = node
-
-    def section(self, name: str) -> _Fields:
-        return _Fields(self._prefix + name, self._node.getNode(name))
-
-    def text(self, name: str) -> str:
-        node = self._node.getNode(name)
-        require(node.isString(), f"{self._prefix}{name} must be a text")
-        return node.string()
-
-    def number(self, name: str) -> float:
-        return _number(self._prefix + name, self._node.getNode(name))
-
-    def integer(self, name: str) -> int:
-        node = self._node.getNode(name)
-        require(node.isInt(), f"{self._prefix}{name} must be a whole number")
-        return int(node.real())
-
-    def numbers(self, name: str) -> tuple[float, ...]:
-        node = self._node.getNode(name)
-        full_name = self._prefix + name
-        require(node.isSeq(), f"{full_name} must be a list of numbers")
-        return tuple(_number(full_name, node.at(index)) for index in range(node.size()))
-
-    def matrix(self, name: str, rows: int, columns: int) -> Float64:
-        node = self._node.getNode(name)
-        # The size is checked before OpenCV allocates what the file asks for.
-        require(
-            node.isMap()
-            and node.getNode("rows").real() == rows
-            and node.getNode("cols").real() == columns
-            and node.getNode("dt").string() == "d"
-            and node.getNode("data").size() == rows * columns,
-            f"{self._prefix}{name} must be a {rows}×{columns} opencv-matrix of type d",
-        )
-        return np.asarray(node.mat(), dtype=np.float64)
-
-
-def _number(name: str, node: cv2.FileNode) -> float:
-    require(node.isReal() or node.isInt(), f"{name} must be a number")
-    return node.real()

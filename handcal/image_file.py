@@ -1,0 +1,55 @@
+"""Image files that may be hostile: their size is known before any memory is given to them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handcal.errors import FileError
+from handcal.files import read_limited
+
+_MAX_FILE_BYTES = 64 * 2**20
+MAX_SIDE_PX = 8192
+_MAX_PIXELS = 16 * 2**20
+_PNG = b"\x89PNG\r\n\x1a\n"
+_JPEG = b"\xff\xd8"
+# Start-of-frame segments, which hold a JPEG's size; C4, C8 and CC among them are something else.
+_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+def read_image(path: Path, flags: int) -> NDArray[Any]:
+    """Read a PNG or JPEG as `cv2.imdecode` with `flags` does, its size checked before decoding.
+
+    Raises
+    ------
+    FileError
+        If it is missing, damaged, too large or neither PNG nor JPEG.
+    """
+    data = read_limited(path, _MAX_FILE_BYTES)
+    width, height = _image_size(data, path)
+    if width * height > _MAX_PIXELS or max(width, height) > MAX_SIDE_PX:
+        raise FileError(f"{path} is {width}x{height} pixels, more than is allowed")
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:
+        raise FileError(f"{path} cannot be decoded: {error.err}") from error
+    if image is None:
+        raise FileError(f"{path} is damaged")
+    return image
+
+
+def _image_size(data: bytes, path: Path) -> tuple[int, int]:
+    """Return the size that an image says it has, before any memory is given to it."""
+    if data.startswith(_PNG) and len(data) >= 24:
+        return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    if data.startswith(_JPEG):
+        at = 2
+        while at + 9 <= len(data) and data[at] == 0xFF:
+            if data[at + 1] in _JPEG_FRAMES:
+                return int.from_bytes(data[at + 7 : at + 9]), int.from_bytes(data[at + 5 : at + 7])
+            at += 2 + int.from_bytes(data[at + 2 : at + 4])
+    raise FileError(f"{path} is neither a PNG nor a JPEG image")
