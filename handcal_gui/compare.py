@@ -38,8 +38,7 @@ class Comparison(QObject):
     def cancel(self) -> None:
         """Stop, and wait for it."""
         if self._job is not None:
-            self._job.cancel()
-            self._job.wait()
+            self._job.abandon()
             self._job = None
 
     def _start(self, method: Method) -> None:

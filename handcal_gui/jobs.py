@@ -9,6 +9,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 
 from handcal.errors import CancelledError, HandcalError
+from handcal_gui.worker import Worker
 
 _LOG = logging.getLogger(__name__)
 
@@ -17,7 +18,7 @@ IsCancelled = Callable[[], bool]
 Work = Callable[[Report, IsCancelled], object]
 
 
-class Job(QObject):
+class Job(Worker):
     """Calls `work` once, in a thread.
 
     Parameters
@@ -42,33 +43,32 @@ class Job(QObject):
     cancelled = Signal()
 
     def __init__(self, work: Work, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__("handcal job", parent)
         self._work = work
         self._cancelled = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="handcal job")
-
-    def start(self) -> None:
-        """Begin."""
-        self._thread.start()
 
     def cancel(self) -> None:
-        """Ask the work to stop; it says so by `cancelled`."""
+        """Ask the work to stop; it says so by `cancelled`, unless it comes to its end first."""
         self._cancelled.set()
 
-    def wait(self) -> None:
-        """Wait for the end; cancel first unless the work is short."""
-        if self._thread.is_alive():
-            self._thread.join()
+    def abandon(self) -> None:
+        """Have the work stop, and wait for it; nothing more is heard of it."""
+        self.cancel()
+        self.wait()
+        self._forget_all()
 
     def _run(self) -> None:
         try:
-            done = self._work(self.progressed.emit, self._cancelled.is_set)
+            done = self._work(self._report, self._cancelled.is_set)
         except CancelledError:
-            self.cancelled.emit()
+            self._say(self.cancelled.emit)
         except HandcalError as error:
-            self.failed.emit(str(error))
+            self._say(self.failed.emit, str(error))
         except Exception as error:
             _LOG.exception("a job broke down")
-            self.failed.emit(f"handcal broke down ({type(error).__name__}: {error})")
+            self._say(self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})")
         else:
-            self.succeeded.emit(done)
+            self._say(self.succeeded.emit, done)
+
+    def _report(self, doing: str, share: float) -> None:
+        self._say(self.progressed.emit, doing, share)

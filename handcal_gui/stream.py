@@ -12,13 +12,14 @@ from PySide6.QtCore import QObject, Signal
 from handcal.errors import HandcalError
 from handcal.snapshot import Snapshot
 from handcal.station import Station
+from handcal_gui.worker import Said, Worker
 
 _LOG = logging.getLogger(__name__)
 
 Command = Callable[[Station], object]
 
 
-class Stream(QObject):
+class Stream(Worker):
     """Runs a station in a thread until closed.
 
     Snapshots wait in a place for one: whoever polls gets the newest and never an old one, however
@@ -34,7 +35,7 @@ class Stream(QObject):
     opened : Signal(Station)
         The station runs. Only its constants may be read in other threads.
     obeyed : Signal(str, object)
-        A command is done: its name and what it returned.
+        A command is done, and the newest snapshot shows it: its name and what it returned.
     failed : Signal(str, str)
         A command failed: its name and why, for a person to read.
     ended : Signal(str)
@@ -47,16 +48,11 @@ class Stream(QObject):
     ended = Signal(str)
 
     def __init__(self, open_station: Callable[[], Station], parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__("handcal engine", parent)
         self._open_station = open_station
         self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
         self._newest: Snapshot | None = None
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="handcal engine")
-
-    def start(self) -> None:
-        """Open the station and run it."""
-        self._thread.start()
 
     def newest(self) -> Snapshot | None:
         """Return the newest snapshot; None before the first."""
@@ -67,33 +63,47 @@ class Stream(QObject):
         self._commands.put((name, command))
 
     def close(self) -> None:
-        """End the thread and close the station; safe to call twice."""
+        """End the thread and close the station, and hear the last of it; safe to call twice."""
         self._closing.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self.wait()
+        self._hear_all()
 
     def _run(self) -> None:
         why = ""
         try:
             with self._open_station() as station:
-                self.opened.emit(station)
+                self._say(self.opened.emit, station)
                 while not self._closing.is_set():
+                    answers = self._obey(station)
                     self._newest = station.step()
-                    self._obey(station)
-                self._obey(station)  # what was asked for just before the end, such as notes
+                    self._answer(answers)
+                # What was asked for just before the end, such as notes.
+                self._answer(self._obey(station))
         except HandcalError as error:
             why = str(error)
         except Exception as error:
             _LOG.exception("the engine broke down")
-            why = f"handcal broke down ({type(error).__name__}: {error}); the session is kept"
-        self.ended.emit(why)
+            why = f"handcal broke down ({_told(error)}); the session is kept"
+        self._say(self.ended.emit, why)
 
-    def _obey(self, station: Station) -> None:
+    def _obey(self, station: Station) -> list[Said]:
+        """Do what was asked for, and return the answers."""
+        answers: list[Said] = []
         while not self._commands.empty():
             name, command = self._commands.get()
             try:
-                done = command(station)
+                answers.append((self.obeyed.emit, (name, command(station))))
             except (HandcalError, ValueError) as error:
-                self.failed.emit(name, str(error))
-            else:
-                self.obeyed.emit(name, done)
+                answers.append((self.failed.emit, (name, str(error))))
+            except Exception as error:
+                _LOG.exception("a command broke down: %s", name)
+                answers.append((self.failed.emit, (name, _told(error))))
+        return answers
+
+    def _answer(self, answers: list[Said]) -> None:
+        for emit, what in answers:
+            self._say(emit, *what)
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

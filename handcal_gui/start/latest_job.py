@@ -46,7 +46,8 @@ class LatestJob(QObject):
         """Forget what is asked, and wait for the job's end."""
         self._next = []
         if self._job is not None:
-            self._job.wait()
+            self._job.abandon()
+            self._job = None
 
     def _start(self) -> None:
         question = self._next.pop()
