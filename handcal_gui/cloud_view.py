@@ -60,8 +60,8 @@ class CloudView(QWidget):
         self._orbit = Orbit()
         self._is_fitted = True
         self._dragged_from = QPointF()
-        self._frame_key: object = None
-        self._frame_picture = QPixmap()
+        self._backdrop_key: object = None
+        self._backdrop = QPixmap()
 
     @property
     def orbit(self) -> Orbit:
@@ -116,7 +116,7 @@ class CloudView(QWidget):
                 self.width() - _LABELS_EMS[0] * em,
                 self.height() - _LABELS_EMS[1] * em,
             )
-        painter.drawPixmap(0, 0, self._frame(self._box))
+        painter.drawPixmap(0, 0, self._draw_backdrop(self._box))
         self._paint_points(painter)
         self._paint_lines(painter)
         painter.drawText(QPointF(SPACING_PX, self.height() - SPACING_PX), self._text)
@@ -197,16 +197,16 @@ class CloudView(QWidget):
         painter.drawLines([QLineF(*end) for end in ends.tolist()])
         painter.restore()
 
-    def _frame(self, box: Box) -> QPixmap:
+    def _draw_backdrop(self, box: Box) -> QPixmap:
         """Return the canvas with box and scale, drawn anew only if one of them has changed."""
         ratio = self.devicePixelRatio()
         key = box, self._orbit, self.size(), ratio, colors(), self.palette().cacheKey()
-        if key != self._frame_key:
-            self._frame_key = key
-            self._frame_picture = QPixmap(*self._device_size())
-            self._frame_picture.setDevicePixelRatio(ratio)
-            self._frame_picture.fill(QColor(colors().canvas))
-            painter = QPainter(self._frame_picture)
+        if key != self._backdrop_key:
+            self._backdrop_key = key
+            self._backdrop = QPixmap(*self._device_size())
+            self._backdrop.setDevicePixelRatio(ratio)
+            self._backdrop.fill(QColor(colors().canvas))
+            painter = QPainter(self._backdrop)
             painter.setPen(self.palette().windowText().color())
             corner = QPointF(self.width() - SPACING_PX, self.height() - SPACING_PX)
             draw_scale(painter, self._orbit, corner)
@@ -214,7 +214,7 @@ class CloudView(QWidget):
             painter.translate(self.width() / 2, self.height() / 2)
             draw_box(painter, box, self._orbit)
             painter.end()
-        return self._frame_picture
+        return self._backdrop
 
     def _device_size(self) -> tuple[int, int]:
         ratio = self.devicePixelRatio()

@@ -13,13 +13,13 @@ from handcal_gui.legend import role_color
 from handcal_gui.theme import SPACING_PX, colors
 
 LINES = {
-    "hand": ("text", Qt.PenStyle.SolidLine),
-    "drawn": ("live", Qt.PenStyle.DashLine),
-    "cursor": ("cursor", Qt.PenStyle.SolidLine),
-    "offline": ("muted", Qt.PenStyle.DotLine),
+    "hand": ("text", (1.5, Qt.PenStyle.SolidLine)),
+    "drawn": ("live", (1.5, Qt.PenStyle.DashLine)),
+    "cursor": ("cursor", (2.5, Qt.PenStyle.SolidLine)),
+    "offline": ("muted", (1.5, Qt.PenStyle.DotLine)),
 }
-"""Colour and style of each outline."""
-_LINE_PX, _HALO_PX = 1.5, 4.0
+"""Colour of each outline, and width in pixels and style of its line."""
+_HALO_PX = 4.5
 _MOST_POINTS = 250
 """Of each outline, since Qt takes a microsecond and more for each."""
 _MARGIN = 0.12
@@ -116,8 +116,8 @@ class EyeCanvas(QWidget):
             painter.drawPolyline(line)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for what, line in lines.items():
-            role, style = LINES[what]
-            painter.setPen(_pen(role_color(role, self), _LINE_PX, style))
+            role, width_and_style = LINES[what]
+            painter.setPen(_pen(role_color(role, self), *width_and_style))
             painter.drawPolyline(line)
 
     def _to_widget(self) -> QTransform:

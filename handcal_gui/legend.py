@@ -6,7 +6,8 @@ from PySide6.QtCore import QLineF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
-from handcal_gui.theme import SPACING_PX, colors, number_font
+from handcal_gui.number_label import NumberLabel
+from handcal_gui.theme import SPACING_PX, colors
 
 _SAMPLE_PX = (22, 14)
 
@@ -18,7 +19,7 @@ def role_color(role: str, widget: QWidget) -> QColor:
 
 
 class LegendEntry(QWidget):
-    """A sample of one thing, its name, and a right-aligned number that does not jump.
+    """A sample of one thing, its name, and maybe a number that does not jump.
 
     Parameters
     ----------
@@ -26,15 +27,20 @@ class LegendEntry(QWidget):
         Of the thing.
     role : str
         As `role_color` takes it.
-    line : Qt.PenStyle
-        That it is drawn with; ``NoPen`` for points.
     tooltip : str
+    line : (float, Qt.PenStyle) or None
+        Width in pixels and style that it is drawn with; None for points.
     widest : str
         The number's widest text; empty if it has none.
     """
 
     def __init__(
-        self, name: str, role: str, line: Qt.PenStyle, tooltip: str, widest: str = ""
+        self,
+        name: str,
+        role: str,
+        tooltip: str,
+        line: tuple[float, Qt.PenStyle] | None = None,
+        widest: str = "",
     ) -> None:
         super().__init__()
         self.setObjectName(f"legend-{name.lower().replace(' ', '-')}")
@@ -42,10 +48,8 @@ class LegendEntry(QWidget):
         self._sample = _Sample(role, line)
         self._name = QLabel(name)
         self._name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._number = QLabel()
-        self._number.setFont(number_font())
-        self._number.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self._number.setMinimumWidth(self._number.fontMetrics().horizontalAdvance(widest))
+        self._number = NumberLabel(f"{self.objectName()}-number", widest, tooltip)
+        self._number.setVisible(bool(widest))
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
@@ -56,7 +60,7 @@ class LegendEntry(QWidget):
     @property
     def text(self) -> str:
         """Name and number."""
-        return f"{self._name.text()} {self._number.text()}".strip()
+        return f"{self._name.text()} {self._number.text()}"
 
     def show_name(self, name: str, role: str | None) -> None:
         """Change what the thing is called and its colour; None hides the sample."""
@@ -69,9 +73,9 @@ class LegendEntry(QWidget):
 
 
 class _Sample(QWidget):
-    """A piece of line, or a few points."""
+    """A piece of line, or of a surface of points."""
 
-    def __init__(self, role: str, line: Qt.PenStyle) -> None:
+    def __init__(self, role: str, line: tuple[float, Qt.PenStyle] | None) -> None:
         super().__init__()
         self._role: str | None = role
         self._line = line
@@ -86,11 +90,11 @@ class _Sample(QWidget):
         if self._role is None:
             return
         painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         color = role_color(self._role, self)
         width, height = _SAMPLE_PX
-        if self._line is Qt.PenStyle.NoPen:
+        if self._line is None:
             painter.fillRect((width - height) // 2, 0, height, height, color)
             return
-        painter.setPen(QPen(color, 2, self._line, Qt.PenCapStyle.FlatCap))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(color, *self._line, Qt.PenCapStyle.FlatCap))
         painter.drawLine(QLineF(0, height / 2, width, height / 2))

@@ -21,12 +21,14 @@ class NumberLabel(QLabel):
         The widest text it is made for, with its unit.
     tooltip : str
         What the number means.
+    scale : float
+        Size of the digits, relative to text.
     """
 
-    def __init__(self, name: str, widest: str, tooltip: str) -> None:
+    def __init__(self, name: str, widest: str, tooltip: str, scale: float = 1.0) -> None:
         super().__init__(UNKNOWN)
         self.setObjectName(name)
         self.setToolTip(tooltip)
-        self.setFont(number_font())
+        self.setFont(number_font(scale))
         self.setMinimumWidth(self.fontMetrics().horizontalAdvance(widest))
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)

@@ -19,9 +19,15 @@ _VIRIDIS = ("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#
 _BAR_PX = 12
 
 
+def residual_ramp() -> UInt8:
+    """Return (8, 3) RGB from none to `LARGEST_MM`, from faint to strong before the canvas."""
+    ramp = np.array([rgb(stop) for stop in _VIRIDIS], np.uint8)
+    return ramp if is_dark() else ramp[::-1]
+
+
 def residual_colors(residuals_m: Float64) -> UInt8:
     """Return (N, 3) RGB of distances; those of no partner, NaN, are red."""
-    ramp = np.array([rgb(stop) for stop in _stops()])
+    ramp = residual_ramp()
     place = np.clip(1e3 * residuals_m / LARGEST_MM, 0.0, 1.0) * (len(ramp) - 1)
     shades = np.stack([np.interp(place, np.arange(len(ramp)), c) for c in ramp.T], axis=1)
     shades[np.isnan(residuals_m)] = rgb(colors().red)
@@ -52,17 +58,12 @@ class ResidualScale(QWidget):
         left = width_of(low) + gap
         bar = QRectF(left, top, swatch.x() - width_of(high) - 5 * gap - left, _BAR_PX)
         gradient = QLinearGradient(bar.topLeft(), bar.topRight())
-        stops = _stops()
-        for i, stop in enumerate(stops):
-            gradient.setColorAt(i / (len(stops) - 1), stop)
+        ramp = residual_ramp().tolist()
+        for i, color in enumerate(ramp):
+            gradient.setColorAt(i / (len(ramp) - 1), QColor(*color))
         painter.fillRect(bar, gradient)
         painter.fillRect(swatch, QColor(colors().red))
         painter.setPen(self.palette().windowText().color())
         for x, text in ((0.0, low), (bar.right() + gap, high), (swatch.right() + gap, outlier)):
             where = QRectF(x, 0, self.width(), self.height())
             painter.drawText(where, Qt.AlignmentFlag.AlignVCenter, text)
-
-
-def _stops() -> tuple[str, ...]:
-    """Return colours from faint to strong before the present canvas."""
-    return _VIRIDIS if is_dark() else _VIRIDIS[::-1]

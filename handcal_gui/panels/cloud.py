@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from handcal.calibrate import PlacedHand
@@ -16,6 +16,7 @@ from handcal.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.cloud_view import CloudView
 from handcal_gui.legend import LegendEntry
+from handcal_gui.number_label import UNKNOWN
 from handcal_gui.orbit import Direction
 from handcal_gui.residual_scale import ResidualScale, residual_colors
 from handcal_gui.splat import rgb
@@ -83,9 +84,9 @@ class CloudPanel(QWidget):
         self._text = ""
         self._next_pairs_s = 0.0
         self._view = CloudView()
-        points, widest = Qt.PenStyle.NoPen, "99,999"
-        self._cursor = LegendEntry("Cursor", "cursor", points, "The frozen hand; points", widest)
-        self._hand = LegendEntry("Live hand", "live", points, "The hand now; points", widest)
+        widest = "99,999"
+        self._cursor = LegendEntry("Cursor", "cursor", "The frozen hand; points", widest=widest)
+        self._hand = LegendEntry("Live hand", "live", "The hand now; points", widest=widest)
         self._scale = ResidualScale()
         self._pairs = QCheckBox("Pairs")
         self._pairs.setObjectName("cloud-pairs")
@@ -94,6 +95,7 @@ class CloudPanel(QWidget):
             "that they lie on once the hand is laid over it; found anew twice a second"
         )
         self._pairs.toggled.connect(self._forget_pairs)
+        self.setFocusProxy(self._view)
         self._lay_out()
         self.clear()
 
@@ -113,6 +115,7 @@ class CloudPanel(QWidget):
         if placed is None:
             self.clear(problem or _EMPTY)
             return
+        self._pairs.setEnabled(True)
         axes = _live_axes(cursor, placed)
         is_red = seen is not None and seen.is_red
         role = "red" if is_red else "live"
@@ -132,6 +135,7 @@ class CloudPanel(QWidget):
         middle_m = np.median(transform(T_E_W, alignment.cursor_m), axis=0)
         axes = _Axes(T_E_W, middle_m, _FROM_CURSOR)
         self._forget_pairs()
+        self._pairs.setEnabled(False)
         self._show(
             _Cloud("Cursor", "cursor", axes.mm(alignment.cursor_m)),
             _Cloud("Hand", "live", axes.mm(alignment.hand_m), residuals_m),
@@ -168,10 +172,12 @@ class CloudPanel(QWidget):
         layout.addLayout(legend)
 
     def _show(self, cursor: _Cloud | None, hand: _Cloud | None, text: str) -> None:
+        if hand is None:
+            self._hand.show_name("Live hand", "live")
         for entry, cloud in ((self._cursor, cursor), (self._hand, hand)):
             if cloud is not None:
                 entry.show_name(cloud.name, cloud.role if cloud.residuals_m is None else None)
-            entry.show_number(f"{len(cloud.points_mm):,}" if cloud else "–")
+            entry.show_number(f"{len(cloud.points_mm):,}" if cloud else UNKNOWN)
         self._scale.setVisible(hand is not None and hand.residuals_m is not None)
         self._clouds = [cloud for cloud in (cursor, hand) if cloud is not None]
         self._text = text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.snapshot import Snapshot
@@ -10,7 +9,8 @@ from handcal.types import EYES, Eye
 from handcal.wearer_view import EyeView, Overlay
 from handcal_gui.eye_canvas import LINES, EyeCanvas
 from handcal_gui.legend import LegendEntry
-from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.number_label import UNKNOWN, NumberLabel
+from handcal_gui.theme import SPACING_PX
 
 _TITLES: dict[Eye, str] = {"left": "Left eye", "right": "Right eye"}
 _EMPTY = "What this eye sees will appear here. Hold a hand up before the depth camera."
@@ -26,6 +26,9 @@ _LEGEND = {
     "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
 }
 
+_NUMBER_SCALE = 0.85
+"""Both eyes' numbers fit side by side into a narrow dock."""
+
 
 class WearerViewPanel(QWidget):
     """Both eyes side by side: what calibration did is seen here.
@@ -39,7 +42,7 @@ class WearerViewPanel(QWidget):
         self.setObjectName("wearer-view-panel")
         self._eyes = {eye: _EyeColumn(_TITLES[eye]) for eye in EYES}
         self._entries = {
-            what: LegendEntry(name, *LINES[what], tooltip)
+            what: LegendEntry(name, LINES[what][0], tooltip, LINES[what][1])
             for what, (name, tooltip) in _LEGEND.items()
         }
         whole, before = QCheckBox("Whole display"), QCheckBox("Before")
@@ -121,32 +124,22 @@ def _origin(view: EyeView | None, *, is_solved: bool) -> str:
 
 
 class _ErrorRow(QWidget):
-    """By how much a drawn outline misses the hand, in numbers that do not jump."""
+    """By how much a drawn outline misses the hand."""
 
     def __init__(self, name: str, tooltip: str) -> None:
         super().__init__()
         self.setToolTip(tooltip)
-        self._px, self._arcmin = QLabel(), QLabel()
+        self._px = NumberLabel("error-px", "999.9 px", tooltip, _NUMBER_SCALE)
+        self._arcmin = NumberLabel("error-arcmin", "999.9′", tooltip, _NUMBER_SCALE)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
         layout.addWidget(QLabel(name), 1)
-        for label, widest in ((self._px, "999.9 px"), (self._arcmin, "999.9′")):
-            label.setFont(number_font(0.85))
-            label.setMinimumWidth(label.fontMetrics().horizontalAdvance(widest))
-            label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            layout.addWidget(label)
-
-    @property
-    def text(self) -> str:
-        """Both numbers."""
-        return f"{self._px.text()} {self._arcmin.text()}"
+        layout.addWidget(self._px)
+        layout.addWidget(self._arcmin)
 
     def show_overlay(self, overlay: Overlay | None) -> None:
         """Show an overlay's errors, if there is one with an outline."""
-        if overlay is None or overlay.error_px is None:
-            self._px.setText("– px")
-            self._arcmin.setText("–′")
-        else:
-            self._px.setText(f"{overlay.error_px:.1f} px")
-            self._arcmin.setText(f"{overlay.error_arcmin:.1f}′")
+        is_known = overlay is not None and overlay.error_px is not None
+        self._px.setText(f"{overlay.error_px:.1f} px" if overlay and is_known else UNKNOWN)
+        self._arcmin.setText(f"{overlay.error_arcmin:.1f}′" if overlay and is_known else UNKNOWN)

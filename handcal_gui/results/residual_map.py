@@ -7,13 +7,11 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QWidget
 
-from handcal.register.verdict import VerdictSettings
 from handcal.types import Float64
 from handcal_gui.plots import Plot
-from handcal_gui.theme import colors, is_dark
+from handcal_gui.residual_scale import LARGEST_MM, residual_ramp
+from handcal_gui.theme import colors
 
-_LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
-"""The colours end where the verdict would refuse such an rms, so that maps can be compared."""
 _SHADES = 32
 
 
@@ -34,7 +32,7 @@ class ResidualMap(Plot):
             pg.ScatterPlotItem(size=5, symbol="x"),
         )
         self._bar = pg.ColorBarItem(
-            values=(0.0, _LARGEST_MM), width=14, interactive=False, label="Residual (mm)"
+            values=(0.0, LARGEST_MM), width=14, interactive=False, label="Residual (mm)"
         )
         item = self.item
         item.setAspectLocked()
@@ -66,20 +64,14 @@ class ResidualMap(Plot):
     def _redraw(self) -> None:
         places_m, residuals_m = self._shown
         is_outlier = np.isnan(residuals_m)
-        palette = _palette()
+        palette = pg.ColorMap(None, residual_ramp())
         self._bar.setColorMap(palette)
         for side in ("left", "right"):
             self._bar.getAxis(side).setTextPen(self.palette().windowText().color())
         shades = [pg.mkBrush(c) for c in palette.getLookupTable(0.0, 1.0, _SHADES)]
-        shade = (_SHADES / _LARGEST_MM * 1e3 * residuals_m[~is_outlier]).astype(int)
+        shade = (_SHADES / LARGEST_MM * 1e3 * residuals_m[~is_outlier]).astype(int)
         inliers, outliers = self.scatters
         inliers.setData(
             pos=1e3 * places_m[~is_outlier], brush=[shades[min(i, _SHADES - 1)] for i in shade]
         )
         outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
-
-
-def _palette() -> pg.ColorMap:
-    """Return colours from faint to strong before the present canvas, none of them too faint."""
-    viridis = pg.colormap.get("viridis")
-    return viridis.getSubset(0.15, 0.85) if is_dark() else viridis.getSubset(0.85, -0.85)

@@ -15,7 +15,7 @@ from handcal_gui.legend import LegendEntry
 from handcal_gui.panels.wearer_view import WearerViewPanel
 
 MakeSnapshot = Callable[..., Snapshot]
-UNKNOWN = ["– px", "–′"] * 2
+UNKNOWN = ["–"] * 4
 
 
 @pytest.fixture
