@@ -56,7 +56,7 @@ def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Resu
 def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> None:
     """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
     count = len(results.alignments)
-    room = max(1.0, 0.24 * count)  # for the names below
+    room = max(1.0, 0.4 * count)  # for the names below
     fused, tuned = count + room, count + 2.0 * room
     is_tuned = any("fine_tuned" in outcome.shifts_m[eye] for eye in EYES)
     for component, ax in enumerate(axes):
