@@ -6,7 +6,7 @@ One thread owns a station: it calls `step` for ever, and whatever else is wanted
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +32,11 @@ from handcal.sim.simulation import Simulation
 from handcal.snapshot import Procedure, Snapshot
 from handcal.station_settings import StationSettings
 from handcal.trial import make_trial
-from handcal.types import Eye, Float64
+from handcal.types import Eye, Float64, Frame
 from handcal.wearer_view import EyeView, see
 
 _VIEW_PERIOD_S = 0.1
+_STORE_PERIOD_S = 1.0
 
 
 class Station(Closable):
@@ -97,7 +98,9 @@ class Station(Closable):
             )
             self._stack = stack.pop_all()
         self._number = 0
-        self._problem = ""
+        self._frame: Frame | None = None
+        self._not_applied = self._not_stored = ""
+        self._next_store_s = 0.0
         self._revision = self.session.revision
         self._views: dict[Eye, EyeView] = {}
         self._viewed: Eye = "right"
@@ -111,31 +114,41 @@ class Station(Closable):
     def step(self) -> Snapshot:
         """Take a frame, if one comes soon, through the procedure; say how everything stands."""
         frame = self._feed.read()
+        self._frame = frame or self._frame
         observation = None
         try:
             if frame is not None:
                 observation = self.calibration.step(frame)
             if self.calibration.state is State.APPLYING:
                 self.calibration.poll_applied()
-            self._problem = ""
-        except (FileError, LinkError) as error:
-            self._problem = str(error)
+        except LinkError as error:
+            self._not_applied = str(error)
+        except FileError:
+            pass  # the procedure keeps what it could not write; `_store_waiting` tells
+        if self.calibration.state is not State.SOLVED:
+            self._not_applied = ""
+        self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
         self._number += 1
         return Snapshot(
             number=self._number,
             t_host_ns=time.monotonic_ns(),
-            frame=frame,
+            frame=self._frame,
             observation=observation,
             camera=self._feed.status,
             link=self._link.statistics(),
             link_problem=self._link_problem(),
-            problem=self._problem,
+            problem=self._not_stored or self._not_applied,
             procedure=self._procedure(),
-            record=self._newest_record(),
+            record=self._record,
             views=dict(self._views),
         )
+
+    def finish(self) -> None:
+        """Note that the session is complete; FileError if that, or all before, cannot be."""
+        self.calibration.store_waiting()
+        self.session.finish()
 
     def save_trial(self, eye: Eye, depth_m: float) -> int:
         """Store a trial: the solved φ judged by the one set by hand, for a target at a distance.
@@ -170,7 +183,9 @@ class Station(Closable):
             self._simulation.restart()
 
     def close(self) -> None:
-        """End the virtual headset, and close camera, link and session; safe to call twice."""
+        """Store what waits for it, and close everything; safe to call twice."""
+        with suppress(FileError):
+            self.calibration.store_waiting()
         self._stack.close()
 
     def _start_headset(self, scene_port: int) -> VirtualHeadset:
@@ -272,21 +287,28 @@ class Station(Closable):
             is_applied=calibration.is_applied,
         )
 
-    def _newest_record(self) -> SessionRecord:
-        if self._revision != self.session.revision:
-            self._revision = self.session.revision
-            self._record = Session.open(self.session.path, self._record)
-        return self._record
+    def _store_waiting(self) -> None:
+        """Try again now and then what the session could not take; read what it has taken."""
+        now_s = time.monotonic()
+        if self._not_stored and now_s < self._next_store_s:
+            return
+        self._next_store_s = now_s + _STORE_PERIOD_S
+        try:
+            self.calibration.store_waiting()
+            if self._revision != self.session.revision:
+                self._record = Session.open(self.session.path, self._record)
+                self._revision = self.session.revision
+            self._not_stored = ""
+        except FileError as error:
+            self._not_stored = f"{error}. What cannot be written is kept until it can."
 
 
 def _open_session(settings: StationSettings, wearer: str, resume: Path | None) -> Session:
     if resume is not None:
         return Session(resume)
     rig = read_rig(settings.rig_path)
-    stored = {
-        "calibration": settings_json(settings.calibration),
-        "station": settings_json(settings),
-    }
+    station = settings_json(settings)
+    stored = {"calibration": station.pop("calibration"), "station": station}
     return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
 
 
