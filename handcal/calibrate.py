@@ -169,7 +169,7 @@ class Calibration:
     link : HeadsetServer
     session : Session or None
         Where everything is recorded, at the moment it happens; what it could not take is written
-        before whatever comes next.
+        before whatever comes next, or by `store_waiting`.
     settings : CalibrationSettings
     resume : SessionRecord or None
         What `session` holds, to go on with.
@@ -486,6 +486,12 @@ class Calibration:
         settled_m = self.applied_shift_m
         self._store(lambda session: session.save_fine_tuned(settled_m))
 
+    def store_waiting(self) -> None:
+        """Write what the session could not take before; FileError if it still cannot."""
+        while self._session is not None and self._unstored:
+            self._unstored[0](self._session)
+            self._unstored.popleft()
+
     def _resume(self, record: SessionRecord) -> None:
         """Go on where a session ended: what was on its way then has to be done again."""
         self._shelf.kept = dict(zip(record.alignment_numbers, record.alignments, strict=True))
@@ -673,16 +679,9 @@ class Calibration:
 
     def _store(self, write: Callable[[Session], object]) -> None:
         """Write to the session, after what could not be written before."""
-        if self._session is None:
-            return
-        self._unstored.append(write)
-        while self._unstored:
-            oldest = self._unstored.popleft()
-            try:
-                oldest(self._session)
-            except FileError:
-                self._unstored.appendleft(oldest)
-                raise
+        if self._session is not None:
+            self._unstored.append(write)
+            self.store_waiting()
 
 
 def _align_prompt(eyes: Sequence[Eye]) -> str:
