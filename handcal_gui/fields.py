@@ -67,6 +67,22 @@ def button(name: str, text: str = "", label: str = "", help_text: str = "") -> Q
     return named(QPushButton(text, autoDefault=True), name, label or text, help_text)
 
 
+class MainButton(QPushButton):
+    """The one button of a page that leads on; the theme gives its class the accent colour."""
+
+
+def main_button(name: str, text: str = "") -> MainButton:
+    """Return a page's main button: large, and what Enter presses."""
+    made = named(MainButton(text, autoDefault=True), name, text)
+    font = made.font()
+    font.setPointSizeF(1.2 * font.pointSizeF())
+    font.setBold(True)
+    made.setFont(font)
+    made.setMinimumHeight(5 * SPACING_PX)
+    made.setDefault(True)
+    return made
+
+
 def paragraph(name: str = "", text: str = "") -> QLabel:
     """Return a label whose text is wrapped and takes the width that there is."""
     label = QLabel(text, wordWrap=True)

@@ -74,7 +74,8 @@ class Program(QObject):
         super().__init__()
         self._file = file
         self._preferences, complaint = file.load()
-        use_theme(self._preferences.theme)
+        self._use_theme()
+        QGuiApplication.styleHints().colorSchemeChanged.connect(self._use_theme)
         self._pairing_key = file.pairing_key()
         panels = Panels(
             camera=CameraPanel(),
@@ -210,6 +211,9 @@ class Program(QObject):
         }
         self.window.restore_layouts({page: text for page, text in layouts.items() if text})
 
+    def _use_theme(self) -> None:
+        use_theme(self._preferences.theme)
+
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
@@ -249,7 +253,7 @@ class Program(QObject):
         dialog = PreferencesDialog(self._preferences, self.window)
         if dialog.exec():
             self._remember(dialog.preferences())
-            use_theme(self._preferences.theme)
+            self._use_theme()
             self.start.show_preferences(self._preferences)
 
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:

@@ -17,6 +17,7 @@ from PySide6.QtGui import (
     QPixmap,
 )
 from PySide6.QtSvg import QSvgRenderer
+from PySide6.QtWidgets import QApplication
 
 from handcal.resources import resource_path
 
@@ -62,8 +63,8 @@ _LIGHT = Colors(
     warning="#a15c00",
     left="#00707a",
     right="#8e3fa8",
-    muted="#6b7280",
-    canvas="#fbfbfc",
+    muted="#5f6772",
+    canvas="#ffffff",
 )
 _DARK = Colors(
     live="#5aa2ff",
@@ -74,22 +75,89 @@ _DARK = Colors(
     left="#4dd0d9",
     right="#d391ea",
     muted="#9aa3ae",
-    canvas="#16181c",
+    canvas="#17191c",
 )
 
 
+@dataclass(frozen=True, slots=True)
+class _Shades:
+    """What a palette is made of; Fusion draws the edge of a box a little darker than `box_edge`."""
+
+    window: str
+    base: str
+    stripe: str
+    button: str
+    text: str
+    faint: str
+    disabled: str
+    accent: str
+    link: str
+    box_edge: str
+
+
+_LIGHT_SHADES = _Shades(
+    window="#f3f4f6",
+    base="#ffffff",
+    stripe="#f6f7f9",
+    button="#fbfbfc",
+    text="#1b1f24",
+    faint=_LIGHT.muted,
+    disabled="#9299a3",
+    accent=_LIGHT.live,
+    link=_LIGHT.live,
+    box_edge="#b6bcc5",
+)
+_DARK_SHADES = _Shades(
+    window="#26282c",
+    base="#1b1d20",
+    stripe="#222428",
+    button="#3a3d43",
+    text="#eceef1",
+    faint=_DARK.muted,
+    disabled="#7d848d",
+    accent="#2f6fb5",
+    link=_DARK.live,
+    box_edge="#99a1ab",
+)
+_MAIN_BUTTON = "#0b3f8f"
+"""Fusion makes it lighter; white stands out against it nevertheless."""
+_BOXES = (
+    "QAbstractSpinBox",
+    "QCheckBox",
+    "QComboBox",
+    "QLineEdit",
+    "QListWidget",
+    "QPlainTextEdit",
+    "QRadioButton",
+    "QTableView",
+    "Card",
+    "VerdictCard",
+)
+"""What has an edge that must be seen, in the dark, too."""
+
+
 def use_theme(theme: Literal["system", "light", "dark"]) -> None:
-    """Follow the system's colours, or not."""
+    """Take the colours that the system asks for, or others; to be called when it changes, too."""
     schemes = {
         "system": Qt.ColorScheme.Unknown,
         "light": Qt.ColorScheme.Light,
         "dark": Qt.ColorScheme.Dark,
     }
     hints = QGuiApplication.styleHints()
-    QGuiApplication.setPalette(QPalette())
     hints.setColorScheme(schemes[theme])
-    if theme == "dark" and hints.colorScheme() != Qt.ColorScheme.Dark:
-        QGuiApplication.setPalette(_dark_palette())  # a plain X display knows no schemes
+    # A plain X display knows no schemes, so that the choice itself counts.
+    scheme = hints.colorScheme() if theme == "system" else schemes[theme]
+    shades = _DARK_SHADES if scheme is Qt.ColorScheme.Dark else _LIGHT_SHADES
+    palette = _palette(shades)
+    QApplication.setPalette(palette)
+    boxes, main = QPalette(palette), QPalette(palette)
+    boxes.setColor(QPalette.ColorRole.Window, QColor(shades.box_edge))
+    for group in (QPalette.ColorGroup.Active, QPalette.ColorGroup.Inactive):
+        main.setColor(group, QPalette.ColorRole.Button, QColor(_MAIN_BUTTON))
+        main.setColor(group, QPalette.ColorRole.ButtonText, QColor("#ffffff"))
+    for kind in _BOXES:
+        QApplication.setPalette(boxes, kind)
+    QApplication.setPalette(main, "MainButton")
 
 
 def is_dark() -> bool:
@@ -124,28 +192,22 @@ def icon(name: str, color: str = "") -> QIcon:
     return result
 
 
-def _dark_palette() -> QPalette:
-    palette = QPalette(QColor("#3a3d42"), QColor("#2b2d31"))
+def _palette(shades: _Shades) -> QPalette:
+    palette = QPalette(QColor(shades.button), QColor(shades.window))
+    roles = QPalette.ColorRole
     for role, color in (
-        (QPalette.ColorRole.Base, "#1e2023"),
-        (QPalette.ColorRole.AlternateBase, "#25272b"),
-        (QPalette.ColorRole.ToolTipBase, "#3a3d42"),
-        (QPalette.ColorRole.ToolTipText, "#eceef1"),
-        (QPalette.ColorRole.Text, "#eceef1"),
-        (QPalette.ColorRole.WindowText, "#eceef1"),
-        (QPalette.ColorRole.ButtonText, "#eceef1"),
-        (QPalette.ColorRole.PlaceholderText, _DARK.muted),
-        (QPalette.ColorRole.Highlight, "#2f6fb5"),
-        (QPalette.ColorRole.HighlightedText, "#ffffff"),
-        (QPalette.ColorRole.Link, _DARK.live),
+        (roles.Base, shades.base),
+        (roles.AlternateBase, shades.stripe),
+        (roles.ToolTipBase, shades.button),
+        (roles.PlaceholderText, shades.faint),
+        (roles.Highlight, shades.accent),
+        (roles.HighlightedText, "#ffffff"),
+        (roles.Link, shades.link),
     ):
         palette.setColor(role, QColor(color))
-    for role in (
-        QPalette.ColorRole.Text,
-        QPalette.ColorRole.WindowText,
-        QPalette.ColorRole.ButtonText,
-    ):
-        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor("#7d848d"))
+    for role in (roles.Text, roles.WindowText, roles.ButtonText, roles.ToolTipText):
+        palette.setColor(role, QColor(shades.text))
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(shades.disabled))
     return palette
 
 

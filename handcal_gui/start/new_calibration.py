@@ -12,7 +12,7 @@ from handcal.doctor import Finding, Health
 from handcal.history import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.preflight import Part, is_ready
 from handcal.station_settings import StationSettings
-from handcal_gui.fields import button, named, paragraph
+from handcal_gui.fields import main_button, named, paragraph
 from handcal_gui.preferences import Preferences
 from handcal_gui.start.card import Card
 from handcal_gui.start.latest_job import LatestJob
@@ -62,10 +62,8 @@ class NewCalibration(Card):
         self._wearer.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
         self._form = StationForm(self._wearer, preferences.station, pairing_key)
         self._problem = paragraph("startProblem")
-        self._button = button("start", "Start calibration")
+        self._button = main_button("start", "Start calibration")
         self._button.setEnabled(False)
-        self._button.setDefault(True)
-        self._button.setMinimumHeight(5 * SPACING_PX)
         self._lay_out()
         self._check = LatestJob(lambda question: check(*question), self)
         self._check.answered.connect(self._take_findings)

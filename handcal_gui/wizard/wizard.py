@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.snapshot import Snapshot
-from handcal_gui.fields import button
+from handcal_gui.fields import button, main_button
 from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard
 
@@ -48,7 +48,7 @@ class WizardPanel(QWidget):
         self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
         self._note = QLabel(wordWrap=True)
         self._note.setObjectName("wizardNote")
-        self._main = button("wizardMain", "")
+        self._main = main_button("wizardMain")
         self._others = [button(f"wizardOther{i}", "") for i in range(_MOST_OTHERS)]
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
@@ -94,12 +94,6 @@ class WizardPanel(QWidget):
         self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
         self._note.setMinimumHeight(2 * self._note.fontMetrics().lineSpacing() + 2)
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
-        font = self._main.font()
-        font.setPointSizeF(1.2 * font.pointSizeF())
-        font.setBold(True)
-        self._main.setFont(font)
-        self._main.setMinimumHeight(5 * SPACING_PX)
-        self._main.setDefault(True)
         self._plan.addItems(list(PLANS.values()))
         self._plan.setToolTip(
             "One eye after the other tells each eye's place, and takes two alignments.\n"
