@@ -40,8 +40,11 @@ class SampleSettings:
     whole_px : float
         Side of a square with as many pixels as the detector will shrink a whole image to.
     zoomed : float
-        Share of the crops in which one hand is zoomed to fill 12–85 % of the side, as a wearer's
+        Share of the crops as large as makes one hand fill 12–85 % of the side, as a wearer's
         does; the others show the photograph about as large as the detector will see it.
+    centered : float
+        Share of the crops that are about that hand. The others show any part of the photograph,
+        as large: faces, arms and things that are no hands.
     zoom_max : float
         A photograph is enlarged no further.
     large_weight : float
@@ -53,6 +56,7 @@ class SampleSettings:
     side_px: int = 192
     whole_px: float = 300.0
     zoomed: float = 0.5
+    centered: float = 0.72
     zoom_max: float = 4.0
     large_weight: float = 2.0
     simulated: float = 0.06
@@ -113,13 +117,14 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         image_px = np.sqrt(photo.width * photo.height)
         scale = settings.whole_px / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
         center = rng.uniform(0.0, 1.0, 2) * (photo.width, photo.height)
-        if len(photo.boxes) and rng.random() < 0.85:
+        if len(photo.boxes):
             sizes = photo.relative_sizes
             hand = rng.choice(len(sizes), p=sizes / sizes.sum())
-            center = (photo.boxes[hand, :2] + photo.boxes[hand, 2:]) / 2
             if rng.random() < settings.zoomed:
                 wanted_px = settings.side_px * np.exp(rng.uniform(np.log(0.12), np.log(0.85)))
                 scale = min(wanted_px / (sizes[hand] * image_px), settings.zoom_max)
+            if rng.random() < settings.centered:
+                center = (photo.boxes[hand, :2] + photo.boxes[hand, 2:]) / 2
         size_px = photo.width, photo.height
         return random_warp(rng, size_px, center, scale, settings.side_px)
 
