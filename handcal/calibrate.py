@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
 from handcal.display import projection_matrix, view_of_eye
-from handcal.errors import FileError, HandcalError, HandError, PoseError, PosePendingError
+from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
 from handcal.geometry import invert, transform
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.history import MAX_ALIGNMENTS, Shelf, read_shifts

@@ -25,7 +25,7 @@ from handcal.geometry import invert, transform
 from handcal.link.pairing import new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.rig.rig_file import read_rig
-from handcal.session import Session, SessionRecord
+from handcal.session import Session
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
@@ -81,13 +81,15 @@ class Station(Closable):
             self.session = stack.enter_context(_open_session(settings, wearer, resume))
             self._record = Session.open(self.session.path)
             self.rig = self._record.rig
+            self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
             bind = LOOPBACK if is_virtual else (settings.host, settings.port)
             self._link = stack.enter_context(HeadsetServer(self.pairing_key.encode(), bind))
             if is_virtual:
                 self._simulation = stack.enter_context(
                     Simulation(settings.seed, self._start_headset)
                 )
-                self._true_eyes = TrueEyes(self._simulation.world, self.rig, settings.seed)
+                self.worn_rig = read_rig(self._worn_rig_path)
+                self._true_eyes = TrueEyes(self._simulation.world, self.worn_rig, settings.seed)
             self._feed = stack.enter_context(CameraFeed(self._open_camera))
             self.calibration = Calibration(
                 self.rig,
@@ -195,6 +197,7 @@ class Station(Closable):
             scene_port,
             self.pairing_key,
             seed=self.settings.seed,
+            worn_rig_path=self._worn_rig_path,
             loss=self.settings.loss,
             reorder=self.settings.reorder,
         )
@@ -210,7 +213,7 @@ class Station(Closable):
         return SyntheticCamera(
             self._simulation.world,
             self._simulation.scene,
-            depth_intrinsics=self.rig.depth_intrinsics,
+            depth_intrinsics=self.worn_rig.depth_intrinsics,
             seed=settings.seed,
         )
 
@@ -238,7 +241,7 @@ class Station(Closable):
             eye_shift_m = self._true_eyes.shift_m[eye]
             scene = self._simulation.scene_at(hand.t_host_ns)
             if scene is not None:
-                T_W_H = scene.T_W_D @ invert(self.rig.T_H_D)
+                T_W_H = scene.T_W_D @ invert(self.worn_rig.T_H_D)
                 image = self._true_eyes.look(eye, T_W_H, scene.T_W_hand)
         elif calibration.results is not None and eye in calibration.results.shifts:
             eye_shift_m = calibration.results.shifts[eye].shift_m

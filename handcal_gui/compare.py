@@ -29,17 +29,24 @@ class Comparison(QObject):
         self._settings = SolveSettings()
         self._job: Job | None = None
         panel.compare_requested.connect(self._start)
-        panel.compare_cancelled.connect(self.cancel)
+        panel.compare_cancelled.connect(self._give_up)
 
     def use(self, alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> None:
         """Compare these from now on."""
         self._alignments, self._rig, self._settings = alignments, rig, settings
 
     def cancel(self) -> None:
-        """Stop, and wait for it."""
+        """Stop, and wait for it; nothing is shown any more."""
         if self._job is not None:
             self._job.abandon()
             self._job = None
+
+    def _give_up(self) -> None:
+        """Stop without waiting: a method may take seconds for what it has begun."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job.succeeded.disconnect()
+            self._job.failed.disconnect()
 
     def _start(self, method: Method) -> None:
         self.cancel()

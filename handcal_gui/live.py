@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from contextlib import suppress
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from handcal.calibrate import Calibration
+from handcal.errors import FileError
 from handcal.snapshot import Snapshot
 from handcal.station import Station
-from handcal.types import Eye, Float64
 from handcal_gui.compare import Comparison
 from handcal_gui.stream import Command, Stream
 from handcal_gui.window import MainWindow
@@ -54,6 +56,8 @@ class Live(QObject):
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
         self._is_watching = False
+        self._is_doing = False
+        self._complained_of = ""
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -67,7 +71,7 @@ class Live(QObject):
     def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
         """Run a station, after ending the present one."""
         self.stop()
-        self._is_watching = False
+        self._is_watching = self._is_doing = False
         self._wizard_panel.start(Wizard(plan))
         self._stream = Stream(open_station, self)
         self._stream.opened.connect(self._take_station)
@@ -75,36 +79,40 @@ class Live(QObject):
         self._stream.failed.connect(self._take_failure)
         self._stream.ended.connect(self._take_end)
         self._stream.start()
-        self._timer.start()
 
     def stop(self) -> None:
         """End the calibration and wait for it; safe to call twice."""
-        self._timer.stop()
         self._comparison.cancel()
-        stream, self._stream = self._stream, None
+        stream = self._stream
         if stream is not None:
+            self._window.panels.fine_tune.settle()
             self._window.panels.session.flush()
             stream.close()
             stream.deleteLater()
+        self._stream = None
+        self._timer.stop()
         self._snapshot = None
         self._window.banner.show_condition("")
 
     def do(self, action: Action) -> None:
-        """Do what the wizard offers."""
+        """Do what the wizard offers, unless something that it offered is still being done."""
         snapshot = self._snapshot
-        if snapshot is None:
+        if snapshot is None or self._is_doing:
             return
         eyes = self._wizard_panel.wizard.eyes(snapshot)
-        commands: dict[Action, Command] = {
-            Action.MAKE_CURSOR: lambda station: station.calibration.make_cursor(eyes),
-            Action.CONFIRM: lambda station: station.calibration.confirm(),
-            Action.SOLVE: lambda station: station.calibration.solve(),
-            Action.APPLY: lambda station: station.calibration.apply(),
-            Action.REDO: lambda station: station.calibration.redo(),
-            Action.FINISH: lambda station: station.session.finish(),
+        commands: dict[Action, Callable[[Calibration], object]] = {
+            Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
+            Action.CONFIRM: Calibration.confirm,
+            Action.SOLVE: Calibration.solve,
+            Action.APPLY: Calibration.apply,
+            Action.REDO: Calibration.redo,
         }
         if action in commands:
-            self._ask(action.value, commands[action])
+            self._is_doing = True
+            self._calibrate(action.value, commands[action])
+        elif action is Action.FINISH:
+            self._is_doing = True
+            self._ask(action.value, Station.finish)
         elif action is Action.EXPORT:
             self.export_requested.emit()
         elif action is Action.NEXT_WEARER:
@@ -117,52 +125,65 @@ class Live(QObject):
         panels = self._window.panels
         self._wizard_panel.asked.connect(self.do)
         self._window.space_pressed.connect(self._wizard_panel.press_main)
-        panels.fine_tune.shift_changed.connect(self._set_shift)
-        panels.fine_tune.shift_settled.connect(
-            lambda: self._ask("record φ", lambda station: station.calibration.record_shift())
+        self._connect_fine_tuning()
+        self._connect_session()
+        panels.link.restart_headset_requested.connect(
+            lambda: self._ask("restart the headset", Station.restart_headset)
+        )
+
+    def _connect_fine_tuning(self) -> None:
+        fine_tune, trials = self._window.panels.fine_tune, self._window.panels.trials
+        fine_tune.shift_changed.connect(
+            lambda shifts_m: self._calibrate("set φ", lambda c: c.set_shift(shifts_m))
+        )
+        fine_tune.shift_settled.connect(
+            lambda: self._calibrate("record φ", Calibration.record_shift)
         )
         # What is shown for a comparison only is not the φ that a trial is about.
-        panels.trials.trial_requested.connect(panels.fine_tune.settle)
-        panels.trials.trial_requested.connect(
-            lambda eye, depth_m: self._ask(
-                "record the trial", lambda station: station.save_trial(eye, depth_m)
-            )
+        trials.trial_requested.connect(fine_tune.settle)
+        trials.trial_requested.connect(
+            lambda eye, depth_m: self._ask("record the trial", lambda s: s.save_trial(eye, depth_m))
         )
-        panels.link.restart_headset_requested.connect(
-            lambda: self._ask("restart the headset", lambda station: station.restart_headset())
-        )
-        session = panels.session
+
+    def _connect_session(self) -> None:
+        session, trials = self._window.panels.session, self._window.panels.trials
         session.delete_alignment_requested.connect(
-            self._ask_number("delete the alignment", lambda s: s.calibration.delete_alignment)
+            lambda number: self._calibrate(
+                "delete the alignment", lambda c: c.delete_alignment(number)
+            )
         )
         session.restore_alignment_requested.connect(
-            self._ask_number("restore the alignment", lambda s: s.calibration.restore_alignment)
+            lambda number: self._calibrate(
+                "restore the alignment", lambda c: c.restore_alignment(number)
+            )
         )
-        for panel in (session, panels.trials):
+        for panel in (session, trials):
             panel.delete_trial_requested.connect(
-                self._ask_number("delete the trial", lambda s: s.session.delete_trial)
+                lambda number: self._ask(
+                    "delete the trial", lambda s: s.session.delete_trial(number)
+                )
             )
             panel.restore_trial_requested.connect(
-                self._ask_number("restore the trial", lambda s: s.session.restore_trial)
+                lambda number: self._ask(
+                    "restore the trial", lambda s: s.session.restore_trial(number)
+                )
             )
         session.notes_changed.connect(
-            lambda text: self._ask(
-                "save the notes", lambda station: station.session.save_notes(text)
-            )
+            lambda text: self._ask("save the notes", lambda s: s.session.save_notes(text))
         )
 
     def _ask(self, name: str, command: Command) -> None:
         if self._stream is not None:
             self._stream.ask(name, command)
 
-    def _ask_number(
-        self, name: str, method: Callable[[Station], Callable[[int], object]]
-    ) -> Callable[[int], None]:
-        """Return what asks the engine to call a method with a number."""
-        return lambda number: self._ask(name, lambda station: method(station)(number))
+    def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> None:
+        """Ask the procedure; what it cannot write, it keeps, and the station tells of that."""
 
-    def _set_shift(self, shifts_m: Mapping[Eye, Float64]) -> None:
-        self._ask("set φ", lambda station: station.calibration.set_shift(shifts_m))
+        def obey(station: Station) -> None:
+            with suppress(FileError):
+                command(station.calibration)
+
+        self._ask(name, obey)
 
     def _poll(self) -> None:
         snapshot = self._stream.newest() if self._stream is not None else None
@@ -203,14 +224,22 @@ class Live(QObject):
             f"{host}:{port}", station.pairing_key, is_virtual=station.settings.headset == "virtual"
         )
         self._window.show_page("live")
+        self._timer.start()
         self.opened.emit(station.session.path)
 
     def _take_answer(self, name: str, _answer: object) -> None:
-        self._window.banner.clear()
+        self._poll()  # what is done can be seen before anything else is
+        if name in set(Action):
+            self._is_doing = False
         if name == Action.FINISH and self._snapshot is not None:
             self._wizard_panel.wizard.move(Action.FINISH, self._snapshot)
+        if name == self._complained_of:
+            self._window.banner.clear()
 
     def _take_failure(self, name: str, why: str) -> None:
+        if name in set(Action):
+            self._is_doing = False
+        self._complained_of = name
         self._window.banner.show_message(f"Could not {name}: {why}")
 
     def _take_end(self, why: str) -> None:
