@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,10 +19,13 @@ from handcal.calibrate import Calibration, Observation, State
 from handcal.display import (
     TARGET_DEPTHS_M,
     arcmin_from_px,
-    reprojection_error_px,
+    eye_projection,
+    projection_matrix,
     target_corners_m,
+    view_of_eye,
 )
 from handcal.errors import HandcalError
+from handcal.geometry import invert, project, transform
 from handcal.register.solve import solve_alignment
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station import Station
@@ -48,6 +51,8 @@ class DemoSettings:
     eyes : {"both", "each"}
     loss, reorder : float
         Share of the link's datagrams lost, and reordered, in each direction.
+    worn_rig : str
+        Path of the rig that the wearer really looks through; empty takes the one calibrated with.
     """
 
     seed: int = 1
@@ -55,6 +60,7 @@ class DemoSettings:
     eyes: EyePlan = "both"
     loss: float = 0.0
     reorder: float = 0.0
+    worn_rig: str = ""
 
 
 def run_demo(
@@ -83,6 +89,7 @@ def run_demo(
     """
     station_settings = StationSettings(
         rig=str(rig_path),
+        worn_rig=settings.worn_rig,
         seed=settings.seed,
         loss=settings.loss,
         reorder=settings.reorder,
@@ -92,13 +99,12 @@ def run_demo(
         report("Connecting to the virtual headset", 0.0)
         observations = _follow_plan(station, settings, report)
         statistics = station.step().link
-        station.session.record("link", **asdict(statistics))
-        station.session.finish()
+        station.finish()
     calibration, rig = station.calibration, station.rig
     return {
         "seed": settings.seed,
         "session": str(station.session.path),
-        **_judge(calibration, rig, settings),
+        **_judge(calibration, station, settings),
         "guard": {
             "rejected": calibration.refused,
             "accepted_deg": max(
@@ -116,18 +122,37 @@ def run_demo(
 
 
 def reprojection_arcmin(
-    rig: Rig, shifts_m: Mapping[Eye, Float64], true_shifts_m: Mapping[Eye, Float64]
+    rig: Rig,
+    shifts_m: Mapping[Eye, Float64],
+    true_shifts_m: Mapping[Eye, Float64],
+    worn_rig: Rig | None = None,
 ) -> float:
     """Return the mean error seen by the true eyes, in arcmin.
 
-    At the corners of the user test's target at its three distances.
+    At the corners of the user test's target at its three distances, tracked by the depth camera.
+
+    Parameters
+    ----------
+    rig : Rig
+        The one rendered with.
+    shifts_m : mapping of eye to (3,) float64
+        φ rendered with, from the C0 of `rig`.
+    true_shifts_m : mapping of eye to (3,) float64
+        φ of the true eyes, from the C0 of `worn_rig`.
+    worn_rig : Rig, optional
+        The true one, if it is another.
     """
+    worn_rig = worn_rig or rig
     corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
+    T_H_H = rig.T_H_D @ invert(worn_rig.T_H_D)  # how far off the tracked target is
     errors = []
     for eye in EYES:
-        display = rig.eyes[eye]
-        error_px = reprojection_error_px(display, shifts_m[eye], true_shifts_m[eye], corners_E_m)
-        errors.append(arcmin_from_px(display, error_px))
+        worn = worn_rig.eyes[eye]
+        T_E_H = view_of_eye(worn, np.eye(4))
+        target_V_m = transform(worn.T_V_H @ T_H_H @ invert(T_E_H), corners_E_m)
+        drawn_px = project(projection_matrix(rig.eyes[eye], shifts_m[eye]), target_V_m)
+        needed_px = project(eye_projection(worn, true_shifts_m[eye]), corners_E_m)
+        errors.append(arcmin_from_px(worn, np.linalg.norm(drawn_px - needed_px, axis=1)))
     return float(np.mean(errors))
 
 
@@ -169,11 +194,16 @@ def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> li
     return observations
 
 
-def _judge(calibration: Calibration, rig: Rig, settings: DemoSettings) -> dict[str, Any]:
+def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -> dict[str, Any]:
     """Compare the result with the wearer's true eyes."""
     assert calibration.results is not None
-    truth_m = draw_eyes(np.random.default_rng(settings.seed), WearerSettings())
-    results = calibration.results
+    results, rig, worn_rig = calibration.results, station.rig, station.worn_rig
+    eyes_m = draw_eyes(np.random.default_rng(settings.seed), WearerSettings())
+    # From the C0 that the rig knows, which is not quite where it is.
+    truth_m = {
+        eye: shift_m + rig.eyes[eye].t_C0_V_m - worn_rig.eyes[eye].t_C0_V_m
+        for eye, shift_m in eyes_m.items()
+    }
     solved_m = {eye: shift.shift_m for eye, shift in results.shifts.items()}
     nothing_m = {eye: np.zeros(3) for eye in EYES}
     return {
@@ -189,8 +219,8 @@ def _judge(calibration: Calibration, rig: Rig, settings: DemoSettings) -> dict[s
             for eye, shift in results.shifts.items()
         },
         "reprojection_arcmin": {
-            "before": reprojection_arcmin(rig, nothing_m, truth_m),
-            "after": reprojection_arcmin(rig, solved_m, truth_m),
+            "before": reprojection_arcmin(rig, nothing_m, eyes_m, worn_rig),
+            "after": reprojection_arcmin(rig, solved_m, eyes_m, worn_rig),
         },
     }
 

@@ -81,7 +81,7 @@ def solve_session(
     report : callable
         Told before each alignment what is going on and which share of the whole is done.
     is_cancelled : callable
-        Asked before each alignment.
+        Asked before each alignment, and by the slow methods before each iteration.
 
     Raises
     ------
@@ -90,12 +90,16 @@ def solve_session(
     CancelledError
         If it was cancelled.
     """
-    solved = []
-    for done, alignment in enumerate(alignments):
+
+    def checkpoint() -> None:
         if is_cancelled():
             raise CancelledError("solving was cancelled")
+
+    solved = []
+    for done, alignment in enumerate(alignments):
+        checkpoint()
         report(f"Solving alignment {done + 1} of {len(alignments)}", done / len(alignments))
-        solved.append(solve_alignment(alignment, rig, settings.method))
+        solved.append(solve_alignment(alignment, rig, settings.method, checkpoint))
     pairs = list(zip(alignments, solved, strict=True))
     shifts = fuse_alignments(pairs, rig, settings.fuse)
     after_another_m2 = covariances_after_another(pairs, rig, settings.fuse)

@@ -174,6 +174,11 @@ class Station(Closable):
         )
         return self.session.save_trial(trial)
 
+    def finish(self) -> None:
+        """Note how the link did, and that the session ends here; FileError if it cannot be."""
+        self.session.record("link", **asdict(self._link.statistics()))
+        self.session.finish()
+
     def require_headset(self) -> None:
         """Raise LinkError if the virtual headset has ended."""
         if self._simulation is not None:

@@ -95,7 +95,9 @@ class Review(QObject):
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
         if stored.results is not None:
-            panels.cloud.show_alignment(record.alignments[-1])
+            last = record.alignments[-1]
+            residuals_m = stored.results.alignments[-1][last.eyes[0]].residuals_m
+            panels.cloud.show_alignment(last, residuals_m)
             self._comparison.use(record.alignments, record.rig, stored.settings)
         self._window.show_page("review")
         self.opened.emit(record.path)

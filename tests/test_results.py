@@ -114,6 +114,20 @@ def test_it_reports_and_can_be_cancelled_between_alignments(left: Alignment) -> 
     assert len(reports) == 1
 
 
+@pytest.mark.parametrize("method", ["paper", "linear", "icp"])
+def test_a_slow_method_can_be_cancelled_in_the_middle(left: Alignment, method: Method) -> None:
+    asked = 0
+
+    def is_cancelled() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 3
+
+    with pytest.raises(CancelledError):
+        solve_session([left], RIG, SolveSettings(method), is_cancelled=is_cancelled)
+    assert asked == 4  # before the alignment, and before three iterations
+
+
 def test_nothing_to_solve_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one alignment"):
         solve_session([], RIG, SolveSettings())

@@ -6,7 +6,9 @@ another, and know nothing of cuts, outliers or a rotated hand. They are here to 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,6 +18,7 @@ from handcal.register.model import fit_shift, predict
 from handcal.register.surface import nearest
 from handcal.types import Float64
 
+Checkpoint: TypeAlias = Callable[[], object]
 MAX_ITERATIONS = 800
 # The paper stops when the error falls by less than this factor from one iteration to the next.
 PAPER_RATIO = 0.9999
@@ -37,7 +40,9 @@ class Iterated:
     stop_reason: str
 
 
-def solve_paper(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterated:
+def solve_paper(
+    cursor_m: Float64, hand_m: Float64, distance_m: float, checkpoint: Checkpoint = lambda: None
+) -> Iterated:
     """Solve as in Hu et al. 2021: rows contracted with λ, SVD, stop at 1 > e_k/e_(k-1) > 0.9999.
 
     Parameters
@@ -46,6 +51,8 @@ def solve_paper(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterat
         In E0(t_b).
     distance_m : float
         z(C0→S).
+    checkpoint : callable
+        Called before each iteration; whatever it raises ends the solving.
     """
     phi_4 = 1.0 / distance_m
     tree = cKDTree(cursor_m)
@@ -53,6 +60,7 @@ def solve_paper(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterat
     moved = hand_m - shift_m
     history: list[float] = []
     while True:
+        checkpoint()
         partner, error_m2 = _pair(tree, cursor_m, moved)
         history.append(error_m2)
         if error_m2 < _EXACT_M2:
@@ -75,13 +83,16 @@ def solve_paper(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterat
         moved = predict(hand_m, shift_m, distance_m, exact=False)
 
 
-def solve_linear(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Iterated:
+def solve_linear(
+    cursor_m: Float64, hand_m: Float64, distance_m: float, checkpoint: Checkpoint = lambda: None
+) -> Iterated:
     """Solve the paper's model with all three rows of each pair; arguments as `solve_paper`."""
     tree = cKDTree(cursor_m)
     shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
     moved = hand_m - shift_m
     history: list[float] = []
     while True:
+        checkpoint()
         partner, error_m2 = _pair(tree, cursor_m, moved)
         history.append(error_m2)
         previous_m = shift_m
@@ -93,7 +104,9 @@ def solve_linear(cursor_m: Float64, hand_m: Float64, distance_m: float) -> Itera
             return _ended(shift_m, moved, partner, history, None)
 
 
-def solve_icp(cursor_m: Float64, hand_m: Float64) -> Iterated:
+def solve_icp(
+    cursor_m: Float64, hand_m: Float64, checkpoint: Checkpoint = lambda: None
+) -> Iterated:
     """Solve rigidly, point to point (Besl & McKay 1992), and read φ off the translation.
 
     UQ's translation is -φ at E's origin; the paper compares with this. Arguments as `solve_paper`.
@@ -102,6 +115,7 @@ def solve_icp(cursor_m: Float64, hand_m: Float64) -> Iterated:
     T = rigid(translation_m=cursor_m.mean(axis=0) - hand_m.mean(axis=0))
     history: list[float] = []
     while True:
+        checkpoint()
         moved = transform(T, hand_m)
         partner, error_m2 = _pair(tree, cursor_m, moved)
         history.append(error_m2)

@@ -11,7 +11,7 @@ from handcal.geometry import is_rigid, transform
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.fuse import with_eye_box
 from handcal.register.model import design, drawn
-from handcal.register.rcicp import solve_icp, solve_linear, solve_paper
+from handcal.register.rcicp import Checkpoint, solve_icp, solve_linear, solve_paper
 from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
 
 MIN_POINTS = 100
@@ -75,12 +75,16 @@ def solve_eye_shift(
 
 
 def solve_alignment(
-    alignment: Alignment, rig: Rig, method: Method = "consistent"
+    alignment: Alignment,
+    rig: Rig,
+    method: Method = "consistent",
+    checkpoint: Checkpoint = lambda: None,
 ) -> Mapping[Eye, EyeShift]:
     """Solve every eye that took part in an alignment.
 
     ``consistent`` registers the hand once for both eyes: its motion is the same for either. It
-    adds no prior: that is `fuse_alignments`'.
+    adds no prior: that is `fuse_alignments`'. The other methods may take seconds, and call
+    `checkpoint` before each iteration: whatever it raises ends the solving.
 
     Raises
     ------
@@ -108,7 +112,7 @@ def solve_alignment(
         else:
             cursor = transform(T_drawn @ T_E, alignment.cursor_m)
             hand = transform(T_E, alignment.hand_m)
-            shifts[eye] = _solve_baseline(cursor, hand, distance_m, method)
+            shifts[eye] = _solve_baseline(cursor, hand, distance_m, method, checkpoint)
     return shifts
 
 
@@ -145,7 +149,11 @@ def _check_cut(name: str, cut: ArrayLike | None, cloud: Float64) -> Bool | None:
 
 
 def _solve_baseline(
-    cursor_m: Float64, hand_m: Float64, distance_m: float, method: Method
+    cursor_m: Float64,
+    hand_m: Float64,
+    distance_m: float,
+    method: Method,
+    checkpoint: Checkpoint = lambda: None,
 ) -> EyeShift:
     """Solve by one of the published ways, in E0(t_b).
 
@@ -153,10 +161,10 @@ def _solve_baseline(
     for every ICP (Censi 2007): only ``consistent`` claims more.
     """
     if method == "icp":
-        ended = solve_icp(cursor_m, hand_m)
+        ended = solve_icp(cursor_m, hand_m, checkpoint)
     else:
         solver = solve_paper if method == "paper" else solve_linear
-        ended = solver(cursor_m, hand_m, distance_m)
+        ended = solver(cursor_m, hand_m, distance_m, checkpoint)
     residuals_m = np.linalg.norm(ended.moved_m - ended.partner_m, axis=1)
     A = design(ended.partner_m, hand_m, distance_m, exact=False).reshape(-1, 3)
     variance_m2 = float(residuals_m @ residuals_m) / (3 * len(hand_m) - 3)
