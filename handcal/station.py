@@ -148,8 +148,9 @@ class Station(Closable):
         )
 
     def finish(self) -> None:
-        """Note that the session is complete; FileError if that, or all before, cannot be."""
+        """Note how the link did and that the session is complete; FileError if it cannot be."""
         self.calibration.store_waiting()
+        self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
 
     def save_trial(self, eye: Eye, depth_m: float) -> int:
@@ -173,11 +174,6 @@ class Station(Closable):
             self.calibration.applied_shift_m[eye],
         )
         return self.session.save_trial(trial)
-
-    def finish(self) -> None:
-        """Note how the link did, and that the session ends here; FileError if it cannot be."""
-        self.session.record("link", **asdict(self._link.statistics()))
-        self.session.finish()
 
     def require_headset(self) -> None:
         """Raise LinkError if the virtual headset has ended."""
