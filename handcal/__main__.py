@@ -40,6 +40,7 @@ def demo(arguments: argparse.Namespace) -> None:
         eyes=arguments.eyes,
         loss=arguments.loss,
         reorder=arguments.reorder,
+        worn_rig=str(arguments.worn_rig or ""),
     )
     with _progress() as report:
         result = run_demo(settings, _rig_path(arguments.rig), make_folder(arguments.output), report)
@@ -164,6 +165,7 @@ def headset(arguments: argparse.Namespace) -> None:
 
     settings = HeadsetSettings(
         rig_path=str(_rig_path(arguments.rig)),
+        worn_rig_path=str(arguments.worn_rig or ""),
         host=arguments.host,
         port=arguments.port,
         scene_port=arguments.scene_port,
@@ -277,6 +279,9 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
     one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")
     one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
+    one.add_argument(
+        "--worn-rig", type=Path, help="the true rig of the simulated headset, if it is another"
+    )
 
     one = add(segment, json=False)
     one.add_argument("--color", type=Path, required=True, help="colour image")
@@ -320,6 +325,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--host", default="127.0.0.1", help="the PC")
     one.add_argument("--key-file", type=Path, help="pairing key; else in HANDCAL_PAIRING_KEY")
     one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
+    one.add_argument("--worn-rig", type=Path, help="the true rig, if it is another")
     one.add_argument("--seed", type=seed, default=1, help="of the wearer")
     one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
     one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")

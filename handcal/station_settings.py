@@ -31,6 +31,8 @@ class StationSettings:
         Where a network headset connects to.
     rig : str
         Path of the rig file; empty takes the example, which is the virtual headset's own.
+    worn_rig : str
+        Path of the rig that the simulated wearer really looks through; empty takes `rig`.
     seed : int
         Of the simulated wearer, hand and room.
     loss, reorder : float
@@ -47,6 +49,7 @@ class StationSettings:
     host: str = "0.0.0.0"  # noqa: S104 (a headset is another device; the datagrams are signed)
     port: int = DEFAULT_PORT
     rig: str = ""
+    worn_rig: str = ""
     seed: int = 1
     loss: float = 0.0
     reorder: float = 0.0

@@ -25,6 +25,8 @@ UInt16: TypeAlias = NDArray[np.uint16]
 
 Eye: TypeAlias = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
+RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
+RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
 VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
@@ -327,6 +329,41 @@ class EyeDisplay:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Origin:
+    """How a part of a rig was calibrated, and how far to trust it.
+
+    Attributes
+    ----------
+    method : str
+        One line.
+    made : str
+        When: ISO 8601.
+    views : int
+        Images, or pairs of images, that were used.
+    rms_px : float
+        Root mean square of the reprojection error.
+    verdict, reason : str
+        One line each.
+    parameters : tuple of str
+        What the covariance is of, with units.
+    covariance : (n, n) float64
+        Of the n `parameters`.
+    """
+
+    method: str
+    made: str
+    views: int
+    rms_px: float
+    verdict: str
+    reason: str
+    parameters: tuple[str, ...]
+    covariance: Float64
+
+    def __post_init__(self) -> None:
+        freeze(self, "covariance", np.float64, len(self.parameters), len(self.parameters))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Rig:
     """The offline calibration: both eye displays and where the depth camera sits.
 
@@ -337,15 +374,19 @@ class Rig:
     T_H_D : (4, 4) float64
         From the depth camera to the headset rig.
     depth_intrinsics : Intrinsics
+    origins : mapping of part to Origin
+        How each of `RIG_PARTS` was calibrated, as far as that is known.
     """
 
     name: str
     eyes: Mapping[Eye, EyeDisplay]
     T_H_D: Float64
     depth_intrinsics: Intrinsics
+    origins: Mapping[RigPart, Origin] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_D", np.float64, 4, 4)
+        object.__setattr__(self, "origins", MappingProxyType(dict(self.origins)))
         if set(self.eyes) != set(EYES):
             raise ValueError("Rig.eyes: both left and right are needed")
         object.__setattr__(self, "eyes", MappingProxyType(dict(self.eyes)))

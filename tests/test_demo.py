@@ -140,7 +140,7 @@ def test_the_reprojection_error_is_that_of_the_true_eyes() -> None:
     rig = example_rig()
     still_m: dict[Eye, np.ndarray] = {eye: np.zeros(3) for eye in EYES}
     aside_m: dict[Eye, np.ndarray] = {eye: np.array([0.004, 0.0, 0.0]) for eye in EYES}
-    assert reprojection_arcmin(rig, aside_m, aside_m) == 0.0
+    assert reprojection_arcmin(rig, aside_m, aside_m) == pytest.approx(0.0, abs=1e-9)
     # An eye 4 mm aside sees a target at depth z off by 4 mm (1/z - 1/2 m), in radians.
     expected = [np.arctan(0.004 * (1.0 / z - 1.0 / Z_E_S_M)) for z in (0.4, 0.5, 0.6)]
     expected_arcmin = 60.0 * np.degrees(np.mean(expected))

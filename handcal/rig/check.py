@@ -5,21 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from handcal.geometry import is_rigid
-from handcal.types import EYES, EyeDisplay, Float64, Intrinsics, Rig
+from handcal.types import EYES, RIG_PARTS, EyeDisplay, Float64, Intrinsics, Origin, Rig
 
 MAX_SIDE_PX = 16384
+MAX_TEXT = 200
+MAX_PARAMETERS = 12
 
 
 def check_rig(rig: Rig) -> None:
     """Raise ValueError, naming the field and what is expected, if `rig` is implausible."""
-    require(
-        0 < len(rig.name) <= 200 and rig.name.isprintable(),
-        "name must be one line of 1 to 200 printable characters",
-    )
+    _check_line("name", rig.name)
     for eye in EYES:
         _check_display(eye, rig.eyes[eye])
     _check_rigid("T_H_D", rig.T_H_D)
     _check_depth_camera(rig.depth_intrinsics)
+    for part, origin in rig.origins.items():
+        require(part in RIG_PARTS, f"origins may be of {', '.join(RIG_PARTS)}, not of {part}")
+        _check_origin(f"origins.{part}", origin)
 
 
 def require(condition: bool, problem: str) -> None:
@@ -55,6 +57,33 @@ def _check_depth_camera(intrinsics: Intrinsics) -> None:
         len(intrinsics.distortion) in (0, 4, 5, 8, 12, 14)
         and bool(np.isfinite(intrinsics.distortion).all()),
         "depth_camera.distortion must hold 0, 4, 5, 8, 12 or 14 finite numbers (OpenCV's order)",
+    )
+
+
+def _check_origin(name: str, origin: Origin) -> None:
+    for field in ("method", "made", "verdict", "reason"):
+        _check_line(f"{name}.{field}", getattr(origin, field))
+    require(origin.views > 0, f"{name}.views must be above 0")
+    require(0 <= origin.rms_px < np.inf, f"{name}.rms_px must be a number that is not negative")
+    require(
+        0 < len(origin.parameters) <= MAX_PARAMETERS,
+        f"{name}.parameters must hold 1 to {MAX_PARAMETERS} names",
+    )
+    for parameter in origin.parameters:
+        _check_line(f"{name}.parameters", parameter)
+    covariance = origin.covariance
+    require(
+        bool(np.isfinite(covariance).all())
+        and np.allclose(covariance, covariance.T, rtol=1e-6, atol=0.0)
+        and bool((np.diag(covariance) >= 0).all()),
+        f"{name}.covariance must be finite and symmetric, with variances that are not negative",
+    )
+
+
+def _check_line(name: str, text: str) -> None:
+    require(
+        0 < len(text) <= MAX_TEXT and text.isprintable(),
+        f"{name} must be one line of 1 to {MAX_TEXT} printable characters",
     )
 
 

@@ -1,7 +1,8 @@
 """The rig file: the offline calibration in OpenCV's FileStorage YAML.
 
 Anything that reads FileStorage reads it. Per eye: K, H0, t_C0_V_m, z_C0_S_m, the display's size
-and T_V_H; for the depth camera: T_H_D and its intrinsics. Numbers survive exactly.
+and T_V_H; for the depth camera: T_H_D and its intrinsics; and how each was calibrated. Numbers
+survive exactly. Version 1, which does not know how, is read as well; writing makes it version 2.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from handcal.errors import FileError
 from handcal.files import read_limited, write_atomic
 from handcal.rig.check import check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
-from handcal.types import EYES, EyeDisplay, Intrinsics, Rig
+from handcal.types import EYES, RIG_PARTS, EyeDisplay, Intrinsics, Origin, Rig, RigPart
 
-RIG_VERSION = 1
-MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB
+RIG_VERSION = 2
+MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 8 kB with how it was calibrated
 
 
 def write_rig(path: Path, rig: Rig) -> None:
@@ -57,7 +58,10 @@ def write_rig(path: Path, rig: Rig) -> None:
         storage.write("", coefficient)
     storage.endWriteStruct()
     storage.endWriteStruct()
-    write_atomic(path, storage.releaseAndGetString().encode())
+    _write_origins(storage, rig)
+    data = storage.releaseAndGetString().encode()
+    require(len(data) <= MAX_RIG_BYTES, f"the rig takes more than {MAX_RIG_BYTES:,} bytes")
+    write_atomic(path, data)
 
 
 def read_rig(path: Path) -> Rig:
@@ -82,15 +86,38 @@ def quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
+def _write_origins(storage: cv2.FileStorage, rig: Rig) -> None:
+    if not rig.origins:
+        return
+    storage.startWriteStruct("origins", cv2.FileNode_MAP)
+    for part, origin in rig.origins.items():
+        storage.startWriteStruct(part, cv2.FileNode_MAP)
+        for name in ("method", "made", "verdict", "reason"):
+            storage.write(name, quoted(getattr(origin, name)))
+        storage.write("views", origin.views)
+        storage.write("rms_px", origin.rms_px)
+        storage.startWriteStruct("parameters", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
+        for parameter in origin.parameters:
+            storage.write("", quoted(parameter))
+        storage.endWriteStruct()
+        storage.write("covariance", origin.covariance)
+        storage.endWriteStruct()
+    storage.endWriteStruct()
+
+
 def _parse(root: Fields) -> Rig:
     version = root.integer("handcal_rig")
-    require(version == RIG_VERSION, f"rig version {version} is not {RIG_VERSION}, the one known")
+    require(
+        1 <= version <= RIG_VERSION,
+        f"rig version {version} is unknown; versions 1 to {RIG_VERSION} can be read",
+    )
     eyes = {eye: _parse_display(root.section(eye)) for eye in EYES}
     rig = Rig(
         name=root.text("name"),
         eyes=eyes,
         T_H_D=root.matrix("T_H_D", 4, 4),
         depth_intrinsics=_parse_depth_camera(root.section("depth_camera")),
+        origins=_parse_origins(root),
     )
     check_rig(rig)
     return rig
@@ -117,4 +144,25 @@ def _parse_depth_camera(fields: Fields) -> Intrinsics:
         cx=fields.number("cx"),
         cy=fields.number("cy"),
         distortion=fields.numbers("distortion"),
+    )
+
+
+def _parse_origins(root: Fields) -> dict[RigPart, Origin]:
+    if not root.has("origins"):
+        return {}
+    origins = root.section("origins")
+    return {part: _parse_origin(origins.section(part)) for part in RIG_PARTS if origins.has(part)}
+
+
+def _parse_origin(fields: Fields) -> Origin:
+    parameters = fields.texts("parameters")
+    return Origin(
+        method=fields.text("method"),
+        made=fields.text("made"),
+        views=fields.integer("views"),
+        rms_px=fields.number("rms_px"),
+        verdict=fields.text("verdict"),
+        reason=fields.text("reason"),
+        parameters=parameters,
+        covariance=fields.matrix("covariance", len(parameters), len(parameters)),
     )

@@ -72,6 +72,16 @@ class Fields:
         require(node.isSeq(), f"{full_name} must be a list of numbers")
         return tuple(_number(full_name, node.at(index)) for index in range(node.size()))
 
+    def texts(self, name: str) -> tuple[str, ...]:
+        """Return the field's texts, one or more."""
+        node = self._node.getNode(name)
+        items = [node.at(index) for index in range(node.size())] if node.isSeq() else []
+        require(
+            bool(items) and all(item.isString() for item in items),
+            f"{self._prefix}{name} must be a list of texts",
+        )
+        return tuple(item.string() for item in items)
+
     def matrix(self, name: str, rows: int, columns: int) -> Float64:
         """Return an opencv-matrix of doubles of the given size."""
         node = self._node.getNode(name)

@@ -33,13 +33,15 @@ class HeadsetSettings:
     Attributes
     ----------
     rig_path : str
-        The rig that is worn.
+        The rig that the headset goes by, the PC's.
     host, port : str, int
         Where the PC listens.
     scene_port : int
         Where the synthetic camera listens, on this machine.
     seed : int
         Of the wearer, the wearer's hand and the tracking noise.
+    worn_rig_path : str
+        The rig that the wearer really looks through; empty takes `rig_path`.
     wearer : WearerSettings
     impairment : Impairment
         Of the network, in both directions.
@@ -60,6 +62,7 @@ class HeadsetSettings:
     scene_port: int
     host: str = "127.0.0.1"
     seed: int = 0
+    worn_rig_path: str = ""
     wearer: WearerSettings = field(default_factory=WearerSettings)
     impairment: Impairment = UNIMPAIRED
     rate_hz: float = 90.0
@@ -91,7 +94,8 @@ def run_headset(
         If the rig cannot be read.
     """
     rig = read_rig(Path(settings.rig_path))
-    wearer = Wearer(settings.seed, rig, make_hand(settings.seed), settings.wearer)
+    worn_rig = read_rig(Path(settings.worn_rig_path or settings.rig_path))
+    wearer = Wearer(settings.seed, worn_rig, make_hand(settings.seed), settings.wearer)
     rng = np.random.default_rng(settings.seed)
     clock_ns = _clock(settings)
     start_s = heard_s = next_s = time.monotonic()
@@ -109,7 +113,7 @@ def run_headset(
             t_ns = time.monotonic_ns()
             view = _view(client.state(), rig, t_ns / 1e9 - start_s)
             action = wearer.step(view)
-            scene.publish(SceneState(t_ns, action.T_W_H @ rig.T_H_D, action.T_W_hand))
+            scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
             T_W_H = action.T_W_H @ _tracking_error(rng, settings)
             client.send_pose(T_W_H, clock_ns(t_ns))
             if action.confirm:

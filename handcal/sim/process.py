@@ -20,8 +20,8 @@ class VirtualHeadset(Closable):
 
     Parameters
     ----------
-    rig_path : Path
-        The rig that is worn.
+    rig_path, worn_rig_path : Path
+        The rig that the headset goes by, and the one that the wearer really looks through.
     port, scene_port : int
         Where the PC's end of the link and the synthetic camera listen, on this machine.
     pairing_key : str
@@ -39,6 +39,7 @@ class VirtualHeadset(Closable):
         pairing_key: str,
         *,
         seed: int,
+        worn_rig_path: Path,
         loss: float = 0.0,
         reorder: float = 0.0,
     ) -> None:
@@ -47,6 +48,7 @@ class VirtualHeadset(Closable):
             "--port": port,
             "--scene-port": scene_port,
             "--rig": rig_path,
+            "--worn-rig": worn_rig_path,
             "--seed": seed,
             "--loss": loss,
             "--reorder": reorder,

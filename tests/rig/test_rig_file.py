@@ -88,8 +88,8 @@ def test_opencv_itself_reads_the_file(path: Path) -> None:
     ("old", "new", "problem"),
     [
         ("%YAML", "#", "not a FileStorage YAML file"),
-        ("handcal_rig: 1", "handcal_rig: 2", "rig version 2 is not 1"),
-        ("handcal_rig: 1", "other: 1", "handcal_rig must be a whole number"),
+        ("handcal_rig: 2", "handcal_rig: 3", "rig version 3 is unknown; versions 1 to 2"),
+        ("handcal_rig: 2", "other: 2", "handcal_rig must be a whole number"),
         ("name: ", "label: ", "name must be a text"),
         ("left:", "links:", "left must be a map"),
         ("   H0:", "   H1:", r"left\.H0 must be a 3×3 opencv-matrix of type d"),
