@@ -21,6 +21,7 @@ from PySide6.QtWidgets import QApplication
 from handcal.errors import HandcalError
 from handcal.files import make_folder
 from handcal.resources import resource_path
+from handcal.station_settings import StationSettings
 from handcal_gui.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -41,15 +42,20 @@ def main() -> NoReturn:
     file = PreferencesFile(arguments.preferences)
     _log_to(file.path.with_name("handcal.log"))
     try:
-        program = Program(file)
+        program = Program(file, remembers=not _is_demonstration(arguments))
     except HandcalError as error:
         _fail(str(error), 1)
     sys.excepthook = lambda *error: _tell(program, *error)
-    signal.signal(signal.SIGINT, lambda *_: program.window.close())
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: program.window.close())
     awake = QTimer()  # lets Python see the signal
     awake.start(200)
     program.window.show()
-    demonstration = _begin(program, arguments)
+    try:
+        demonstration = _begin(program, arguments)
+    except HandcalError as error:
+        program.close()
+        _fail(str(error), 2)
     app.exec()
     program.close()
     if demonstration is not None and demonstration.complaint is not None:
@@ -59,32 +65,47 @@ def main() -> NoReturn:
 
 def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | None:
     """Do at once what the arguments ask for."""
-    settings = program.preferences.station
-    if arguments.source:
-        is_file = arguments.source not in ("simulator", "realsense")
-        settings = replace(
-            settings,
-            source="recording" if is_file else arguments.source,
-            recording=arguments.source if is_file else settings.recording,
-            headset="network" if arguments.source == "realsense" else "virtual",
-        )
-    if arguments.rig:
-        settings = replace(settings, rig=str(arguments.rig))
-    if arguments.seed is not None:
-        settings = replace(settings, seed=arguments.seed)
-    if arguments.autopilot or arguments.screenshots:
+    settings = _station(program.preferences.station, arguments)
+    if _is_demonstration(arguments):
         demonstration = Demonstration(program, arguments.output, arguments.screenshots)
         demonstration.start(settings)
         return demonstration
     if arguments.session:
         program.open_session(arguments.session)
-    elif settings != program.preferences.station:
+    else:
         program.start.show_preferences(replace(program.preferences, station=settings))
     return None
 
 
+def _station(settings: StationSettings, arguments: argparse.Namespace) -> StationSettings:
+    """Return the station that the arguments ask for."""
+    match arguments.source or ("simulator" if _is_demonstration(arguments) else None):
+        case None:
+            pass
+        case "simulator":
+            settings = replace(settings, source="simulator", headset="virtual")
+        case "realsense":
+            settings = replace(settings, source="realsense", headset="network")
+        case path:
+            settings = replace(settings, source="recording", recording=path, headset="virtual")
+    if arguments.rig:
+        settings = replace(settings, rig=str(arguments.rig))
+    if arguments.seed is not None:
+        settings = replace(settings, seed=arguments.seed)
+    return settings
+
+
+def _is_demonstration(arguments: argparse.Namespace) -> bool:
+    return bool(arguments.autopilot or arguments.screenshots)
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        _fail(f"{message}; see {self.prog} --help", 2)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="handcal-gui",
         description="Calibrate an optical see-through headset with the wearer's bare hand.",
     )
@@ -153,5 +174,5 @@ def _tell(
 
 
 def _fail(message: str, code: int) -> NoReturn:
-    sys.stderr.write(f"handcal-gui: {message}\n")
+    sys.stderr.write(f"handcal-gui: {' '.join(message.split())}\n")
     sys.exit(code)

@@ -60,6 +60,8 @@ class Program(QObject):
     Parameters
     ----------
     file : PreferencesFile
+    remembers : bool
+        Whether what changes is written to the file.
 
     Attributes
     ----------
@@ -70,9 +72,10 @@ class Program(QObject):
     start : StartPage
     """
 
-    def __init__(self, file: PreferencesFile) -> None:
+    def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
         super().__init__()
         self._file = file
+        self._remembers = remembers
         self._preferences, complaint = file.load()
         self._use_theme()
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._use_theme)
@@ -119,12 +122,14 @@ class Program(QObject):
     def open_session(self, path: Path) -> None:
         """Look at a stored session."""
         self.live.stop()
+        self.window.banner.clear()
         self.review.open(path)
 
     def show_start(self) -> None:
         """End what runs, and show the start page."""
         self.live.stop()
         self.review.close()
+        self.start.setEnabled(True)
         self.start.show_preferences(self._preferences)
         self.window.show_page("start")
 
@@ -159,6 +164,8 @@ class Program(QObject):
                 fine_tune_step_m=self.window.panels.fine_tune.step_m,
             )
         )
+        for dialog in self.window.findChildren(ExportDialog):
+            dialog.stop()
         self.live.stop()
         self.review.close()
         self.start.stop()
@@ -217,6 +224,7 @@ class Program(QObject):
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
+        self.start.setEnabled(False)  # until the station is open, or is not
         self.live.start(open_station, self._preferences.plan)
 
     def _browse(self) -> None:
@@ -262,7 +270,8 @@ class Program(QObject):
     def _remember(self, preferences: Preferences) -> None:
         self._preferences = preferences
         try:
-            self._file.save(preferences)
+            if self._remembers:
+                self._file.save(preferences)
         except FileError as error:
             self.window.banner.show_message(f"The preferences cannot be saved: {error}")
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QProgressDialog
 
 from handcal.calibrate import CalibrationSettings
 from handcal.config import read_settings
@@ -16,6 +17,8 @@ from handcal_gui.compare import Comparison
 from handcal_gui.jobs import IsCancelled, Job, Report
 from handcal_gui.review_page import ReviewPage
 from handcal_gui.window import MainWindow
+
+_PATIENCE_MS = 500
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +42,8 @@ class Review(QObject):
     opened : Signal(Path)
     failed : Signal(str)
         A session could not be opened, and why.
+    record : SessionRecord or None
+        What is shown.
     """
 
     opened = Signal(object)
@@ -50,6 +55,7 @@ class Review(QObject):
         self._page = page
         self._comparison = comparison
         self._job: Job | None = None
+        self._progress: QProgressDialog | None = None
         self.record: SessionRecord | None = None
 
     def open(self, path: Path) -> None:
@@ -72,19 +78,40 @@ class Review(QObject):
 
         self._job = Job(work, self)
         self._job.succeeded.connect(self._show)
-        self._job.failed.connect(self.failed)
+        self._job.failed.connect(self._fail)
+        self._job.cancelled.connect(lambda: self._fail(f"{path} was not opened: cancelled"))
+        self._show_progress(self._job)
         self._job.start()
 
     def close(self) -> None:
         """Stop what goes on; safe to call twice."""
         self._comparison.cancel()
         if self._job is not None:
-            self._job.cancel()
-            self._job.wait()
+            self._job.abandon()
             self._job = None
+        self._end_progress()
         self.record = None
 
+    def _show_progress(self, job: Job) -> None:
+        """Say what takes so long, if it does, and let it be cancelled."""
+        progress = QProgressDialog("Reading the session…", "Cancel", 0, 0, self._window)
+        progress.setObjectName("opening")
+        progress.setMinimumDuration(_PATIENCE_MS)
+        progress.canceled.connect(job.cancel)
+        job.progressed.connect(lambda doing, _share: progress.setLabelText(f"{doing}…"))
+        self._progress = progress
+
+    def _end_progress(self) -> None:
+        if self._progress is not None:
+            self._progress.deleteLater()
+            self._progress = None
+
+    def _fail(self, why: str) -> None:
+        self._end_progress()
+        self.failed.emit(why)
+
     def _show(self, stored: _Stored) -> None:
+        self._end_progress()
         self.record = record = stored.record
         panels = self._window.panels
         note = "" if stored.results else "It holds no alignment yet."

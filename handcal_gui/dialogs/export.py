@@ -97,6 +97,13 @@ class ExportDialog(QDialog):
         self._job.start()
         self._refresh()
 
+    def stop(self) -> None:
+        """Give up what runs, and close; before the program ends."""
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+        self.reject()
+
     def reject(self) -> None:
         """Close; an export that runs is cancelled first."""
         if self._job is None:
