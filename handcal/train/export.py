@@ -97,7 +97,7 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
             reduce_range=True,
-            op_types_to_quantize=["Conv", "Add", "Resize"],
+            op_types_to_quantize=["Conv", "Clip", "Add", "Resize"],
         )
 
 
