@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import cv2
 import numpy as np
 
+from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo, read_image
 from handcal.evaluate.precision import ImageResult
-from handcal.hand.detect import overlaps
+from handcal.files import write_atomic
+from handcal.hand.detect import DetectSettings, overlaps
 from handcal.types import Float64, UInt8
 
 _OVERLAP = 0.5
@@ -51,6 +54,26 @@ def contact_sheet(
     drawn += [np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8)] * (-len(drawn) % _COLUMNS)
     rows = [np.hstack(drawn[i : i + _COLUMNS]) for i in range(0, len(drawn), _COLUMNS)]
     return np.vstack(rows) if rows else np.zeros((0, 0, 3), np.uint8)
+
+
+def write_contact_sheet(
+    path: Path, photos: Sequence[Photo], results: Sequence[ImageResult]
+) -> None:
+    """Write a `contact_sheet` of what the detector shows by default, as PNG or JPEG.
+
+    It is black where nothing went wrong.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written, or the name's ending is unknown.
+    """
+    sheet = contact_sheet(photos, results, DetectSettings().score_min)
+    if not cv2.haveImageWriter(str(path)):
+        raise FileError(f"{path} must end in .png or .jpg")
+    shown = sheet if sheet.size else np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8)
+    _, data = cv2.imencode(path.suffix, shown[..., ::-1])
+    write_atomic(path, data.tobytes())
 
 
 def _area(boxes: Float64) -> float:

@@ -6,7 +6,7 @@ import pytest
 
 from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo
-from handcal.evaluate.contact_sheet import contact_sheet
+from handcal.evaluate.contact_sheet import contact_sheet, write_contact_sheet
 from handcal.evaluate.detector import detect_all, evaluation, summary
 from handcal.evaluate.precision import ImageResult
 from handcal.hand.detect import Detections
@@ -88,3 +88,12 @@ def test_doubtful_detections_are_no_failures(photo: Photo) -> None:
     doubtful.scores[2] = 0.1
     assert contact_sheet([photo], [doubtful], 0.3).size == 0
     assert contact_sheet([photo], [doubtful], 0.05).size > 0
+
+
+def test_the_sheet_is_written_as_a_picture(photo: Photo, tmp_path: Path) -> None:
+    for number, boxes in enumerate(([SMALL], [SMALL, LARGE])):
+        path = tmp_path / f"{number}.png"
+        write_contact_sheet(path, [photo], [found(boxes, photo)])
+        assert cv2.imread(str(path)) is not None
+    with pytest.raises(FileError, match="png"):
+        write_contact_sheet(tmp_path / "sheet.what", [photo], [found([SMALL], photo)])
