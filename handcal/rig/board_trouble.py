@@ -1,0 +1,122 @@
+"""Why a board was not found in an image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeAlias
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handcal.types import Float64, UInt8
+
+if TYPE_CHECKING:
+    from handcal.rig.board import Board
+
+_ENOUGH_CORNERS = 8
+# Fewer markers than these are also found in leaves and carpets.
+_ENOUGH_MARKERS = 4
+_FAMILIES = (
+    "DICT_4X4_1000",
+    "DICT_5X5_1000",
+    "DICT_6X6_1000",
+    "DICT_7X7_1000",
+    "DICT_APRILTAG_36H11",
+    "DICT_ARUCO_MIP_36H12",
+    "DICT_ARUCO_ORIGINAL",
+)
+
+FindCorners: TypeAlias = "Callable[[UInt8, Board], tuple[NDArray[np.int64], Float64]]"
+
+
+def why_not_found(gray: UInt8, board: Board, find: FindCorners) -> str:
+    """Return one line on why `find` gave too few corners.
+
+    Parameters
+    ----------
+    gray : (H, W) uint8
+    board : Board
+        The board looked for.
+    find : callable
+        `handcal.rig.board.find_corners`.
+    """
+    shades = np.percentile(gray, (2, 98))
+    if shades[1] - shades[0] < 25:
+        if shades[1] < 60:
+            return "the image is too dark"
+        return "the image is too bright" if shades[0] > 195 else "the image has no contrast"
+    if board.kind == "checkerboard":
+        return _why_no_checkerboard(gray, board)
+    return _why_no_charuco(gray, board, find)
+
+
+def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
+    seen = _markers_of_some_family(gray)
+    if seen:
+        return f"a board with markers ({seen}) is seen, not a plain checkerboard"
+    other = _checkerboard_size(gray)
+    if other and other != tuple(sorted(board.squares)):
+        return (
+            f"a checkerboard of {other[1]}×{other[0]} squares is seen, "
+            f"not one of {board.squares[0]}×{board.squares[1]}"
+        )
+    return (
+        "no checkerboard is seen: all of it must be in the image with a white margin, sharp and "
+        "evenly lit"
+    )
+
+
+def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
+    mirrored = np.ascontiguousarray(gray[:, ::-1])
+    if len(find(mirrored, board)[0]) >= _ENOUGH_CORNERS:
+        return "the image is mirrored: switch that off in the camera"
+    other_print = replace(board, legacy=not board.legacy)
+    if len(find(gray, other_print)[0]) >= _ENOUGH_CORNERS:
+        kind = "an older" if other_print.legacy else "a newer"
+        return f"the board was printed by {kind} OpenCV: set `legacy` to {other_print.legacy}"
+    ids = _markers(gray, board.marker_dictionary)
+    on_board = (board.squares[0] * board.squares[1]) // 2
+    if len(ids) >= _ENOUGH_MARKERS:
+        if max(ids) >= on_board:
+            return f"marker {max(ids)} is seen, but the board has only {on_board}: another board"
+        return (
+            f"{len(ids)} markers are seen, but too few corners between them: another number of "
+            "squares, or the board is covered or bent"
+        )
+    seen = _markers_of_some_family(gray)
+    if seen and not seen.startswith(board.dictionary[:8]):
+        return f"markers of another dictionary are seen ({seen}), not {board.dictionary}"
+    other = _checkerboard_size(gray)
+    if other and not seen:
+        return f"a plain checkerboard of {other[1]}×{other[0]} squares is seen, without markers"
+    if ids:
+        return f"only {len(ids)} markers are seen: come closer, or uncover and light the board"
+    return "no board is seen: it must be sharp, evenly lit and large enough in the image"
+
+
+def _markers(gray: UInt8, dictionary: cv2.aruco.Dictionary) -> list[int]:
+    _, ids, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(gray)
+    return [] if ids is None else [int(number) for number in ids.ravel()]
+
+
+def _markers_of_some_family(gray: UInt8) -> str:
+    """Return the family of dictionaries of which most markers are seen, or an empty text."""
+    counts = {
+        name: len(_markers(gray, cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))))
+        for name in _FAMILIES
+    }
+    best = max(counts, key=lambda name: counts[name])
+    if counts[best] < _ENOUGH_MARKERS:
+        return ""
+    return best.removesuffix("_1000")
+
+
+def _checkerboard_size(gray: UInt8) -> tuple[int, int] | None:
+    """Return how many squares a checkerboard of any size has, the fewer first, if one is seen."""
+    found, _, meta = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), cv2.CALIB_CB_LARGER)
+    if not found:
+        return None
+    few, many = sorted(meta.shape[:2])
+    return few + 1, many + 1
