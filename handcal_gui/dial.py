@@ -67,7 +67,7 @@ class RotationDial(QWidget):
 
     def _color(self) -> QColor:
         if self._angle_deg is None:
-            return self.palette().windowText().color()
+            return QColor(colors().muted)
         return QColor(colors().red if self.is_over else colors().live)
 
     def _paint_arc(self, painter: QPainter) -> None:

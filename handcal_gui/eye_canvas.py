@@ -80,13 +80,13 @@ class EyeCanvas(QWidget):
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the world and the outlines, or the message."""
         painter = QPainter(self)
-        canvas = QColor(colors().canvas)
-        painter.fillRect(self.rect(), canvas)
+        ground = self.palette().window().color()
+        painter.fillRect(self.rect(), ground)
         if self._view is not None:
             self._paint_world(painter, self._view)
         if self._message:
-            canvas.setAlphaF(0.75)
-            painter.fillRect(self.rect(), canvas)
+            ground.setAlphaF(0.75)
+            painter.fillRect(self.rect(), ground)
             painter.setPen(self.palette().windowText().color())
             within = self.rect().adjusted(SPACING_PX, SPACING_PX, -SPACING_PX, -SPACING_PX)
             flags = Qt.AlignmentFlag.AlignCenter.value | Qt.TextFlag.TextWordWrap.value

@@ -8,11 +8,11 @@ from typing import TypeAlias
 import cv2
 import numpy as np
 from PySide6.QtCore import QPointF, QRect, QRectF, QSizeF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QTransform
+from PySide6.QtGui import QImage, QPainter, QPaintEvent, QTransform
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.types import UInt8, UInt16
-from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.theme import SPACING_PX
 
 Image: TypeAlias = UInt8 | UInt16
 
@@ -84,13 +84,13 @@ class ImageView(QWidget):
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the image, the overlay and the texts."""
         painter = QPainter(self)
-        canvas = QColor(colors().canvas)
-        painter.fillRect(self.rect(), canvas)
+        ground = self.palette().window().color()
+        painter.fillRect(self.rect(), ground)
         if self._image is not None:
             self._paint_image(painter, self._image)
         if self._message:
-            canvas.setAlphaF(0.6)
-            painter.fillRect(self.rect(), canvas)
+            ground.setAlphaF(0.6)
+            painter.fillRect(self.rect(), ground)
         self._write(painter, self._message, Qt.AlignmentFlag.AlignVCenter)
         self._write(painter, self._caption, Qt.AlignmentFlag.AlignBottom)
 
@@ -133,7 +133,7 @@ class ImageView(QWidget):
         within = self.rect().adjusted(2 * margin, 2 * margin, -2 * margin, -2 * margin)
         flags = Qt.TextFlag.TextWordWrap.value | Qt.AlignmentFlag.AlignHCenter.value | where.value
         box: QRect = painter.boundingRect(within, flags, text)
-        background = QColor(colors().canvas)
+        background = self.palette().window().color()
         background.setAlphaF(0.85)
         painter.fillRect(box.adjusted(-margin, -margin, margin, margin), background)
         painter.setPen(self.palette().windowText().color())

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import number_font
+from handcal_gui.theme import number_font, quiet
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +45,16 @@ class NumberTable(QTableWidget):
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setTabKeyNavigation(False)
         self.setWordWrap(False)
+        self.setShowGrid(False)
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.horizontalHeader().setSectionsClickable(False)
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(self.verticalHeader().minimumSectionSize())
         self.verticalHeader().setSectionsClickable(False)
+        self.setStyleSheet("QTableCornerButton::section { background: palette(base); border: 0; }")
+        quiet(self.horizontalHeader())
+        quiet(self.verticalHeader())
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
 

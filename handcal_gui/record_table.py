@@ -16,7 +16,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from handcal_gui.theme import SPACING_PX, colors, number_font
+from handcal_gui.theme import SPACING_PX, colors, number_font, quiet
 
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
 _NO_INDEX = QModelIndex()
@@ -70,9 +70,12 @@ class RecordTable(QTableView):
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setTabKeyNavigation(False)
         self.setWordWrap(False)
+        self.setShowGrid(False)
+        self.setAlternatingRowColors(True)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + SPACING_PX // 2)
         across = self.horizontalHeader()
+        quiet(across)
         across.setHighlightSections(False)
         across.setResizeContentsPrecision(_MEASURED_ROWS)
         across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)

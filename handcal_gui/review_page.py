@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from datetime import datetime
 
-import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.results import Results
 from handcal.session import SessionRecord
-from handcal_gui.fields import button
+from handcal_gui.fields import button, main_button, paragraph
+from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX
 
 
@@ -34,15 +35,13 @@ class ReviewPage(QWidget):
         font.setPointSizeF(1.6 * font.pointSizeF())
         font.setBold(True)
         self._title.setFont(font)
-        self._text = QLabel(wordWrap=True)
-        self._text.setObjectName("reviewText")
-        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._text.setTextFormat(Qt.TextFormat.PlainText)
-        self._export = button("reviewExport", "&Export…")
+        self._facts = QFormLayout()
+        self._facts.setHorizontalSpacing(2 * SPACING_PX)
+        self._facts.setVerticalSpacing(SPACING_PX)
+        self._export = main_button("reviewExport", "&Export…")
         self._resume = button("reviewResume", "&Go on with this session")
         self._resume.setToolTip("Open camera and headset, and add alignments, φ or trials to it")
         close = button("reviewClose", "&Close session")
-        self._export.setDefault(True)
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)
         close.clicked.connect(self.close_requested)
@@ -55,7 +54,7 @@ class ReviewPage(QWidget):
         layout.setContentsMargins(*4 * (2 * SPACING_PX,))
         layout.setSpacing(2 * SPACING_PX)
         layout.addWidget(self._title)
-        layout.addWidget(self._text)
+        layout.addLayout(self._facts)
         layout.addLayout(buttons)
         layout.addStretch()
 
@@ -72,24 +71,30 @@ class ReviewPage(QWidget):
         """
         self._title.setText(record.wearer or "Session without a name")
         self._export.setEnabled(bool(record.alignments))
-        started = datetime.fromisoformat(record.events[0].time).astimezone()
-        lines = [
-            f"{started:%d %B %Y, %H:%M}   ·   rig {record.rig.name}",
-            f"{_count(len(record.alignments), 'alignment')}, {_count(len(record.trials), 'trial')}"
-            f"   ·   {'finished' if record.is_finished else 'not finished'}",
-            str(record.path),
-            "",
-        ]
-        if results is not None:
-            for eye, shift in results.shifts.items():
-                phi_mm = "  ".join(f"{value:+.2f}" for value in np.multiply(1e3, shift.shift_m))
-                verdict = results.verdicts[eye]
-                lines.append(f"{eye.capitalize()} eye   φ = {phi_mm} mm   {verdict.name}")
-                lines.append(f"    {verdict.reason}")
-        lines.append(note)
-        if record.torn_bytes:
-            lines.append("The last line of its journal is unfinished, as after a crash.")
-        self._text.setText("\n".join(lines).rstrip())
+        while self._facts.rowCount():
+            self._facts.removeRow(0)
+        for name, fact in _facts(record, results, note):
+            text = paragraph(f"review{name.replace(' ', '')}", fact)
+            text.setTextFormat(Qt.TextFormat.PlainText)
+            text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            self._facts.addRow(name, text)
+
+
+def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
+    """Give what is to be known of a session, by name."""
+    started = datetime.fromisoformat(record.events[0].time).astimezone()
+    yield "Started", f"{started:%d %B %Y, %H:%M}"
+    yield "Rig", record.rig.name
+    state = "finished" if record.is_finished else "not finished"
+    counts = _count(len(record.alignments), "alignment"), _count(len(record.trials), "trial")
+    yield "Holds", f"{', '.join(counts)}; {state}"
+    yield "Folder", str(record.path)
+    for eye, verdict in results.verdicts.items() if results else ():
+        yield EYE_NAMES[eye], f"{VERDICT_WORDS[verdict.name]}: {verdict.reason}"
+    if note:
+        yield "Note", note
+    if record.torn_bytes:
+        yield "Journal", "The last line is unfinished, as after a crash."
 
 
 def _count(number: int, what: str) -> str:

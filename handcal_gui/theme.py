@@ -17,7 +17,7 @@ from PySide6.QtGui import (
     QPixmap,
 )
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QHeaderView
 
 from handcal.resources import resource_path
 
@@ -156,8 +156,8 @@ def use_theme(theme: Literal["system", "light", "dark"]) -> None:
         main.setColor(group, QPalette.ColorRole.Button, QColor(_MAIN_BUTTON))
         main.setColor(group, QPalette.ColorRole.ButtonText, QColor("#ffffff"))
     for kind in _BOXES:
-        QApplication.setPalette(boxes, kind)
-    QApplication.setPalette(main, "MainButton")
+        QApplication.setPalette(boxes, kind.encode())
+    QApplication.setPalette(main, b"MainButton")
 
 
 def is_dark() -> bool:
@@ -168,6 +168,15 @@ def is_dark() -> bool:
 def colors() -> Colors:
     """Return the colours of the present scheme; ask anew on ``QEvent.Type.PaletteChange``."""
     return _DARK if is_dark() else _LIGHT
+
+
+def quiet(header: QHeaderView) -> None:
+    """Let a table's header look like its cells, in less important text."""
+    header.setStyleSheet(
+        "QHeaderView { background: palette(base); }"
+        "QHeaderView::section { background: transparent; border: 0; padding: 2px 6px;"
+        " color: palette(placeholder-text); }"
+    )
 
 
 def number_font(scale: float = 1.0) -> QFont:

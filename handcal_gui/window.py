@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Literal, Protocol
 
-from PySide6.QtCore import QByteArray, Qt, Signal
+from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence, QRegion
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -38,6 +38,8 @@ from handcal_gui.wizard.wizard import WizardPanel
 
 Page = Literal["start", "live", "review"]
 _LAYOUT_VERSION = 1
+_NARROWEST_PX, _WIDEST_PX = 360, 560
+"""A column of docks, at first."""
 _LEFT, _RIGHT, _BOTTOM = (
     Qt.DockWidgetArea.LeftDockWidgetArea,
     Qt.DockWidgetArea.RightDockWidgetArea,
@@ -133,6 +135,8 @@ class MainWindow(QMainWindow):
         self.setDockNestingEnabled(True)
         self.setCorner(Qt.Corner.BottomLeftCorner, _LEFT)
         self.setCorner(Qt.Corner.BottomRightCorner, _RIGHT)
+        self._titles_timer = QTimer(self, interval=0, singleShot=True)
+        self._titles_timer.timeout.connect(self._leave_titles_to_tabs)
         self._docks = self._make_docks()
         self._layouts: dict[Page, QByteArray] = {}
         self._page: Page = "start"
@@ -166,7 +170,9 @@ class MainWindow(QMainWindow):
                 dock.show()
             dock.toggleViewAction().setEnabled(belongs)
         if page not in self._layouts:
+            self._share_room()
             self._docks["results"].raise_()
+        self._leave_titles_to_tabs()
 
     def reset_layout(self) -> None:
         """Put the docks of the page back to where they were at the first start."""
@@ -226,6 +232,8 @@ class MainWindow(QMainWindow):
             dock = QDockWidget(title, self)
             dock.setObjectName(f"{name}Dock")
             dock.setWidget(getattr(self.panels, name))
+            dock.visibilityChanged.connect(self._titles_timer.start)
+            dock.dockLocationChanged.connect(self._titles_timer.start)
             docks[name] = dock
         return docks
 
@@ -242,11 +250,32 @@ class MainWindow(QMainWindow):
         for name in ("fine_tune", "trials", "session", "link"):
             self.tabifyDockWidget(docks["results"], docks[name])
         self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+
+    def _share_room(self) -> None:
+        """Give the docks of a page that has not been laid out by hand what suits the window."""
+        docks = self._docks
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
-        self.resizeDocks([docks["camera"], docks["rotation"]], [380, 430], across)
-        self.resizeDocks([docks["camera"], docks["cloud"]], [380, 340], down)
-        self.resizeDocks([docks["rotation"], docks["results"]], [270, 450], down)
-        self.resizeDocks([docks["wearer_view"]], [320], down)
+        width, height = self.width(), self.height()
+        left = min(max(width * 28 // 100, _NARROWEST_PX), _WIDEST_PX)
+        right = min(max(width * 32 // 100, _NARROWEST_PX), _WIDEST_PX)
+        wizard = self._pages["live"].sizeHint().height() + 12 * SPACING_PX  # with the banner
+        self.resizeDocks([docks["camera"], docks["rotation"]], [left, right], across)
+        camera = left * 9 // 16 + 15 * SPACING_PX
+        self.resizeDocks([docks["camera"], docks["cloud"]], [camera, height - camera], down)
+        rotation = height * 42 // 100
+        self.resizeDocks([docks["rotation"], docks["results"]], [rotation, height - rotation], down)
+        self.resizeDocks([docks["wearer_view"]], [height - wizard], down)
+
+    def _leave_titles_to_tabs(self) -> None:
+        """Take away the titles of docks that share a place, whose tabs say the same."""
+        for dock in self._docks.values():
+            shared = any(not other.isHidden() for other in self.tabifiedDockWidgets(dock))
+            title = dock.titleBarWidget()
+            if shared and title is None:
+                dock.setTitleBarWidget(QWidget(dock))
+            elif not shared and title is not None:
+                dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
+                title.deleteLater()
 
     def _make_menus(self) -> None:
         self._menus = {

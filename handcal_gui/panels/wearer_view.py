@@ -23,7 +23,7 @@ _LEGEND = {
     "hand": ("Hand", "The hand's outline as the eye sees it"),
     "drawn": ("Drawn", "The hand's outline as the headset draws it: on the hand if φ is right"),
     "cursor": ("Cursor", "The frozen hand as the headset draws it"),
-    "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
+    "offline": ("Before calibration", "The hand's outline as drawn before calibration, with φ = 0"),
 }
 
 _NUMBER_SCALE = 0.85
@@ -45,7 +45,7 @@ class WearerViewPanel(QWidget):
             what: LegendEntry(name, LINES[what][0], tooltip, LINES[what][1])
             for what, (name, tooltip) in _LEGEND.items()
         }
-        whole, before = QCheckBox("Whole display"), QCheckBox("Before")
+        whole, before = QCheckBox("Whole display"), QCheckBox("Before calibration")
         whole.setObjectName("wearer-view-whole")
         whole.setToolTip("Show all of each display instead of the part that holds the hand")
         before.setObjectName("wearer-view-before")
@@ -94,8 +94,8 @@ class _EyeColumn(QWidget):
         self._name = title
         self._title = QLabel(title)
         self.canvas = EyeCanvas(title)
-        self._now = _ErrorRow("Now", _ERROR.format("the headset draws it"))
-        self._before = _ErrorRow("Before", _ERROR.format("drawn before calibration (φ = 0)"))
+        self._now = _ErrorRow("Error now", _ERROR.format("the headset draws it"))
+        self._before = _ErrorRow("Error before", _ERROR.format("drawn before calibration (φ = 0)"))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)

@@ -100,7 +100,7 @@ class WizardPanel(QWidget):
             "Both eyes at once is quicker, but cannot tell an eye distance that differs from the "
             "rig's."
         )
-        plan_label = QLabel("&Align")
+        plan_label = QLabel("E&yes")
         plan_label.setBuddy(self._plan)
         plan = QHBoxLayout()
         plan.addWidget(self._title)
@@ -208,6 +208,7 @@ class _CheckRow(QWidget):
             self._text.clear()
             return
         name, word = ("check", "Yes") if check.holds else ("wait", "Not yet")
-        self._icon.setPixmap(icon(name).pixmap(2 * SPACING_PX))
+        shade = colors().good if check.holds else colors().muted
+        self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
         self._icon.setAccessibleName(word)
         self._text.setText(check.text)

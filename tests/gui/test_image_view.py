@@ -7,7 +7,6 @@ from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from handcal.types import UInt8, UInt16
-from handcal_gui import theme
 from handcal_gui.image_view import ImageView, shrink
 
 RED = QColor(255, 0, 0)
@@ -27,12 +26,12 @@ def test_an_image_keeps_its_shape_in_the_middle(qtbot: QtBot) -> None:
     qtbot.addWidget(view)
     view.show_image(red(320, 180))
     picture = shown(view, 400, 400)
-    canvas = QColor(theme.colors().canvas)
+    ground = view.palette().window().color()
     top, bottom = 200 - 225 // 2, 200 + 225 // 2
     for x in (1, 200, 398):
         assert picture.pixelColor(x, top + 2) == picture.pixelColor(x, bottom - 2) == RED
-        assert picture.pixelColor(x, top - 3) == picture.pixelColor(x, bottom + 3) == canvas
-    assert shown(view, 400, 100).pixelColor(20, 50) == canvas
+        assert picture.pixelColor(x, top - 3) == picture.pixelColor(x, bottom + 3) == ground
+    assert shown(view, 400, 100).pixelColor(20, 50) == ground
 
 
 def test_rgb_is_not_bgr_and_grey_is_grey(qtbot: QtBot) -> None:
@@ -67,7 +66,7 @@ def test_the_overlay_ends_with_the_image(qtbot: QtBot) -> None:
     view.show_image(red(40, 30))
     view.show_overlay(lambda painter: painter.fillRect(-99, -99, 999, 999, Qt.GlobalColor.blue))
     picture = shown(view, 400, 200)
-    assert picture.pixelColor(5, 100) == QColor(theme.colors().canvas)
+    assert picture.pixelColor(5, 100) == view.palette().window().color()
     assert picture.pixelColor(200, 100) == QColor(0, 0, 255)
 
 
