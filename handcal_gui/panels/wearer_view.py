@@ -23,7 +23,7 @@ _LEGEND = {
     "hand": ("Hand", "The hand's outline as the eye sees it"),
     "drawn": ("Drawn", "The hand's outline as the headset draws it: on the hand if φ is right"),
     "cursor": ("Cursor", "The frozen hand as the headset draws it"),
-    "offline": ("Before calibration", "The hand's outline as drawn before calibration, with φ = 0"),
+    "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
 }
 
 _NUMBER_SCALE = 0.85
@@ -51,10 +51,10 @@ class WearerViewPanel(QWidget):
         before.setObjectName("wearer-view-before")
         before.setToolTip(_LEGEND["offline"][1])
         before.toggled.connect(self._entries["offline"].setVisible)
-        self._entries["offline"].hide()
         for column in self._eyes.values():
             whole.toggled.connect(column.canvas.show_whole)
             before.toggled.connect(column.canvas.show_offline)
+        before.setChecked(True)
         self._lay_out(whole, before)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
@@ -94,8 +94,9 @@ class _EyeColumn(QWidget):
         self._name = title
         self._title = QLabel(title)
         self.canvas = EyeCanvas(title)
-        self._now = _ErrorRow("Error now", _ERROR.format("the headset draws it"))
-        self._before = _ErrorRow("Error before", _ERROR.format("drawn before calibration (φ = 0)"))
+        self._now = _ErrorRow("Now", _ERROR.format("the headset draws it"))
+        self._before = _ErrorRow("Before", _ERROR.format("drawn before calibration (φ = 0)"))
+        self._now.emphasise()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
@@ -137,6 +138,13 @@ class _ErrorRow(QWidget):
         layout.addWidget(QLabel(name), 1)
         layout.addWidget(self._px)
         layout.addWidget(self._arcmin)
+
+    def emphasise(self) -> None:
+        """Stand out from the rows beside."""
+        for label in self.findChildren(QLabel):
+            font = label.font()
+            font.setBold(True)
+            label.setFont(font)
 
     def show_overlay(self, overlay: Overlay | None) -> None:
         """Show an overlay's errors, if there is one with an outline."""
