@@ -1,4 +1,5 @@
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -36,3 +37,25 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("no real recordings: set HANDCAL_DATA to the folder that holds them")
     return folder
+
+
+@pytest.fixture(scope="session")
+def headset_of() -> Callable[[int], int]:
+    """Return what finds the process of the virtual headset that a process has started."""
+    if not Path("/proc/self/task").is_dir():
+        pytest.skip("processes are found only in Linux's /proc")
+
+    def find(pid: int) -> int:
+        children = [
+            int(child)
+            for task in Path(f"/proc/{pid}/task").iterdir()
+            for child in (task / "children").read_text().split()
+        ]
+        (headset,) = (
+            child
+            for child in children
+            if b"headset" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+        )
+        return headset
+
+    return find
