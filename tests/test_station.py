@@ -120,7 +120,7 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         assert all(after_m[eye] < 0.8 * before_m[eye] for eye in EYES)
 
         solved_m = applied_m["left"]
-        adjusted_m = solved_m + [0.001, 0.0, 0.0]
+        adjusted_m = solved_m + np.array([0.001, 0.0, 0.0])
         calibration.set_shift({"left": adjusted_m})
         station.save_trial("left", 0.5)
         station.finish()
@@ -151,8 +151,8 @@ def test_a_headset_that_falls_silent_is_told_and_applying_can_be_repeated(
         assert "headset" in gone.link_problem
 
         os.kill(silent, signal.SIGKILL)
+        step_until(station, "the end", lambda s: "has ended" in s.link_problem, PATIENCE_S)
         with pytest.raises(LinkError, match="has ended"):
-            step_until(station, "the end", lambda s: "has ended" in s.link_problem, PATIENCE_S)
             station.require_headset()
         station.restart_headset()
         step_until(station, "another headset", is_connected, PATIENCE_S)
