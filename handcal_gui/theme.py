@@ -155,9 +155,9 @@ def use_theme(theme: Literal["system", "light", "dark"]) -> None:
     for group in (QPalette.ColorGroup.Active, QPalette.ColorGroup.Inactive):
         main.setColor(group, QPalette.ColorRole.Button, QColor(_MAIN_BUTTON))
         main.setColor(group, QPalette.ColorRole.ButtonText, QColor("#ffffff"))
-    for kind in _BOXES:
-        QApplication.setPalette(boxes, kind.encode())
-    QApplication.setPalette(main, b"MainButton")
+    for special, kinds in ((boxes, _BOXES), (main, ("MainButton",))):
+        for kind in kinds:  # as text; PySide's stub is wrong
+            QApplication.setPalette(special, kind)  # type: ignore[arg-type]
 
 
 def is_dark() -> bool:
@@ -209,6 +209,7 @@ def _palette(shades: _Shades) -> QPalette:
         (roles.AlternateBase, shades.stripe),
         (roles.ToolTipBase, shades.button),
         (roles.PlaceholderText, shades.faint),
+        (roles.Accent, shades.accent),
         (roles.Highlight, shades.accent),
         (roles.HighlightedText, "#ffffff"),
         (roles.Link, shades.link),
