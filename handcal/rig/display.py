@@ -1,0 +1,358 @@
+"""One eye's display, from a grid shown on it that the viewpoint camera behind it sees.
+
+The display is a plane S in front of the camera, so a homography takes the camera's pixels to the
+display's. Combined with the camera's lens matrix and its pose in the headset it is the off-axis
+projection K H0 from the viewpoint C0 (Hu et al. 2021, homography-corrected off-axis model).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handcal.geometry import camera_matrix, invert
+from handcal.rig.check import MAX_SIDE_PX
+from handcal.rig.grid import GridView
+from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.viewpoint import ViewpointPose, plane_pose
+from handcal.types import EyeDisplay, Float64, Intrinsics, freeze
+
+DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
+"""What `DisplayCalibration.covariance` is of."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screen:
+    """What the headset itself tells of one eye's display.
+
+    Attributes
+    ----------
+    width_px, height_px : int
+    T_V_H : (4, 4) float64
+        From the headset rig to the rendering camera.
+    """
+
+    width_px: int
+    height_px: int
+    T_V_H: Float64
+
+    def __post_init__(self) -> None:
+        freeze(self, "T_V_H", np.float64, 4, 4)
+        if not (0 < self.width_px <= MAX_SIDE_PX and 0 < self.height_px <= MAX_SIDE_PX):
+            raise ValueError(f"a display has 1 to {MAX_SIDE_PX} pixels along each side")
+
+
+@dataclass(frozen=True, slots=True)
+class DisplaySettings:
+    """How far the display is, and what calibration is accepted.
+
+    Attributes
+    ----------
+    distance_m : float or None
+        z(C0→S) as measured, such as by the focus of the viewpoint camera.
+    pixel_m : float or None
+        Size of a display's pixel on S, to solve z(C0→S) from the grid: see `pixel_size_m`. Either
+        this or `distance_m`.
+    distance_sigma : float
+        How well either is known, relative; standard deviation.
+    good_px, bad_px : float
+        Root mean square reprojection error in the camera up to which the plane fits well, and from
+        which on it does not fit.
+    good_sigma_px : float
+        How well the place of the display's corners must be known, standard deviation, px.
+    largest_turn_rad : float
+        Between the axes of the display and of V.
+    largest_offset_m : float
+        From C0 to V: the eye box.
+    """
+
+    distance_m: float | None = None
+    pixel_m: float | None = None
+    distance_sigma: float = 0.01
+    good_px: float = 0.5
+    bad_px: float = 2.0
+    good_sigma_px: float = 0.3
+    largest_turn_rad: float = 0.05
+    largest_offset_m: float = 0.02
+
+    def __post_init__(self) -> None:
+        if (self.distance_m is None) == (self.pixel_m is None):
+            raise ValueError(
+                "tell either the measured distance of the display or the size of its pixels"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplayHomography:
+    """Where the display's plane is in the viewpoint camera's undistorted image.
+
+    Attributes
+    ----------
+    H_C_S : (3, 3) float64
+        Pixels of the camera from those of the display.
+    residuals_px : tuple of float
+        Root mean square error of each view, px of the camera.
+    rms_px : float
+    sigma_px : float
+        How well the least known corner of the display is known: standard deviation, px of the
+        display.
+    """
+
+    H_C_S: Float64
+    residuals_px: tuple[float, ...]
+    rms_px: float
+    sigma_px: float
+
+    def __post_init__(self) -> None:
+        freeze(self, "H_C_S", np.float64, 3, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplayCalibration:
+    """One eye's display, calibrated.
+
+    Attributes
+    ----------
+    display : EyeDisplay
+    homography : DisplayHomography
+    R_S_C : (3, 3) float64
+        From the viewpoint camera's axes to the display's.
+    turn_rad : float
+        Angle between the display's axes and V's; H0 takes it up.
+    covariance : (4, 4) float64
+        Of `DISPLAY_PARAMETERS`.
+    verdict : CalibrationVerdict
+    """
+
+    display: EyeDisplay
+    homography: DisplayHomography
+    R_S_C: Float64
+    turn_rad: float
+    covariance: Float64
+    verdict: CalibrationVerdict
+
+    def __post_init__(self) -> None:
+        freeze(self, "R_S_C", np.float64, 3, 3)
+        freeze(self, "covariance", np.float64, 4, 4)
+
+
+def pixel_size_m(angle_rad: float, pixels: float, distance_m: float) -> float:
+    """Return the size on S of a pixel of a grid whose angular size is known.
+
+    Parameters
+    ----------
+    angle_rad : float
+        What the grid, or a single pixel, subtends from the display's nominal eye point.
+    pixels : float
+        How many pixels that are.
+    distance_m : float
+        Of S from the nominal eye point, as the manufacturer tells it.
+    """
+    if not (0.0 < angle_rad < np.pi and pixels > 0.0 and distance_m > 0.0):
+        raise ValueError("angle, pixels and distance must be positive, the angle below 180°")
+    return float(2.0 * distance_m * np.tan(angle_rad / 2.0) / pixels)
+
+
+def fit_homography(
+    views: Sequence[GridView], camera: Intrinsics, width_px: int, height_px: int
+) -> DisplayHomography:
+    """Find the plane-induced homography between display and camera, the camera held still.
+
+    Parameters
+    ----------
+    views : sequence of GridView
+    camera : Intrinsics
+        The viewpoint camera; its distortion is taken out first.
+    width_px, height_px : int
+        Size of the display.
+
+    Raises
+    ------
+    ValueError
+        If there is no view, or one of another size than the camera's images.
+    """
+    if not views:
+        raise ValueError("no image shows the grid")
+    for number, view in enumerate(views):
+        if view.size != (camera.width, camera.height):
+            raise ValueError(
+                f"image {number + 1} has {view.size[0]}×{view.size[1]} pixels, the viewpoint "
+                f"camera's calibration {camera.width}×{camera.height}: take all at one resolution"
+            )
+    display_px = np.concatenate([view.display_px for view in views])
+    pixels = np.concatenate([_undistort(view.pixels, camera) for view in views])
+    H = np.asarray(cv2.findHomography(display_px, pixels, 0)[0], dtype=np.float64)
+    off_px = cv2.perspectiveTransform(display_px[None], H)[0] - pixels
+    of_view = np.repeat(np.arange(len(views)), [len(view.pixels) for view in views])
+    residuals_px = tuple(_rms(off_px[of_view == number]) for number in range(len(views)))
+    return DisplayHomography(
+        H_C_S=H,
+        residuals_px=residuals_px,
+        rms_px=_rms(off_px),
+        sigma_px=_corner_sigma_px(H, display_px, off_px, width_px, height_px),
+    )
+
+
+def calibrate_display(
+    homography: DisplayHomography,
+    camera: Intrinsics,
+    viewpoint: ViewpointPose,
+    screen: Screen,
+    settings: DisplaySettings,
+) -> DisplayCalibration:
+    """Calibrate one eye's display at the viewpoint camera's place, C0.
+
+    Parameters
+    ----------
+    homography : DisplayHomography
+    camera : Intrinsics
+        The viewpoint camera.
+    viewpoint : ViewpointPose
+        Where it was while it saw the grid.
+    screen : Screen
+    settings : DisplaySettings
+    """
+    T_V_C = screen.T_V_H @ viewpoint.T_H_C
+    R_S_C, C0_S_px = _pose_before(homography, camera, screen)
+    focal_px = -float(C0_S_px[2])  # C0's distance from S, in the display's pixels
+    K = np.array(
+        [
+            [focal_px, 0.0, (screen.width_px - 1) / 2.0],
+            [0.0, focal_px, (screen.height_px - 1) / 2.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    off_axis = np.linalg.solve(homography.H_C_S, camera_matrix(camera)) @ invert(T_V_C)[:3, :3]
+    z_C0_S_m = settings.distance_m
+    if settings.pixel_m is not None:
+        z_C0_S_m = focal_px * settings.pixel_m
+    assert z_C0_S_m is not None
+    display = EyeDisplay(
+        K=K,
+        H0=np.linalg.solve(K, off_axis / off_axis[2, 2]),
+        t_C0_V_m=-T_V_C[:3, 3],
+        z_C0_S_m=z_C0_S_m,
+        width_px=screen.width_px,
+        height_px=screen.height_px,
+        T_V_H=screen.T_V_H,
+    )
+    turn_rad = float(Rotation.from_matrix(R_S_C @ invert(T_V_C)[:3, :3]).magnitude())
+    covariance = np.zeros((4, 4))
+    R_V_H = screen.T_V_H[:3, :3]
+    covariance[:3, :3] = R_V_H @ viewpoint.covariance[3:, 3:] @ R_V_H.T
+    covariance[3, 3] = (settings.distance_sigma * z_C0_S_m) ** 2
+    return DisplayCalibration(
+        display=display,
+        homography=homography,
+        R_S_C=R_S_C,
+        turn_rad=turn_rad,
+        covariance=0.5 * (covariance + covariance.T),
+        verdict=_judge(display, homography, viewpoint.verdict, turn_rad, settings),
+    )
+
+
+def _undistort(pixels: Float64, camera: Intrinsics) -> Float64:
+    K = camera_matrix(camera)
+    straight = cv2.undistortPoints(
+        pixels[:, None],
+        K,
+        np.array(camera.distortion),
+        P=K,
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
+    )
+    return np.asarray(straight, dtype=np.float64).reshape(-1, 2)
+
+
+def _rms(off_px: Float64) -> float:
+    return float(np.sqrt((off_px**2).sum(axis=1).mean()))
+
+
+def _corner_sigma_px(
+    H: Float64, display_px: Float64, off_px: Float64, width_px: int, height_px: int
+) -> float:
+    """Propagate the corners' noise through the homography to the display's own corners."""
+    degrees = off_px.size - 8
+    if degrees <= 0:
+        return float("inf")
+    # The display's pixels are brought near 1, or the normal equations lose their digits.
+    scale = float(max(width_px, height_px))
+    H = H @ np.diag([scale, scale, 1.0])
+    J = _jacobian(H, display_px / scale)
+    covariance = np.linalg.pinv(J.T @ J) * (off_px**2).sum() / degrees
+    corners_px = np.array([[x, y] for x in (0, width_px - 1) for y in (0, height_px - 1)])
+    J = _jacobian(H, corners_px / scale).reshape(4, 2, 8)
+    variances_px2 = np.einsum("kia,ab,kib->k", J, covariance, J)
+    camera_px_per_px = np.linalg.norm(H[:2, :2]) / scale / np.sqrt(2.0) / H[2, 2]
+    return float(np.sqrt(variances_px2.max()) / camera_px_per_px)
+
+
+def _jacobian(H: Float64, points: Float64) -> Float64:
+    """Return (2N, 8): derivatives of the mapped points by all of H but its last element."""
+    homogeneous = np.column_stack([points, np.ones(len(points))])
+    mapped = homogeneous @ H.T
+    weights = homogeneous / mapped[:, 2:]
+    J = np.zeros((len(points), 2, 8))
+    J[:, 0, 0:3] = J[:, 1, 3:6] = weights
+    J[:, :, 6:8] = -(mapped[:, :2] / mapped[:, 2:])[:, :, None] * weights[:, None, :2]
+    return J.reshape(-1, 8)
+
+
+def _pose_before(
+    homography: DisplayHomography, camera: Intrinsics, screen: Screen
+) -> tuple[Float64, Float64]:
+    """Return R_S_C by PnP, and where the camera is in S: in pixels, from the display's first."""
+    width, height = screen.width_px - 1.0, screen.height_px - 1.0
+    corners_px = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    seen_px = cv2.perspectiveTransform(corners_px[None], homography.H_C_S)[0]
+    undistorted = replace(camera, distortion=())
+    points_px = np.column_stack([corners_px, np.zeros(4)])
+    T_S_C = invert(plane_pose(points_px, seen_px, undistorted))
+    return T_S_C[:3, :3], T_S_C[:3, 3]
+
+
+def _judge(
+    display: EyeDisplay,
+    homography: DisplayHomography,
+    viewpoint: CalibrationVerdict,
+    turn_rad: float,
+    settings: DisplaySettings,
+) -> CalibrationVerdict:
+    worst = int(np.argmax(homography.residuals_px))
+    residuals = (
+        f"residual {homography.rms_px:.2f} px (image {worst + 1} "
+        f"{homography.residuals_px[worst]:.2f} px)"
+    )
+    offset_m = float(np.linalg.norm(display.t_C0_V_m))
+    if homography.rms_px > settings.bad_px:
+        return CalibrationVerdict(
+            "bad",
+            f"the grid does not lie on a plane, {residuals}: the camera moved between the images, "
+            "or its intrinsics are not these",
+        )
+    if turn_rad > settings.largest_turn_rad:
+        return CalibrationVerdict(
+            "bad",
+            f"the display is turned by {np.degrees(turn_rad):.1f}° against the headset's own view: "
+            "left and right exchanged, a mirrored image, or poses of another camera place",
+        )
+    if offset_m > settings.largest_offset_m:
+        return CalibrationVerdict(
+            "bad",
+            f"the camera was {1e3 * offset_m:.0f} mm from the headset's own viewpoint: left and "
+            "right exchanged, or poses of another camera place",
+        )
+    if viewpoint.name != "good":
+        return viewpoint
+    if homography.rms_px > settings.good_px or homography.sigma_px > settings.good_sigma_px:
+        return CalibrationVerdict(
+            "needs more views",
+            f"the display's corners are known to {homography.sigma_px:.2f} px, {residuals}: take "
+            "more images of the grid, or show it on more of the display",
+        )
+    return CalibrationVerdict(
+        "good", f"the display's corners are known to {homography.sigma_px:.2f} px; {residuals}"
+    )

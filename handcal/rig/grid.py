@@ -1,0 +1,118 @@
+"""The grid that a display shows to the viewpoint camera behind it, and where it is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.rig.board import Board, charuco, find_board
+from handcal.rig.check import MAX_SIDE_PX
+from handcal.types import Float64, UInt8, freeze
+
+# A board is told in metres, and a display's grid in pixels: any scale serves, if it is the same.
+_BOARD_M = 1e-4
+_MARKER_SHARE = 0.7
+_SMALLEST_SQUARE_PX, _LARGEST_SQUARE_PX = 20, 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A ChArUco grid in the middle of a display.
+
+    Any part of it tells where it belongs and which side is up, so that the camera need not see
+    the whole display.
+
+    Attributes
+    ----------
+    width_px, height_px : int
+        Size of the display.
+    square_px : int
+        Side of a square; as many squares are shown as there is room for, 40 at most each way.
+        A multiple of 10 gives markers whose edges lie between pixels.
+    dictionary : str
+        Of the markers, as OpenCV calls it.
+    """
+
+    width_px: int
+    height_px: int
+    square_px: int = 80
+    dictionary: str = "DICT_5X5_1000"
+
+    def __post_init__(self) -> None:
+        if not _SMALLEST_SQUARE_PX <= self.square_px <= _LARGEST_SQUARE_PX:
+            raise ValueError(
+                f"a square must be {_SMALLEST_SQUARE_PX} to {_LARGEST_SQUARE_PX} pixels wide"
+            )
+        if max(self.width_px, self.height_px) > MAX_SIDE_PX:
+            raise ValueError(f"a display has at most {MAX_SIDE_PX} pixels along each side")
+        if min(self.width_px, self.height_px) < 3 * self.square_px:
+            raise ValueError(
+                f"the display, {self.width_px}×{self.height_px} pixels, has no room for 3 squares "
+                f"of {self.square_px} pixels each way: choose smaller ones"
+            )
+
+    @property
+    def squares(self) -> tuple[int, int]:
+        """Columns and rows of squares."""
+        return min(40, self.width_px // self.square_px), min(40, self.height_px // self.square_px)
+
+    @property
+    def corner_px(self) -> tuple[int, int]:
+        """The upper left pixel of the grid."""
+        columns, rows = self.squares
+        across, down = columns * self.square_px, rows * self.square_px
+        return (self.width_px - across) // 2, (self.height_px - down) // 2
+
+    @property
+    def board(self) -> Board:
+        """The same as a board."""
+        side_m = _BOARD_M * self.square_px
+        return Board("charuco", self.squares, side_m, _MARKER_SHARE * side_m, self.dictionary)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridView:
+    """The corners of a display's grid seen in one image.
+
+    Attributes
+    ----------
+    display_px : (N, 2) float64
+        Corners on the display.
+    pixels : (N, 2) float64
+        The same in the camera's image, lens included.
+    size : (int, int)
+        Width and height of the image.
+    """
+
+    display_px: Float64
+    pixels: Float64
+    size: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        freeze(self, "display_px", np.float64, None, 2)
+        freeze(self, "pixels", np.float64, len(self.display_px), 2)
+
+
+def draw_grid(grid: Grid) -> UInt8:
+    """Return the image for the display to show, pixel for pixel, (height_px, width_px) uint8."""
+    image = np.zeros((grid.height_px, grid.width_px), dtype=np.uint8)
+    columns, rows = grid.squares
+    x, y = grid.corner_px
+    size = columns * grid.square_px, rows * grid.square_px
+    image[y : y + size[1], x : x + size[0]] = charuco(grid.board).generateImage(size)
+    return image
+
+
+def find_grid(image: UInt8, grid: Grid) -> GridView:
+    """Find the grid's corners in the viewpoint camera's image, (H, W) or (H, W, 3) uint8.
+
+    Raises
+    ------
+    BoardError
+        If too few are seen; the text says why.
+    """
+    view = find_board(image, grid.board)
+    # A board begins at the outer edge of its first pixel, half a pixel before the centre.
+    display_px = view.points_m[:, :2] / _BOARD_M + np.array(grid.corner_px) - 0.5
+    return GridView(display_px, view.pixels, view.size)
