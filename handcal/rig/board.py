@@ -55,7 +55,7 @@ class Board:
     kind: BoardKind = "charuco"
     squares: tuple[int, int] = (10, 7)
     square_m: float = 0.025
-    marker_m: float = 0.018
+    marker_m: float = 0.016
     dictionary: str = "DICT_5X5_100"
     legacy: bool = False
 
@@ -303,6 +303,6 @@ def _neighbours(ids: Int64, pixels: Float64, columns: int) -> tuple[Float64, Flo
 
 def _sample(gray: UInt8, places: Float64) -> Float64:
     """Return the image's shade at places of shape (..., 2)."""
-    flat = places.reshape(-1, 1, 2).astype(np.float32)
-    shades = cv2.remap(gray, flat, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+    x, y = places.reshape(-1, 1, 2).astype(np.float32).T
+    shades = cv2.remap(gray, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(shades, dtype=np.float64).reshape(places.shape[:-1])

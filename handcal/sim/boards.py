@@ -1,0 +1,142 @@
+"""Images of a calibration board with known truth: lens distortion, blur, noise, uneven light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from handcal.geometry import camera_matrix, image_points, invert, rigid, transform
+from handcal.rig.board import Board, corners_m
+from handcal.rig.board_print import draw_board
+from handcal.types import Float32, Float64, Intrinsics, UInt8
+
+_SQUARE_PX = 64  # of the texture
+_BLACK, _WHITE, _WALL = 30.0, 215.0, 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSettings:
+    """How a simulated camera takes pictures.
+
+    Attributes
+    ----------
+    blur_px : float
+        Standard deviation of the lens's blur.
+    noise : float
+        Standard deviation of the sensor's noise, in shades of 255.
+    samples : int
+        Rays along each side of a pixel.
+    """
+
+    blur_px: float = 0.7
+    noise: float = 3.0
+    samples: int = 3
+
+
+class BoardPainter:
+    """Paints what a camera sees of a board; sees to the lens once."""
+
+    def __init__(
+        self, board: Board, camera: Intrinsics, settings: PictureSettings | None = None
+    ) -> None:
+        self._board, self._camera = board, camera
+        self._settings = settings or PictureSettings()
+        print_ = draw_board(board, _SQUARE_PX).astype(np.float32) / 255
+        texture = _BLACK + (_WHITE - _BLACK) * print_
+        self._texture = texture
+        self._rays = _rays(camera, self._settings.samples)
+
+    def paint(self, T_C_B: Float64, rng: np.random.Generator) -> UInt8:
+        """Return an image (H, W) of the board at a pose in the camera's frame."""
+        T_B_C = invert(T_C_B)
+        directions = self._rays @ T_B_C[:3, :3].T.astype(np.float32)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = -T_B_C[2, 3] / directions[..., 2]
+            places_m = T_B_C[:2, 3] + reach[..., None] * directions[..., :2]
+        places_m[~(reach > 0)] = -1e3
+        # The texture's pixel centres are at whole numbers; its margin is one square.
+        at = (places_m / self._board.square_m + 1) * _SQUARE_PX - 0.5
+        x, y = np.moveaxis(np.clip(at, -1e4, 1e4).astype(np.float32), 2, 0)
+        fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=_WALL)
+        size = self._camera.width, self._camera.height
+        image = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32)
+        return self._expose(image, rng)
+
+    def _expose(self, image: Float32, rng: np.random.Generator) -> UInt8:
+        height, width = image.shape
+        falloff = rng.uniform(-0.15, 0.15, 2)
+        light = 1 + np.add.outer(
+            falloff[0] * np.linspace(-1, 1, height), falloff[1] * np.linspace(-1, 1, width)
+        )
+        if self._settings.blur_px > 0:
+            image = np.asarray(cv2.GaussianBlur(image, (0, 0), self._settings.blur_px), np.float32)
+        noisy = image * light + rng.normal(scale=self._settings.noise, size=image.shape)
+        shades: UInt8 = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+        return shades
+
+
+def board_poses(
+    board: Board,
+    camera: Intrinsics,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    max_tilt_rad: float = 0.7,
+    others: tuple[tuple[Float64, Intrinsics], ...] = (),
+) -> list[Float64]:
+    """Return poses T_C_B of a board held as one does: all over the image, tilted to every side.
+
+    Parameters
+    ----------
+    board : Board
+    camera : Intrinsics
+    count : int
+    rng : Generator
+    max_tilt_rad : float
+    others : tuple of (T_O_C, Intrinsics)
+        Further cameras that must see all of the board, too.
+    """
+    points_m = corners_m(board)
+    middle_m = points_m.mean(axis=0)
+    reach_m = np.linalg.norm(points_m.max(axis=0) - points_m.min(axis=0))
+    poses: list[Float64] = []
+    while len(poses) < count:
+        tilt = max_tilt_rad * np.sqrt(rng.uniform(0.1, 1.0))
+        towards = rng.uniform(-np.pi, np.pi)
+        roll = rigid([0.0, 0.0, rng.normal(scale=0.3)])
+        turn = rigid(tilt * np.array([np.cos(towards), np.sin(towards), 0.0])) @ roll
+        depth_m = camera.fx * reach_m / (camera.width * rng.uniform(0.4, 0.95))
+        aim_px = rng.uniform([0.2, 0.2], [0.8, 0.8]) * [camera.width, camera.height]
+        ray = np.linalg.inv(camera_matrix(camera)) @ [*aim_px, 1.0]
+        T_C_B = rigid(turn[:3, :3], depth_m * ray - turn[:3, :3] @ middle_m)
+        views = ((np.eye(4), camera), *others)
+        if all(_sees(transform(T_O_C @ T_C_B, points_m), seen_by) for T_O_C, seen_by in views):
+            poses.append(T_C_B)
+    return poses
+
+
+def _sees(points_m: Float64, camera: Intrinsics) -> bool:
+    if points_m[:, 2].min() <= 0:
+        return False
+    pixels = image_points(points_m, camera)
+    edge_px = 0.02 * camera.width
+    size = np.array([camera.width, camera.height])
+    return bool((pixels > edge_px).all() and (pixels < size - edge_px).all())
+
+
+def _rays(camera: Intrinsics, samples: int) -> Float32:
+    """Return directions (H * samples, W * samples, 3) of rays through parts of the pixels."""
+    within = (np.arange(samples) + 0.5) / samples - 0.5
+    x = (np.arange(camera.width)[:, None] + within).ravel()
+    y = (np.arange(camera.height)[:, None] + within).ravel()
+    pixels = np.stack(np.meshgrid(x, y), axis=-1)
+    undistorted = cv2.undistortPoints(
+        pixels.reshape(-1, 1, 2),
+        camera_matrix(camera),
+        np.array(camera.distortion or (0.0,) * 5),
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
+    )
+    plane = undistorted.reshape(*pixels.shape)
+    return np.dstack([plane, np.ones(plane.shape[:2])]).astype(np.float32)
