@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
