@@ -1,0 +1,259 @@
+"""A camera's intrinsics from views of a board, and how far to trust them.
+
+The method is Zhang's, "A flexible new technique for camera calibration", 2000, by OpenCV.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+import cv2
+import numpy as np
+
+from handcal.geometry import camera_matrix, rigid
+from handcal.rig.board import BoardView
+from handcal.rig.least_squares import marginal_covariance
+from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.views import Coverage, View, ViewsError, coverage, one_size, used
+from handcal.rig.worst import WorstView, rms, worst_view
+from handcal.types import Float64, Intrinsics, freeze
+
+LensModel: TypeAlias = Literal["none", "radial", "full", "rational"]
+_FIX_HIGHER = cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3
+_FLAGS: dict[LensModel, int] = {
+    "none": cv2.CALIB_ZERO_TANGENT_DIST | _FIX_HIGHER,
+    "radial": cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K3,
+    "full": 0,
+    "rational": cv2.CALIB_RATIONAL_MODEL,
+}
+# Which of OpenCV's coefficients each solves for.
+_SOLVED: dict[LensModel, tuple[int, ...]] = {
+    "none": (),
+    "radial": (0, 1),
+    "full": (0, 1, 2, 3, 4),
+    "rational": (0, 1, 2, 3, 4, 5, 6, 7),
+}
+MIN_VIEWS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSettings:
+    """How intrinsics are solved, and when they are good.
+
+    Attributes
+    ----------
+    lens : {"none", "radial", "full", "rational"}
+        Distortion: none; k1, k2; k1, k2, p1, p2, k3; the same and k4 to k6.
+    good_views : int
+        With fewer, more are asked for.
+    good_coverage : float
+        Share of the image's cells that must have had a corner.
+    good_spread_rad : float
+        How far the boards' normals must spread about their mean, RMS.
+    max_focal_sigma : float
+        Relative standard deviation of the focal lengths.
+    max_rms_px : float
+        Above, something is wrong: board, focus or exposure.
+    """
+
+    lens: LensModel = "full"
+    good_views: int = 10
+    good_coverage: float = 0.6
+    good_spread_rad: float = 0.2
+    max_focal_sigma: float = 0.001
+    max_rms_px: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraCalibration:
+    """A camera's intrinsics, and how far to trust them.
+
+    Attributes
+    ----------
+    intrinsics : Intrinsics
+    covariance : (P, P) float64 or None
+        Of fx, fy, cx, cy and the coefficients solved for, in order; None if not determined.
+    rms_px : float
+        Root mean square distance of seen and expected corners.
+    residuals_px : mapping of name to float
+        The same of each view.
+    T_C_B : mapping of name to (4, 4) float64
+        The board's pose in each view.
+    dropped : tuple of str
+        Views left out by a person.
+    coverage : Coverage
+    worst : WorstView
+    verdict : CalibrationVerdict
+    """
+
+    intrinsics: Intrinsics
+    covariance: Float64 | None
+    rms_px: float
+    residuals_px: Mapping[str, float]
+    T_C_B: Mapping[str, Float64]
+    dropped: tuple[str, ...]
+    coverage: Coverage
+    worst: WorstView
+    verdict: CalibrationVerdict
+
+    def __post_init__(self) -> None:
+        freeze(self, "covariance", np.float64, None, None)
+        object.__setattr__(self, "residuals_px", MappingProxyType(dict(self.residuals_px)))
+        object.__setattr__(self, "T_C_B", MappingProxyType(dict(self.T_C_B)))
+
+    @property
+    def arcmin_per_px(self) -> float:
+        """How much a pixel in the middle of the image covers, arcminutes."""
+        return float(np.degrees(np.arctan(1 / self.intrinsics.fx)) * 60)
+
+    @property
+    def sigma(self) -> Float64:
+        """Standard deviations of fx, fy, cx, cy and the coefficients solved for."""
+        if self.covariance is None:
+            return np.full(4, np.inf)
+        return np.sqrt(np.diag(self.covariance))
+
+
+def calibrate_camera(
+    views: Sequence[View], settings: CameraSettings | None = None
+) -> CameraCalibration:
+    """Solve a camera's intrinsics from views of a board.
+
+    Raises
+    ------
+    ViewsError
+        If fewer than `MIN_VIEWS` show the board, they are of mixed resolutions, or nothing can
+        be solved from them.
+    """
+    settings = settings or CameraSettings()
+    found = used(views, MIN_VIEWS)
+    intrinsics, poses = _solve(found, settings.lens)
+    fits = {name: linearise(seen, poses[name], intrinsics) for name, seen in found.items()}
+    off_px = {name: off for name, (off, _) in fits.items()}
+    solved = [*range(6, 10), *(10 + number for number in _SOLVED[settings.lens])]
+    everything_px = np.vstack(list(off_px.values()))
+    covariance = marginal_covariance(
+        ((by[:, solved], by[:, :6]) for _, by in fits.values()), everything_px.ravel()
+    )
+    tilt_rad = {name: tilt(poses[name], seen) for name, seen in found.items()}
+    worst = worst_view(found, off_px, tilt_rad)
+    seen_area = coverage(found.values())
+    return CameraCalibration(
+        intrinsics=intrinsics,
+        covariance=covariance,
+        rms_px=rms(everything_px),
+        residuals_px={name: rms(off) for name, off in off_px.items()},
+        T_C_B=poses,
+        dropped=tuple(view.name for view in views if view.dropped),
+        coverage=seen_area,
+        worst=worst,
+        verdict=_judge(
+            intrinsics, covariance, rms(everything_px), poses, seen_area.share, worst, settings
+        ),
+    )
+
+
+def linearise(seen: BoardView, T_C_B: Float64, intrinsics: Intrinsics) -> tuple[Float64, Float64]:
+    """Return residuals (N, 2), seen less expected, px, and the derivatives of the expected.
+
+    The derivatives, (2N, 10 + coefficients), are by the rotation vector, the translation, fx, fy,
+    cx, cy and the coefficients.
+    """
+    rotation, _ = cv2.Rodrigues(T_C_B[:3, :3])
+    coefficients = np.array(intrinsics.distortion or (0.0,) * 4)
+    expected, by = cv2.projectPoints(
+        seen.points_m, rotation, T_C_B[:3, 3], camera_matrix(intrinsics), coefficients
+    )
+    off_px: Float64 = seen.pixels - expected.reshape(-1, 2)
+    return off_px, np.asarray(by, dtype=np.float64)
+
+
+def tilt(T_C_B: Float64, seen: BoardView) -> float:
+    """Return the angle between the board's normal and the line of sight, rad."""
+    middle_m = T_C_B[:3, :3] @ seen.points_m.mean(axis=0) + T_C_B[:3, 3]
+    return float(np.arccos(np.clip(T_C_B[:3, 2] @ middle_m / np.linalg.norm(middle_m), -1, 1)))
+
+
+def normal_spread(poses: Mapping[str, Float64]) -> float:
+    """Return how far the boards' normals spread about their mean, RMS, rad."""
+    normals = np.stack([T[:3, 2] for T in poses.values()])
+    mean = normals.mean(axis=0)
+    mean /= np.linalg.norm(mean)
+    angles = np.arccos(np.clip(normals @ mean, -1, 1))
+    return float(np.sqrt(np.mean(angles**2)))
+
+
+def _solve(
+    found: Mapping[str, BoardView], lens: LensModel
+) -> tuple[Intrinsics, dict[str, Float64]]:
+    width, height = one_size(found)
+    try:
+        _, K, coefficients, rotations, translations, *_ = cv2.calibrateCameraExtended(
+            [seen.points_m.astype(np.float32) for seen in found.values()],
+            [seen.pixels.astype(np.float32) for seen in found.values()],
+            (width, height),
+            np.eye(3),
+            np.zeros(8),
+            flags=_FLAGS[lens],
+        )
+    except cv2.error as error:
+        raise ViewsError(
+            "nothing can be solved from these views: take more, of a board tilted to every side"
+        ) from error
+    fx, fy, cx, cy = (float(K[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    count = {"none": 0, "rational": 8}.get(lens, 5)
+    distortion = tuple(float(one) for one in coefficients.ravel()[:count])
+    intrinsics = Intrinsics(width, height, fx, fy, cx, cy, distortion)
+    if not np.isfinite([intrinsics.fx, intrinsics.fy, *intrinsics.distortion]).all():
+        raise ViewsError("these views determine no camera: tilt the board to every side")
+    poses = {
+        name: rigid(cv2.Rodrigues(rotation)[0], translation.ravel())
+        for name, rotation, translation in zip(found, rotations, translations, strict=True)
+    }
+    return intrinsics, poses
+
+
+def _judge(
+    intrinsics: Intrinsics,
+    covariance: Float64 | None,
+    rms_px: float,
+    poses: Mapping[str, Float64],
+    share: float,
+    worst: WorstView,
+    settings: CameraSettings,
+) -> CalibrationVerdict:
+    spread_rad = normal_spread(poses)
+    if rms_px > settings.max_rms_px:
+        return CalibrationVerdict(
+            "bad",
+            f"corners are {rms_px:.2f} px off, more than {settings.max_rms_px:g}: check that the "
+            f"board is flat and focus fixed; drop the worst image, {worst.name}: {worst.why}",
+        )
+    if covariance is None or spread_rad < settings.good_spread_rad / 4:
+        return CalibrationVerdict(
+            "bad",
+            "all views show the board at nearly one angle, which does not tell the focal length: "
+            "tilt it by 20° to 45° to every side",
+        )
+    focal_sigma = float((np.sqrt(np.diag(covariance)[:2]) / [intrinsics.fx, intrinsics.fy]).max())
+    wanting = []
+    if len(poses) < settings.good_views:
+        wanting.append(f"{len(poses)} views, {settings.good_views} are better")
+    if share < settings.good_coverage:
+        wanting.append(
+            f"the board was seen in {100 * share:.0f} % of the image only: bring it to its edges"
+        )
+    if spread_rad < settings.good_spread_rad:
+        wanting.append(f"it was tilted by {np.degrees(spread_rad):.0f}° only: tilt it more")
+    if focal_sigma > settings.max_focal_sigma:
+        wanting.append(f"the focal length is known to ± {100 * focal_sigma:.2f} % only")
+    if wanting:
+        return CalibrationVerdict("needs more views", "; ".join(wanting))
+    return CalibrationVerdict(
+        "good",
+        f"corners are {rms_px:.2f} px off in {len(poses)} views over {100 * share:.0f} % of the "
+        f"image; focal length ± {100 * focal_sigma:.2f} %",
+    )

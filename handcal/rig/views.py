@@ -1,0 +1,224 @@
+"""A set of views of a board: read, looked through, dropped, paired."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handcal.errors import FileError, HandcalError
+from handcal.image_file import read_image
+from handcal.rig.board import Board, BoardError, BoardView, find_board
+from handcal.types import UInt8
+
+MAX_VIEWS = 500
+_SUFFIXES = frozenset({".png", ".jpg", ".jpeg"})
+_CELLS = (8, 6)
+
+
+class ViewsError(HandcalError):
+    """A set of views cannot be used; the text says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One image, and what was found in it.
+
+    Attributes
+    ----------
+    name : str
+        Unique among the views, as the file's name.
+    found : BoardView or None
+    problem : str
+        Why nothing was found; empty if it was.
+    dropped : bool
+        Left out by a person.
+    """
+
+    name: str
+    found: BoardView | None
+    problem: str = ""
+    dropped: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """How the corners of all views lie over the image.
+
+    Attributes
+    ----------
+    hits : (6, 8) int64
+        In how many views each cell of the image has a corner.
+    share : float
+        Cells with one.
+    """
+
+    hits: NDArray[np.int64]
+    share: float
+
+
+def view(name: str, image: UInt8, board: Board) -> View:
+    """Look for the board in an image (H, W) or (H, W, 3)."""
+    try:
+        return View(name, find_board(image, board))
+    except BoardError as error:
+        return View(name, None, str(error))
+
+
+def image_files(paths: Iterable[Path]) -> list[Path]:
+    """Return the PNG and JPEG files among `paths` and in the folders among them, by name.
+
+    Raises
+    ------
+    FileError
+        If there are none, more than `MAX_VIEWS`, or two of the same name.
+    """
+    files: list[Path] = []
+    for path in paths:
+        try:
+            inside = sorted(path.iterdir()) if path.is_dir() else [path]
+        except OSError as error:
+            raise FileError(f"cannot read {path}: {error.strerror or error}") from error
+        files += [file for file in inside if file.suffix.lower() in _SUFFIXES]
+    if not files:
+        raise FileError("no PNG or JPEG images are there")
+    if len(files) > MAX_VIEWS:
+        raise FileError(f"{len(files)} images are more than the {MAX_VIEWS} allowed")
+    name, count = Counter(file.name for file in files).most_common(1)[0]
+    if count > 1:
+        raise FileError(f"{count} images are called {name}; give each a name of its own")
+    return files
+
+
+def read_views(
+    files: Sequence[Path],
+    board: Board,
+    report: Callable[[str, float], None] = lambda _what, _share: None,
+) -> tuple[View, ...]:
+    """Look for the board in image files; one that cannot be read is a view with a problem.
+
+    Parameters
+    ----------
+    files : sequence of Path
+    board : Board
+    report : callable
+        Told each file's name, and the share done; may raise to give up.
+    """
+    views = []
+    for number, file in enumerate(files):
+        report(file.name, number / len(files))
+        try:
+            image = read_image(file, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+            views.append(view(file.name, image, board))
+        except (FileError, ValueError) as error:
+            views.append(View(file.name, None, str(error)))
+    return tuple(views)
+
+
+def drop(views: Iterable[View], names: Collection[str]) -> tuple[View, ...]:
+    """Return the views, those called one of `names` left out, all others in.
+
+    Raises
+    ------
+    ViewsError
+        If there is no view of a name.
+    """
+    views = tuple(views)
+    unknown = set(names) - {view.name for view in views}
+    if unknown:
+        raise ViewsError(f"there is no image {', '.join(sorted(unknown))} to drop")
+    return tuple(replace(view, dropped=view.name in names) for view in views)
+
+
+def used(views: Iterable[View], at_least: int) -> dict[str, BoardView]:
+    """Return what was found in the views that are not left out, by name.
+
+    Raises
+    ------
+    ViewsError
+        If they are fewer than `at_least`, or not all of one size.
+    """
+    views = tuple(views)
+    found = {view.name: view.found for view in views if view.found and not view.dropped}
+    if len(found) < at_least:
+        problems = Counter(view.problem for view in views if view.problem)
+        mostly = f"; mostly: {problems.most_common(1)[0][0]}" if problems else ""
+        raise ViewsError(
+            f"the board was found in {len(found)} of {len(views)} images used, at least "
+            f"{at_least} are needed{mostly}"
+        )
+    one_size(found)
+    return found
+
+
+def one_size(found: Mapping[str, BoardView]) -> tuple[int, int]:
+    """Return the width and height that all views share.
+
+    Raises
+    ------
+    ViewsError
+        If they do not, naming those that differ.
+    """
+    sizes = Counter(board_view.size for board_view in found.values())
+    (width, height), _ = sizes.most_common(1)[0]
+    others = [
+        f"{name} ({seen.size[0]}x{seen.size[1]})"
+        for name, seen in found.items()
+        if seen.size != (width, height)
+    ]
+    if others:
+        raise ViewsError(
+            f"the images have mixed resolutions: most are {width}x{height}, but not "
+            f"{', '.join(others[:5])}{' …' if len(others) > 5 else ''}; drop those"
+        )
+    return width, height
+
+
+def coverage(found: Iterable[BoardView]) -> Coverage:
+    """Count in how many views each cell of the image has a corner."""
+    columns, rows = _CELLS
+    hits = np.zeros((rows, columns), np.int64)
+    for seen in found:
+        cells = ((seen.pixels + 0.5) / seen.size * _CELLS).astype(int)
+        x, y = np.clip(cells, 0, [columns - 1, rows - 1]).T
+        hit = np.zeros_like(hits)
+        hit[y, x] = 1
+        hits += hit
+    return Coverage(hits, float(np.mean(hits > 0)))
+
+
+def pair_views(first: Sequence[View], second: Sequence[View]) -> tuple[tuple[View, View], ...]:
+    """Pair the views of two cameras by the last number in their names, as left07 and right07.
+
+    Raises
+    ------
+    ViewsError
+        If a number occurs twice in one set, or none in both.
+    """
+    numbered = [_by_number(views) for views in (first, second)]
+    shared = sorted(numbered[0].keys() & numbered[1].keys())
+    if not shared:
+        raise ViewsError(
+            "no two images belong together: the two of a pair must end in the same number, as "
+            "depth07.png and headset07.png"
+        )
+    return tuple((numbered[0][number], numbered[1][number]) for number in shared)
+
+
+def _by_number(views: Iterable[View]) -> dict[int, View]:
+    numbered: dict[int, View] = {}
+    for one in views:
+        numbers = re.findall(r"\d+", Path(one.name).stem)
+        if not numbers:
+            continue
+        number = int(numbers[-1][-18:])
+        if number in numbered:
+            raise ViewsError(f"{numbered[number].name} and {one.name} end in the same number")
+        numbered[number] = one
+    return numbered
