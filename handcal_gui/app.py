@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import os
+import re
 import signal
 import sys
 from contextlib import suppress
@@ -14,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NoReturn
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QSize, QTimer
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
@@ -50,6 +51,8 @@ def main() -> NoReturn:
         signal.signal(number, lambda *_: program.window.close())
     awake = QTimer()  # lets Python see the signal
     awake.start(200)
+    if arguments.size:
+        program.window.resize(arguments.size)
     program.window.show()
     try:
         demonstration = _begin(program, arguments)
@@ -131,7 +134,10 @@ def _parser() -> argparse.ArgumentParser:
         "--screenshots",
         type=Path,
         metavar="DIR",
-        help="save a picture of every step and panel on the way, as the autopilot goes",
+        help="save a picture of every step, panel and dialog on the way, as the autopilot goes",
+    )
+    parser.add_argument(
+        "--size", type=_size, metavar="WxH", help="of the window at first, such as 1280x800"
     )
     parser.add_argument(
         "--preferences", type=Path, metavar="FILE", help="remember things in FILE, not for the user"
@@ -143,6 +149,13 @@ def _seed(text: str) -> int:
     if not text.isdecimal() or int(text) >= 2**32:
         raise argparse.ArgumentTypeError(f"must be a whole number from 0 to {2**32 - 1}")
     return int(text)
+
+
+def _size(text: str) -> QSize:
+    found = re.fullmatch(r"(\d{3,4})x(\d{3,4})", text)
+    if not found:
+        raise argparse.ArgumentTypeError("must be like 1280x800")
+    return QSize(int(found[1]), int(found[2]))
 
 
 def _require_display() -> None:

@@ -26,7 +26,7 @@ class Autopilot(QObject):
     live : Live
     wizard_panel : WizardPanel
     look : callable, optional
-        Called with every view before its button is pressed; may take its time.
+        Called with every view before its button is pressed; may take its time, or pause.
 
     Attributes
     ----------
@@ -50,12 +50,21 @@ class Autopilot(QObject):
         self._look = look
         self._view: View | None = None
         self._since_s = self._moved_s = time.monotonic()
-        self._is_acting = self._is_done = False
+        self._is_paused = self._is_done = False
         live.polled.connect(self._watch)
+
+    def pause(self) -> None:
+        """Press nothing until `go_on`."""
+        self._is_paused = True
+
+    def go_on(self) -> None:
+        """Go on after a pause."""
+        self._is_paused = False
+        self._since_s = self._moved_s = time.monotonic()
 
     def _watch(self, _snapshot: Snapshot) -> None:
         view = self._wizard_panel.shown
-        if view is None or self._is_acting or self._is_done:
+        if view is None or self._is_paused or self._is_done:
             return
         now_s = time.monotonic()
         if self._view is None or (view.step, view.main) != (self._view.step, self._view.main):
@@ -68,10 +77,10 @@ class Autopilot(QObject):
             self._act(view)
 
     def _act(self, view: View) -> None:
-        self._is_acting = True  # looking may take so long that more snapshots come meanwhile
-        self._look(view)
-        self._is_acting = False
         self._since_s = time.monotonic()
+        self._look(view)
+        if self._is_paused:
+            return
         if view.main.action is Action.NEXT_WEARER:
             self._end(self.finished.emit)
         elif view.main.action is not Action.CONFIRM:

@@ -14,10 +14,17 @@ from handcal.station import Station
 from handcal_gui.compare import Comparison
 from handcal_gui.stream import Command, Stream
 from handcal_gui.window import MainWindow
-from handcal_gui.wizard.steps import Action, EyePlan, Wizard
+from handcal_gui.wizard.steps import Action, EyePlan, Step, Wizard
 from handcal_gui.wizard.wizard import WizardPanel
 
 _POLL_MS = 33
+_PANELS_OF_STEPS = {
+    Step.CONNECT: "link",
+    Step.SOLVE: "results",
+    Step.VERIFY: "results",
+    Step.SAVE: "session",
+}
+"""What to look at when a step begins."""
 
 
 class Live(QObject):
@@ -56,7 +63,7 @@ class Live(QObject):
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
         self._is_watching = False
-        self._is_doing = False
+        self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
         self._complained_of = ""
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
@@ -71,7 +78,8 @@ class Live(QObject):
     def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
         """Run a station, after ending the present one."""
         self.stop()
-        self._is_watching = self._is_doing = False
+        self._is_watching = False
+        self._doing = self._shown = 0
         self._wizard_panel.start(Wizard(plan))
         self._stream = Stream(open_station, self)
         self._stream.opened.connect(self._take_station)
@@ -97,7 +105,7 @@ class Live(QObject):
     def do(self, action: Action) -> None:
         """Do what the wizard offers, unless something that it offered is still being done."""
         snapshot = self._snapshot
-        if snapshot is None or self._is_doing:
+        if snapshot is None or self._shown < self._doing:
             return
         eyes = self._wizard_panel.wizard.eyes(snapshot)
         commands: dict[Action, Callable[[Calibration], object]] = {
@@ -108,11 +116,9 @@ class Live(QObject):
             Action.REDO: Calibration.redo,
         }
         if action in commands:
-            self._is_doing = True
-            self._calibrate(action.value, commands[action])
+            self._doing = self._calibrate(action.value, commands[action])
         elif action is Action.FINISH:
-            self._is_doing = True
-            self._ask(action.value, Station.finish)
+            self._doing = self._ask(action.value, Station.finish)
         elif action is Action.EXPORT:
             self.export_requested.emit()
         elif action is Action.NEXT_WEARER:
@@ -124,6 +130,9 @@ class Live(QObject):
     def _connect(self) -> None:
         panels = self._window.panels
         self._wizard_panel.asked.connect(self.do)
+        self._wizard_panel.step_changed.connect(
+            lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
+        )
         self._window.space_pressed.connect(self._wizard_panel.press_main)
         self._connect_fine_tuning()
         self._connect_session()
@@ -172,23 +181,23 @@ class Live(QObject):
             lambda text: self._ask("save the notes", lambda s: s.session.save_notes(text))
         )
 
-    def _ask(self, name: str, command: Command) -> None:
-        if self._stream is not None:
-            self._stream.ask(name, command)
+    def _ask(self, name: str, command: Command) -> int:
+        return self._stream.ask(name, command) if self._stream is not None else 0
 
-    def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> None:
+    def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> int:
         """Ask the procedure; what it cannot write, it keeps, and the station tells of that."""
 
         def obey(station: Station) -> None:
             with suppress(FileError):
                 command(station.calibration)
 
-        self._ask(name, obey)
+        return self._ask(name, obey)
 
     def _poll(self) -> None:
-        snapshot = self._stream.newest() if self._stream is not None else None
+        snapshot, shown = self._stream.newest() if self._stream is not None else (None, 0)
         if snapshot is None or snapshot is self._snapshot:
             return
+        self._shown = shown
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
             self._comparison.use(
                 snapshot.record.alignments, snapshot.record.rig, self._solve_settings
@@ -196,7 +205,8 @@ class Live(QObject):
         self._snapshot = snapshot
         panels = self._window.panels
         for panel in panels.all():
-            if not panel.visibleRegion().isEmpty():
+            # A trial may be recorded, by its key, while its panel is out of sight.
+            if panel is panels.trials or not panel.visibleRegion().isEmpty():
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
@@ -228,17 +238,12 @@ class Live(QObject):
         self.opened.emit(station.session.path)
 
     def _take_answer(self, name: str, _answer: object) -> None:
-        self._poll()  # what is done can be seen before anything else is
-        if name in set(Action):
-            self._is_doing = False
         if name == Action.FINISH and self._snapshot is not None:
             self._wizard_panel.wizard.move(Action.FINISH, self._snapshot)
         if name == self._complained_of:
             self._window.banner.clear()
 
     def _take_failure(self, name: str, why: str) -> None:
-        if name in set(Action):
-            self._is_doing = False
         self._complained_of = name
         self._window.banner.show_message(f"Could not {name}: {why}")
 

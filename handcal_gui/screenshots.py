@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError
 from handcal.files import make_folder
-from handcal_gui.window import MainWindow
-from handcal_gui.wizard.steps import STEPS, Step, View
+from handcal_gui.wizard.steps import STEPS, Action, Step, View
 
 
 class Screenshots:
@@ -17,7 +16,7 @@ class Screenshots:
 
     Parameters
     ----------
-    window : MainWindow
+    window : QWidget
     folder : Path
         Created if needed.
 
@@ -27,30 +26,21 @@ class Screenshots:
         If the folder cannot be created.
     """
 
-    def __init__(self, window: MainWindow, folder: Path) -> None:
+    def __init__(self, window: QWidget, folder: Path) -> None:
         self._window = window
         self._folder = make_folder(folder)
-        self._seen: set[Step] = set()
+        self._seen: dict[Step, set[Action]] = {}
 
     def save_step(self, view: View) -> None:
-        """Save the window the first time that a step is shown."""
-        if view.step not in self._seen:
-            self._seen.add(view.step)
-            name = view.step.value.lower().replace(" ", "-")
-            self.save(f"step-{STEPS.index(view.step) + 1}-{name}")
-
-    def save_panels(self) -> None:
-        """Save every panel that belongs to the page, at the size it has in its dock."""
-        docks = self._window.docks
-        front = [dock for dock in docks.values() if not dock.visibleRegion().isEmpty()]
-        for name, dock in docks.items():
-            if dock.isHidden():
-                continue
-            dock.raise_()
-            QApplication.processEvents()
-            self.save(f"panel-{name.replace('_', '-')}", dock.widget())
-        for dock in front:
-            dock.raise_()
+        """Save the window the first time that a step offers something."""
+        seen = self._seen.setdefault(view.step, set())
+        action = view.main.action
+        if action in seen:
+            return
+        again = f"-{action.value}" if seen else ""
+        seen.add(action)
+        name = f"step-{STEPS.index(view.step) + 1}-{view.step.value}{again}"
+        self.save(name.lower().replace(" ", "-"))
 
     def save(self, name: str, widget: QWidget | None = None) -> None:
         """Save a widget, by default the window; FileError if it cannot be written."""

@@ -11,6 +11,7 @@ from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence, QRegion
 from PySide6.QtWidgets import (
     QAbstractButton,
+    QApplication,
     QDockWidget,
     QFrame,
     QMainWindow,
@@ -63,6 +64,12 @@ _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
     "live": frozenset(_TITLES),
     "review": frozenset({"cloud", "results", "trials", "session"}),
 }
+_PERCENT_OF_PAGE: dict[Page, tuple[int, int]] = {
+    "start": (0, 0),
+    "live": (28, 32),
+    "review": (34, 34),
+}
+"""Of the window's width, for the docks on the left and on the right."""
 
 
 class Panel(Protocol):
@@ -174,6 +181,12 @@ class MainWindow(QMainWindow):
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()
 
+    def bring_up(self, name: str) -> None:
+        """Bring a panel before those that share its place, unless the user is at work in one."""
+        docks, focus = self._docks.values(), QApplication.focusWidget()
+        if name in self._docks and not any(focus and dock.isAncestorOf(focus) for dock in docks):
+            self._docks[name].raise_()
+
     def reset_layout(self) -> None:
         """Put the docks of the page back to where they were at the first start."""
         self._layouts.pop(self._page, None)
@@ -256,8 +269,10 @@ class MainWindow(QMainWindow):
         docks = self._docks
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
         width, height = self.width(), self.height()
-        left = min(max(width * 28 // 100, _NARROWEST_PX), _WIDEST_PX)
-        right = min(max(width * 32 // 100, _NARROWEST_PX), _WIDEST_PX)
+        left, right = (
+            min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX)
+            for percent in _PERCENT_OF_PAGE[self._page]
+        )
         wizard = self._pages["live"].sizeHint().height() + 12 * SPACING_PX  # with the banner
         self.resizeDocks([docks["camera"], docks["rotation"]], [left, right], across)
         camera = left * 9 // 16 + 15 * SPACING_PX

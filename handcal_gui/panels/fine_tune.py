@@ -63,6 +63,8 @@ class FineTunePanel(QWidget):
 
     Attributes
     ----------
+    reset_action : QAction
+        Sets φ as solved.
     shift_changed : Signal(object)
         φ of both eyes, a mapping of eye to (3,) metres, for the headset; at most 30 times a second.
     shift_settled : Signal()
@@ -227,7 +229,7 @@ class FineTunePanel(QWidget):
         self._undo.setEnabled(is_editable and self._history.can_undo)
         self._redo.setEnabled(is_editable and self._history.can_redo)
         self._reset_offline.setEnabled(is_editable)
-        self._reset_solved.setEnabled(is_editable and bool(self._solved))
+        self.reset_action.setEnabled(is_editable and bool(self._solved))
         self._show_offline.setEnabled(is_ready)
         can_end = self._show_solved.isChecked()
         self._show_solved.setEnabled(is_ready and (bool(self._solved) or can_end))
@@ -266,8 +268,8 @@ class FineTunePanel(QWidget):
         self._redo.triggered.connect(lambda: self._go(self._history.redo))
         self._both = add("Both eyes", "L", "Move both eyes by the same amount")
         self._both.setCheckable(True)
-        self._reset_solved = add("Reset to solved", "", "Set φ as solved from the alignments")
-        self._reset_solved.triggered.connect(lambda: self._reset(self._solved))
+        self.reset_action = add("Reset to solved", "", "Set φ as solved from the alignments")
+        self.reset_action.triggered.connect(lambda: self._reset(self._solved))
         self._reset_offline = add("Reset to offline", "", "Set φ to 0, the offline calibration")
         self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
         looks = QActionGroup(self)
@@ -322,7 +324,7 @@ class FineTunePanel(QWidget):
         )
         layout.addLayout(_row(self._editors["left"], self._editors["right"]))
         layout.addLayout(_row(QLabel("Effect at"), self._depth, self._against, None))
-        layout.addLayout(_row(self._show_solved, self._reset_solved, None))
+        layout.addLayout(_row(self._show_solved, self.reset_action, None))
         layout.addLayout(_row(self._show_offline, self._reset_offline, None))
         layout.addWidget(hint)
         layout.addStretch(1)

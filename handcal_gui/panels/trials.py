@@ -47,6 +47,7 @@ class TrialsPanel(QWidget):
 
     Attributes
     ----------
+    record_action : QAction
     trial_requested : Signal(str, float)
         Eye, and the target's distance in metres.
     delete_trial_requested, restore_trial_requested : Signal(int)
@@ -131,7 +132,7 @@ class TrialsPanel(QWidget):
 
     def _refresh(self) -> None:
         why_not = self._why_not()
-        self._record_action.setEnabled(not why_not)
+        self.record_action.setEnabled(not why_not)
         self._message.setText(why_not or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
 
     def _show_deletions(self) -> None:
@@ -156,18 +157,18 @@ class TrialsPanel(QWidget):
             self._depth.addItem(f"{depth_m:g} m", depth_m)
 
     def _make_record_action(self) -> None:
-        self._record_action = QAction("Record trial", self)
-        self._record_action.setToolTip("Record by how much the solved φ misses the one set (T)")
-        self._record_action.setShortcut(Qt.Key.Key_T)
+        self.record_action = QAction("Record trial", self)
+        self.record_action.setToolTip("Record by how much the solved φ misses the one set (T)")
+        self.record_action.setShortcut(Qt.Key.Key_T)
         # Also from the fine-tune panel, where the study leader's hands are.
-        self._record_action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        self._record_action.triggered.connect(self._ask)
-        self.addAction(self._record_action)
+        self.record_action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+        self.record_action.triggered.connect(self._ask)
+        self.addAction(self.record_action)
 
     def _lay_out(self) -> None:
         hint = QLabel(text=_HOW, wordWrap=True)
         record = QToolButton()
-        record.setDefaultAction(self._record_action)
+        record.setDefaultAction(self.record_action)
         choices = QHBoxLayout()
         choices.setSpacing(SPACING_PX)
         for widget in (self._eyes, self._depth, record):

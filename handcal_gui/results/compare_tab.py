@@ -51,6 +51,7 @@ class CompareTab(QWidget):
         self._results: Results | None = None
         self._rig: Rig | None = None
         self.table = NumberTable("Comparison of methods")
+        _keep_room(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")
         self._methods.setAccessibleName("Compare with method")
@@ -64,9 +65,7 @@ class CompareTab(QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, 0)
         self._progress.setTextVisible(False)
-        policy = self._progress.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self._progress.setSizePolicy(policy)
+        _keep_room(self._progress)
         self._progress.setMaximumHeight(SPACING_PX)
         self._status = QLabel()
         self._status.setObjectName("comparison-status")
@@ -85,6 +84,7 @@ class CompareTab(QWidget):
             if method != results.method:
                 self._methods.addItem(method)
         self.table.show_rows((), ())
+        self.table.hide()
 
     def show_comparison(self, other: Results) -> None:
         """Show another method's results of the same alignments."""
@@ -93,6 +93,7 @@ class CompareTab(QWidget):
             return
         columns = self._results.method, other.method, "Difference"
         self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
+        self.table.show()
         self._status.setText(
             f"Difference: {other.method} less {self._results.method}. "
             "Of σ and expected error only those of “consistent” are honest; others are too small."
@@ -139,5 +140,12 @@ class CompareTab(QWidget):
         layout.setSpacing(SPACING_PX)
         layout.addLayout(row)
         layout.addLayout(busy_row)
-        layout.addWidget(self.table, 1)
         layout.addWidget(self._status)
+        layout.addWidget(self.table, 1)
+
+
+def _keep_room(widget: QWidget) -> None:
+    """Keep a widget's room while it is hidden."""
+    policy = widget.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    widget.setSizePolicy(policy)

@@ -32,9 +32,12 @@ class WizardPanel(QWidget):
     asked : Signal(Action)
         A button was pressed.
     plan_changed : Signal(str)
+    step_changed : Signal(Step)
+        Another step is shown.
     """
 
     asked = Signal(object)
+    step_changed = Signal(object)
     plan_changed = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -68,8 +71,10 @@ class WizardPanel(QWidget):
         """Show what the wizard says of a snapshot."""
         view = self.wizard.view(snapshot)
         if view != self.shown:
-            self.shown = view
+            before, self.shown = self.shown, view
             self._refresh(view)
+            if before is None or before.step is not view.step:
+                self.step_changed.emit(view.step)
 
     def press_main(self) -> None:
         """Do what the main button does."""

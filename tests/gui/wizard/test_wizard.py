@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
 from handcal.snapshot import Snapshot
-from handcal_gui.wizard.steps import Action, Wizard
+from handcal_gui.wizard.steps import Action, Step, Wizard
 from handcal_gui.wizard.wizard import WizardPanel
 
 Maker = Callable[..., Snapshot]
@@ -42,6 +42,17 @@ def test_the_main_button_asks_for_what_it_says(
     with qtbot.waitSignal(panel.asked) as asked:
         panel.press_main()
     assert asked.args == [Action.SOLVE]
+
+
+def test_another_step_is_told_once(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
+    with qtbot.waitSignal(panel.step_changed) as told:
+        panel.show_snapshot(snapshot(State.ALIGN))
+    assert told.args == [Step.ALIGN]
+    with qtbot.assertNotEmitted(panel.step_changed):
+        panel.show_snapshot(snapshot(State.ALIGN))
+    with qtbot.waitSignal(panel.step_changed) as told:
+        panel.show_snapshot(snapshot(State.ALIGNED))
+    assert told.args == [Step.SOLVE]
 
 
 def test_a_disabled_main_button_asks_for_nothing(
