@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from handcal.errors import HandcalError
 from handcal.snapshot import Snapshot
 from handcal.station import Station
-from handcal_gui.worker import Said, Worker
+from handcal_gui.worker import Worker
 
 _LOG = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ class Stream(Worker):
     opened : Signal(Station)
         The station runs. Only its constants may be read in other threads.
     obeyed : Signal(str, object)
-        A command is done, and the newest snapshot shows it: its name and what it returned.
+        A command is done: its name and what it returned.
     failed : Signal(str, str)
         A command failed: its name and why, for a person to read.
     ended : Signal(str)
@@ -51,16 +51,25 @@ class Stream(Worker):
         super().__init__("handcal engine", parent)
         self._open_station = open_station
         self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
-        self._newest: Snapshot | None = None
+        self._asked = self._done = 0
+        self._newest: tuple[Snapshot | None, int] = None, 0
         self._closing = threading.Event()
 
-    def newest(self) -> Snapshot | None:
-        """Return the newest snapshot; None before the first."""
+    def newest(self) -> tuple[Snapshot | None, int]:
+        """Return the newest snapshot, None before the first, and how many commands it shows."""
         return self._newest
 
-    def ask(self, name: str, command: Command) -> None:
-        """Have the engine's thread call `command` with the station, before its next frame."""
+    def ask(self, name: str, command: Command) -> int:
+        """Have the engine's thread call `command` with the station, before its next frame.
+
+        Returns
+        -------
+        int
+            How many commands have been asked for, this one included.
+        """
         self._commands.put((name, command))
+        self._asked += 1
+        return self._asked
 
     def close(self) -> None:
         """End the thread and close the station, and hear the last of it; safe to call twice."""
@@ -74,11 +83,9 @@ class Stream(Worker):
             with self._open_station() as station:
                 self._say(self.opened.emit, station)
                 while not self._closing.is_set():
-                    answers = self._obey(station)
-                    self._newest = station.step()
-                    self._answer(answers)
-                # What was asked for just before the end, such as notes.
-                self._answer(self._obey(station))
+                    self._newest = station.step(), self._done
+                    self._obey(station)
+                self._obey(station)  # what was asked for just before the end, such as notes
         except HandcalError as error:
             why = str(error)
         except Exception as error:
@@ -86,23 +93,17 @@ class Stream(Worker):
             why = f"handcal broke down ({_told(error)}); the session is kept"
         self._say(self.ended.emit, why)
 
-    def _obey(self, station: Station) -> list[Said]:
-        """Do what was asked for, and return the answers."""
-        answers: list[Said] = []
+    def _obey(self, station: Station) -> None:
         while not self._commands.empty():
             name, command = self._commands.get()
             try:
-                answers.append((self.obeyed.emit, (name, command(station))))
+                self._say(self.obeyed.emit, name, command(station))
             except (HandcalError, ValueError) as error:
-                answers.append((self.failed.emit, (name, str(error))))
+                self._say(self.failed.emit, name, str(error))
             except Exception as error:
                 _LOG.exception("a command broke down: %s", name)
-                answers.append((self.failed.emit, (name, _told(error))))
-        return answers
-
-    def _answer(self, answers: list[Said]) -> None:
-        for emit, what in answers:
-            self._say(emit, *what)
+                self._say(self.failed.emit, name, _told(error))
+            self._done += 1
 
 
 def _told(error: Exception) -> str:

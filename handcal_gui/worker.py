@@ -7,8 +7,6 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Signal
 
-Said = tuple[Callable[..., None], tuple[object, ...]]
-
 
 class Worker(QObject):
     """Base of objects that run once, in a thread, and say by their signals how it goes.
@@ -55,6 +53,6 @@ class Worker(QObject):
         """Never emit what waits to be."""
         QCoreApplication.removePostedEvents(self, QEvent.Type.MetaCall.value)
 
-    def _hear(self, said: Said) -> None:
+    def _hear(self, said: tuple[Callable[..., None], tuple[object, ...]]) -> None:
         emit, what = said
         emit(*what)

@@ -58,3 +58,14 @@ def test_failure_is_told_in_words(qtbot: QtBot, error: Exception, text: str) -> 
         job.start()
     job.wait()
     assert failed.args == [text]
+
+
+def test_nothing_is_heard_of_a_job_that_was_abandoned(qtbot: QtBot) -> None:
+    job = Job(lambda report, _is_cancelled: report("half", 0.5))
+    heard: list[object] = []
+    job.progressed.connect(lambda *what: heard.append(what))
+    job.succeeded.connect(heard.append)
+    job.start()
+    job.abandon()
+    qtbot.wait(50)
+    assert heard == []

@@ -50,7 +50,30 @@ def test_the_newest_snapshot_waits_and_no_old_one(qtbot: QtBot) -> None:
     station = FakeStation()
     with streaming(qtbot, station) as stream:
         qtbot.waitUntil(lambda: station.steps > 20)
-        assert cast(int, stream.newest()) >= 20
+        assert cast(int, stream.newest()[0]) >= 20
+
+
+def test_it_tells_which_commands_the_newest_snapshot_shows(qtbot: QtBot) -> None:
+    with streaming(qtbot, FakeStation()) as stream:
+        assert stream.newest()[1] == 0
+        numbers = [stream.ask("wait", lambda _station: time.sleep(0.01)) for _ in range(2)]
+        assert numbers == [1, 2]
+        qtbot.waitUntil(lambda: stream.newest()[1] == 2)
+
+
+def test_closing_it_tells_all_that_it_had_to_say_at_once(qtbot: QtBot) -> None:
+    def fail(_station: Station) -> None:
+        raise ZeroDivisionError("oh")
+
+    stream = Stream(lambda: cast(Station, FakeStation()))
+    heard: list[str] = []
+    stream.opened.connect(lambda _station: heard.append("opened"))
+    stream.failed.connect(lambda _name, why: heard.append(why))
+    stream.ended.connect(lambda why: heard.append(f"ended {why}"))
+    stream.ask("fail", fail)
+    stream.start()
+    stream.close()
+    assert heard == ["opened", "ZeroDivisionError: oh", "ended "]
 
 
 def test_commands_run_in_the_engine_s_thread_and_answer_in_the_window_s(qtbot: QtBot) -> None:
