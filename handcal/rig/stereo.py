@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -28,6 +28,8 @@ from handcal.types import Float64, Intrinsics, freeze
 
 MIN_PAIRS = 3
 _MIN_SHARED_CORNERS = 8
+# One pair alone, seen well, gives the cameras' distance to a few millimetres.
+_DISAGREE_M = 0.02
 _SWAPPED = "the cameras are swapped: the depth camera's images are the headset's, and the reverse"
 
 
@@ -141,12 +143,16 @@ def calibrate_stereo(
     off_px, blocks = _fit(both, depth, headset, T_H_D, T_D_B)
     everything_px = np.vstack([off for pair in off_px.values() for off in pair])
     rms_px = rms(everything_px)
+    _check_not_swapped(both, depth, headset, rms_px)
     if rms_px > settings.max_rms_px:
-        _check_not_swapped(both, depth, headset, rms_px)
+        _check_not_mirrored(both, depth, headset, rms_px)
     covariance = marginal_covariance(blocks, everything_px.ravel())
-    apart = _differences(T_H_D, (_alone(pair, depth, headset) for pair in both.values()))
+    alone = np.stack([_alone(pair, depth, headset) for pair in both.values()])
+    apart = _differences(T_H_D, alone)
     worst = _worst(both, off_px, T_H_D, T_D_B)
-    trouble = _odd_pair(tuple(both), apart) or f"drop the worst image, {worst.name}: {worst.why}"
+    trouble = (
+        _disagreement(tuple(both), alone) or f"drop the worst image, {worst.name}: {worst.why}"
+    )
     return StereoCalibration(
         T_H_D=T_H_D,
         covariance=covariance,
@@ -296,30 +302,30 @@ def _pose(seen: BoardView, camera: Intrinsics) -> Float64:
     return rigid(cv2.Rodrigues(rotation)[0], translation.ravel())
 
 
-def _differences(T: Float64, others: Iterable[Float64]) -> Float64:
-    """Return rotation (rad) and distance (m) between `T` and each of the others, (N, 2)."""
-    pairs = [
-        (
-            Rotation.from_matrix(T[:3, :3].T @ other[:3, :3]).magnitude(),
-            np.linalg.norm(T[:3, 3] - other[:3, 3]),
-        )
-        for other in others
-    ]
-    return np.array(pairs, dtype=np.float64)
+def _differences(T: Float64, others: Float64) -> Float64:
+    """Return rotation (rad) and distance (m) between `T` and each of (N, 4, 4) others, (N, 2)."""
+    turns = Rotation.from_matrix(others[:, :3, :3]) * Rotation.from_matrix(T[:3, :3]).inv()
+    shifts_m = np.linalg.norm(others[:, :3, 3] - T[:3, 3], axis=1)
+    return np.stack([turns.magnitude(), shifts_m], axis=1)
 
 
 def _check_not_swapped(
     both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics, rms_px: float
 ) -> None:
-    """Raise ViewsError if the pairs fit far better with the cameras swapped or one mirrored."""
     same_size = (depth.width, depth.height) == (headset.width, headset.height)
     if same_size and _rms_px(both, headset, depth) < rms_px / 2:
         raise ViewsError(_SWAPPED)
-    for which in ("depth", "headset"):
-        if any(_rms_px(*trial) < rms_px / 2 for trial in _unmirrored(both, depth, headset, which)):
-            raise ViewsError(
-                f"the {which} camera's images are mirrored: switch that off in the camera"
-            )
+
+
+def _check_not_mirrored(
+    both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics, rms_px: float
+) -> None:
+    """Raise ViewsError if the pairs fit far better with one camera's images mirrored."""
+    if any(_rms_px(*trial) < rms_px / 2 for trial in _unmirrored(both, depth, headset)):
+        raise ViewsError(
+            "one camera's images are mirrored, the other's not: switch that off in the camera "
+            "(letters in its images, or a ChArUco board, tell which)"
+        )
 
 
 def _rms_px(both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics) -> float:
@@ -328,23 +334,20 @@ def _rms_px(both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics) -
 
 
 def _unmirrored(
-    both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics, which: str
+    both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics
 ) -> Iterator[tuple[dict[str, _Pair], Intrinsics, Intrinsics]]:
-    """Yield the pairs as they would be if one camera's images were not mirrored.
+    """Yield the pairs as they would be if the headset's images were not mirrored.
 
     A mirrored checkerboard was numbered with its rows or its columns reversed; intrinsics solved
     from mirrored images are mirrored, given ones are not.
     """
-    given = {"depth": depth, "headset": headset}
-    camera = given[which]
-    for mirrored_camera in (camera, replace(camera, cx=camera.width - 1 - camera.cx)):
+    for camera in (headset, replace(headset, cx=headset.width - 1 - headset.cx)):
         for axis in (0, 1):
             pairs = {
-                name: replace(pair, **{which: _mirror(getattr(pair, which), axis)})
+                name: replace(pair, headset=_mirror(pair.headset, axis))
                 for name, pair in both.items()
             }
-            cameras = {**given, which: mirrored_camera}
-            yield pairs, cameras["depth"], cameras["headset"]
+            yield pairs, depth, camera
 
 
 def _mirror(seen: BoardView, axis: int) -> BoardView:
@@ -376,16 +379,22 @@ def _worst(
     return worst_view(found, off, tilts)
 
 
-def _odd_pair(names: Sequence[str], apart: Float64) -> str:
-    """Say which pair alone puts the cameras elsewhere than the others do, if one does."""
-    far = apart / np.maximum(np.median(apart, axis=0), [1e-4, 1e-4])
-    odd = int(far.max(axis=1).argmax())
-    if far[odd].max() < 5.0:
+def _disagreement(names: Sequence[str], alone: Float64) -> str:
+    """Say which pair alone puts the cameras elsewhere than most do, or that most disagree."""
+    each = np.stack([_differences(T, alone) for T in alone])
+    medians = np.median(each, axis=1)
+    apart = each[medians[:, 1].argmin()]
+    if np.median(apart[:, 1]) > _DISAGREE_M:
+        return (
+            "hardly two pairs agree: are the two images of a pair taken at the same moment, and "
+            "numbered alike?"
+        )
+    odd = int(apart[:, 1].argmax())
+    if apart[odd, 1] < _DISAGREE_M:
         return ""
     return (
-        f"pair {names[odd]} alone puts the cameras {np.degrees(apart[odd, 0]):.1f}° and "
-        f"{1e3 * apart[odd, 1]:.0f} mm elsewhere; the board moved between its two exposures, or "
-        "its images do not belong together: drop it"
+        f"pair {names[odd]} alone puts the cameras {1e3 * apart[odd, 1]:.0f} mm elsewhere: the "
+        "board moved between its two exposures, or they do not belong together; drop it"
     )
 
 
