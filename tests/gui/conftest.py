@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +17,13 @@ from scipy.spatial.transform import Rotation
 
 from handcal.calibrate import CalibrationSettings, Observation, PlacedHand, State
 from handcal.camera.feed import CameraStatus
+from handcal.closable import Closable
 from handcal.config import settings_json
 from handcal.display import view_of_eye
+from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import rigid, transform
 from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.results import Results, SolveSettings, results_json, solve_session
@@ -29,17 +35,21 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.snapshot import Procedure, Snapshot
+from handcal.station_settings import StationSettings
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig
 from handcal.wearer_view import EyeView, see
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+KEY = "a pairing key of the tests"
 SENSOR = SensorSettings()
 T_W_H = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])
 T_D_CURSOR = rigid([-0.2, 0.0, 0.0], [-0.01, 0.01, 0.50])
 T_D_LIVE = T_D_CURSOR @ rigid([0.02, -0.03, 0.06], [0.012, -0.008, 0.01])
 NOW_NS = 1_000_000_000_000
 AGE_NS = 42_000_000
+T_D_TURNED = T_D_LIVE @ rigid([0.0, 0.0, np.radians(15.0)])
+FRAME_S, POSE_S = 0.08, 0.015
 LINK = LinkStatistics(
     connected=True,
     sent=12_345,
@@ -147,15 +157,134 @@ def snapshot(
     return make
 
 
-def _shoot(rig: Rig, world: World, T_D_hand: Float64) -> tuple[Frame, PlacedHand]:
+class Camera(Closable):
+    """Shows a frame of those rendered, over and over, and can be unplugged."""
+
+    name = "Camera of the tests"
+
+    def __init__(self, frames: Mapping[str, Frame]) -> None:
+        self.shows = "nothing"
+        self.is_plugged = True
+        self.depth_intrinsics = frames["cursor"].depth_intrinsics
+        self._frames = frames
+        self._index = 0
+
+    def __call__(self, _serial: str = "") -> Camera:
+        """Open it."""
+        if not self.is_plugged:
+            raise CameraError("no camera is connected; plug one in")
+        return self
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        if not self.is_plugged:
+            raise CameraError("the camera was unplugged; plug it in again")
+        time.sleep(FRAME_S)
+        if self.shows == "silence":
+            raise CameraTimeoutError("the camera gives no frame")
+        self._index += 1
+        now_ns = time.monotonic_ns()
+        shown = self._frames[self.shows]
+        return replace(shown, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns)
+
+    def close(self) -> None:
+        pass
+
+
+class Headset(Closable):
+    """A headset at rest that does what a test tells it."""
+
+    def __init__(self, rig: Rig, address: tuple[str, int], key: str) -> None:
+        self._rig, self._address, self._key = rig, address, key
+        self._ended = threading.Event()
+        self._open()
+
+    @property
+    def shown(self) -> HeadsetState:
+        return self._client.state()
+
+    def confirm(self) -> None:
+        T_E_W = {eye: view_of_eye(self._rig.eyes[eye], T_W_H) for eye in EYES}
+        self._client.confirm(T_E_W, time.monotonic_ns(), self.shown.cursor_id)
+
+    def fall_silent(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._client.close()
+
+    def come_back(self) -> None:
+        self._ended.clear()
+        self._open()
+
+    def close(self) -> None:
+        self.fall_silent()
+
+    def _open(self) -> None:
+        self._client = HeadsetClient(self._address, self._key.encode())
+        self._thread = threading.Thread(target=self._tell_poses)
+        self._thread.start()
+
+    def _tell_poses(self) -> None:
+        while not self._ended.wait(POSE_S):
+            self._client.send_pose(T_W_H, time.monotonic_ns())
+
+
+@dataclass(frozen=True, eq=False)
+class Studio:
+    """A station's camera and headset in a test's hand: everything else of it is real."""
+
+    settings: StationSettings
+    camera: Camera
+    headset: Headset
+
+
+@pytest.fixture(scope="session")
+def frames(rig: Rig) -> dict[str, Frame]:
+    """Return what the camera may see, by name."""
+    world = World(make_hand(1), make_room(1))
+    poses = {"cursor": T_D_CURSOR, "live": T_D_LIVE, "turned": T_D_TURNED}
+    return {name: _render(rig, world, T) for name, T in {**poses, "nothing": None}.items()}
+
+
+@pytest.fixture
+def studio(
+    rig: Rig, frames: Mapping[str, Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Studio]:
+    """Return a station's parts; it is opened with these settings and `KEY` as pairing key."""
+    camera = Camera(frames)
+    monkeypatch.setattr("handcal.station.RealSenseCamera", camera)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = probe.getsockname()
+    settings = StationSettings(
+        source="realsense",
+        headset="network",
+        host=address[0],
+        port=address[1],
+        sessions=str(tmp_path / "sessions"),
+        # A busy computer gives few frames a second, and a confirmation may lie between two.
+        calibration=CalibrationSettings(match_tolerance_s=0.6, apply_timeout_s=1.0),
+    )
+    with Headset(rig, address, KEY) as headset:
+        yield Studio(settings, camera, headset)
+
+
+def _render(rig: Rig, world: World, T_D_hand: Float64 | None) -> Frame:
     T_W_D, camera = T_W_H @ rig.T_H_D, rig.depth_intrinsics
-    depth_m, color = render(world, T_W_D, T_W_D @ T_D_hand, camera)
+    T_W_hand = None if T_D_hand is None else T_W_D @ T_D_hand
+    depth_m, color = render(world, T_W_D, T_W_hand, camera)
     depth = sense_depth(depth_m, camera.fx, np.random.default_rng(0), SENSOR)
     t_ns = NOW_NS - AGE_NS
-    frame = Frame(1, t_ns, t_ns, depth, SENSOR.depth_scale_m, camera, color, camera)
+    return Frame(1, t_ns, t_ns, depth, SENSOR.depth_scale_m, camera, color, camera)
+
+
+def _shoot(rig: Rig, world: World, T_D_hand: Float64) -> tuple[Frame, PlacedHand]:
+    frame = _render(rig, world, T_D_hand)
     cloud = segment_hand(frame, SegmentSettings())
+    T_W_D = T_W_H @ rig.T_H_D
     points_W_m = transform(T_W_D, cloud.points_m)
-    return frame, PlacedHand(cloud, t_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0))
+    return frame, PlacedHand(
+        cloud, frame.t_host_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0)
+    )
 
 
 def _align(seed: int) -> Alignment:

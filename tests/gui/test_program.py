@@ -1,0 +1,403 @@
+"""The whole program, with a real station whose camera and headset are in the test's hand."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.calibrate import State
+from handcal.session import Session, SessionRecord
+from handcal.snapshot import Snapshot
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.theme import use_theme
+from handcal_gui.wizard.steps import Action, Step
+
+KEY = "a pairing key of the tests"
+PATIENCE_MS = 20_000
+
+
+class Technician:
+    """Watches the window and uses the keyboard."""
+
+    def __init__(self, program: Program, qtbot: QtBot) -> None:
+        self.program = program
+        self.qtbot = qtbot
+
+    @property
+    def snapshot(self) -> Snapshot:
+        assert self.program.live.snapshot is not None
+        return self.program.live.snapshot
+
+    @property
+    def banner(self) -> str:
+        return self.program.window.banner.text
+
+    @property
+    def record(self) -> SessionRecord:
+        return Session.open(self.snapshot.session_path)
+
+    def wait(self, condition: Callable[[], bool]) -> None:
+        self.qtbot.waitUntil(condition, timeout=PATIENCE_MS)
+
+    def wait_for_page(self, page: str) -> None:
+        self.wait(lambda: self.program.window.page == page)
+        if page == "live":
+            self.wait(lambda: self.program.live.snapshot is not None)
+
+    def can(self, action: Action) -> bool:
+        shown = self.program.wizard_panel.shown
+        return shown is not None and shown.main.action is action and shown.main.is_enabled
+
+    def press_space_for(self, action: Action) -> None:
+        """Press the space bar once the wizard offers this."""
+        self.wait(lambda: self.can(action))
+        QTest.keyClick(self.program.window, Qt.Key.Key_Space)
+
+    def wait_for_state(self, state: State) -> None:
+        self.wait(lambda: self.snapshot.procedure.state is state)
+
+    def child(self, kind: type[Any], name: str) -> Any:
+        found = self.program.window.findChild(kind, name)
+        assert isinstance(found, QWidget)
+        return found
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> PreferencesFile:
+    path = tmp_path / "config" / "preferences.json"
+    path.parent.mkdir()
+    path.write_text(json.dumps({"station": {"sessions": str(tmp_path / "sessions")}}))
+    path.with_name("pairing.key").write_text(KEY)
+    return PreferencesFile(path)
+
+
+@pytest.fixture
+def open_program(qtbot: QtBot, file: PreferencesFile) -> Iterator[Callable[[], Technician]]:
+    opened: list[Program] = []
+
+    def open_program() -> Technician:
+        program = Program(file)
+        opened.append(program)
+        qtbot.addWidget(program.window)
+        program.window.show()
+        return Technician(program, qtbot)
+
+    yield open_program
+    for program in opened:
+        program.window.close()
+    use_theme("system")
+    assert [t.name for t in threading.enumerate() if t.name.startswith("handcal")] == []
+
+
+@pytest.fixture
+def technician(open_program: Callable[[], Technician]) -> Technician:
+    return open_program()
+
+
+@pytest.fixture
+def live(technician: Technician, studio: Any) -> Technician:
+    """Return a technician before a station that runs, with the headset connected."""
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
+    technician.wait(lambda: technician.snapshot.link.connected)
+    return technician
+
+
+def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:
+    """Get from Connect, or from Verify, to a cursor."""
+    studio.camera.shows = "cursor"
+    technician.press_space_for(first)
+    technician.press_space_for(Action.NEXT)
+    technician.press_space_for(Action.MAKE_CURSOR)
+    technician.wait_for_state(State.ALIGN)
+    technician.wait(lambda: studio.headset.shown.cursor_W_m is not None)
+
+
+def align(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:
+    make_cursor(technician, studio, first)
+    studio.camera.shows = "live"
+    technician.wait(
+        lambda: (
+            technician.snapshot.observation is not None
+            and technician.snapshot.observation.rotation_rad is not None
+        )
+    )
+    studio.headset.confirm()
+    technician.wait_for_state(State.ALIGNED)
+
+
+def solve_and_apply(technician: Technician) -> None:
+    technician.press_space_for(Action.SOLVE)
+    technician.press_space_for(Action.APPLY)
+    technician.wait_for_state(State.APPLIED)
+
+
+def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
+    live: Technician, studio: Any, file: PreferencesFile
+) -> None:
+    align(live, studio)
+    assert studio.headset.shown.eyes == ("left",)
+    solve_and_apply(live)
+    live.wait(lambda: live.can(Action.ANOTHER))
+    align(live, studio, Action.ANOTHER)
+    assert studio.headset.shown.eyes == ("right",)
+    solve_and_apply(live)
+    live.press_space_for(Action.NEXT)
+    live.press_space_for(Action.FINISH)
+    live.wait(lambda: live.can(Action.NEXT_WEARER))
+    record = live.record
+    assert record.is_finished
+    assert record.wearer == "Ada"
+    assert [alignment.eyes for alignment in record.alignments] == [("left",), ("right",)]
+    for eye in ("left", "right"):
+        P = studio.headset.shown.projections[eye].P
+        assert not np.allclose(P, live.snapshot.record.rig.eyes[eye].K @ np.eye(3, 4))
+    assert live.banner == ""
+    live.press_space_for(Action.NEXT_WEARER)
+    assert live.program.window.page == "start"
+    stored, complaint = file.load()
+    assert complaint == ""
+    assert stored.wearers == ("Ada",)
+    assert stored.sessions == (str(record.path),)
+    assert stored.station == studio.settings
+
+
+def test_a_hand_lost_is_said_and_nothing_can_be_made_of_it(live: Technician, studio: Any) -> None:
+    studio.camera.shows = "cursor"
+    live.press_space_for(Action.NEXT)
+    live.press_space_for(Action.NEXT)
+    live.wait(lambda: live.can(Action.MAKE_CURSOR))
+    studio.camera.shows = "nothing"
+    live.wait(lambda: not live.can(Action.MAKE_CURSOR))
+    shown = live.program.wizard_panel.shown
+    assert shown is not None
+    assert shown.step is Step.MAKE_CURSOR
+    assert "hand" in shown.checks[0].text
+    assert not shown.checks[0].holds
+    assert not live.child(QPushButton, "wizardMain").isEnabled()
+    QTest.keyClick(live.program.window, Qt.Key.Key_Space)
+    live.qtbot.wait(200)
+    assert live.snapshot.procedure.state is State.SHOW_HAND
+
+
+def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> None:
+    make_cursor(live, studio)
+    studio.camera.shows = "turned"
+    live.wait(lambda: live.snapshot.observation is not None and live.snapshot.observation.is_red)
+    studio.headset.confirm()
+    live.wait(lambda: live.snapshot.procedure.refused == 1)
+    assert "more than 9°" in live.child(QLabel, "wizardNote").text()
+    assert live.record.alignments == ()
+    studio.camera.shows = "live"
+    live.wait(
+        lambda: live.snapshot.observation is not None and not live.snapshot.observation.is_red
+    )
+    live.qtbot.wait(300)
+    studio.headset.confirm()
+    live.wait_for_state(State.ALIGNED)
+    live.wait(lambda: len(live.record.alignments) == 1)
+    assert live.child(QLabel, "wizardNote").text() == ""
+
+
+def test_a_silent_headset_is_told_and_sending_repeated(live: Technician, studio: Any) -> None:
+    align(live, studio)
+    live.press_space_for(Action.SOLVE)
+    live.wait(lambda: live.can(Action.APPLY))
+    studio.headset.fall_silent()
+    live.press_space_for(Action.APPLY)
+    live.wait_for_state(State.APPLYING)
+    live.wait_for_state(State.SOLVED)
+    live.wait(lambda: "no headset is connected" in live.snapshot.link_problem)
+    assert "acknowledge" in live.banner
+    assert "acknowledge" in live.child(QLabel, "wizardNote").text()
+    studio.headset.come_back()
+    live.wait(lambda: not live.snapshot.link_problem)
+    live.press_space_for(Action.APPLY)
+    live.wait_for_state(State.APPLIED)
+    live.wait(lambda: live.banner == "")
+
+
+def test_a_camera_unplugged_comes_back_to_the_same_session(live: Technician, studio: Any) -> None:
+    make_cursor(live, studio)
+    studio.camera.is_plugged = False
+    live.wait(lambda: "unplugged" in live.banner or "plug one in" in live.banner)
+    studio.camera.is_plugged = True
+    live.wait(lambda: live.banner == "")
+    assert live.snapshot.procedure.state is State.ALIGN
+    studio.camera.shows = "live"
+    live.wait(lambda: live.snapshot.observation is not None)
+    live.qtbot.wait(300)
+    studio.headset.confirm()
+    live.wait_for_state(State.ALIGNED)
+
+
+def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio: Any) -> None:
+    make_cursor(live, studio)
+    path = live.snapshot.session_path
+    away = path.with_name("away")
+    path.rename(away)  # as good as a full disk
+    studio.camera.shows = "live"
+    live.wait(
+        lambda: (
+            live.snapshot.observation is not None
+            and live.snapshot.observation.rotation_rad is not None
+        )
+    )
+    studio.headset.confirm()
+    live.wait_for_state(State.ALIGNED)
+    live.wait(lambda: "cannot write" in live.banner)
+    live.press_space_for(Action.SOLVE)
+    live.wait_for_state(State.SOLVED)
+    assert live.snapshot.record.alignments == ()
+    away.rename(path)
+    live.wait(lambda: live.banner == "")
+    live.wait(lambda: live.snapshot.record.is_solved)
+    assert len(live.record.alignments) == 1
+
+
+def test_alignments_are_deleted_and_restored(live: Technician, studio: Any) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    session = live.program.window.panels.session
+    session.delete_alignment_requested.emit(1)
+    live.wait(lambda: live.snapshot.record.alignments == ())
+    assert live.snapshot.procedure.results is None
+    session.restore_alignment_requested.emit(1)
+    live.wait(lambda: len(live.snapshot.record.alignments) == 1)
+    live.press_space_for(Action.SOLVE)
+    live.wait_for_state(State.SOLVED)
+    session.delete_alignment_requested.emit(7)
+    live.wait(lambda: live.banner.startswith("Could not delete the alignment: "))
+    QTest.keyClick(live.program.window, Qt.Key.Key_Escape)
+    assert live.banner == ""
+
+
+def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
+    live: Technician, studio: Any
+) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    window = live.program.window
+    solved_m = live.snapshot.procedure.applied_shift_m["left"]
+    before = studio.headset.shown.projections["left"].P
+    window.docks["fine_tune"].raise_()
+    panel = window.panels.fine_tune
+    panel.setFocus()
+    live.wait(lambda: panel.isVisible() and "In the headset" in live.child(QLabel, "status").text())
+    for _ in range(3):
+        QTest.keyClick(panel, Qt.Key.Key_Right)
+    step_m = 3.0 * panel.step_m
+    live.wait(
+        lambda: np.allclose(
+            live.snapshot.procedure.applied_shift_m["left"] - solved_m, [step_m, 0, 0]
+        )
+    )
+    live.wait(lambda: not np.array_equal(studio.headset.shown.projections["left"].P, before))
+    live.wait(lambda: live.snapshot.record.fine_tuned is not None)
+    tuned = live.snapshot.record.fine_tuned
+    assert tuned is not None
+    np.testing.assert_allclose(tuned["left"], solved_m + np.array([step_m, 0.0, 0.0]))
+    assert sum(event.name == "fine_tuned" for event in live.record.events) == 1
+
+    QTest.keyClick(window, Qt.Key.Key_T)
+    live.wait(lambda: len(live.snapshot.record.trials) == 1)
+    (trial,) = live.snapshot.record.trials
+    np.testing.assert_allclose(trial.adjusted_shift_m - trial.calibrated_shift_m, [step_m, 0, 0])
+    assert trial.eye == "left"
+    assert trial.error_px.min() > 0.0
+
+
+def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio: Any) -> None:
+    path = live.snapshot.session_path
+    window = live.program.window
+    window.docks["session"].raise_()
+    live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
+    window.panels.session.findChild(QPlainTextEdit).setPlainText("wears glasses")
+    window.docks["fine_tune"].raise_()
+    panel = window.panels.fine_tune
+    live.wait(lambda: panel.isVisible() and panel.isEnabled())
+    live.wait(lambda: "In the headset" in live.child(QLabel, "status").text())
+    panel.setFocus()
+    QTest.keyClick(panel, Qt.Key.Key_Right)
+    window.close()
+    record = Session.open(path)
+    assert record.notes == "wears glasses"
+    assert record.fine_tuned is not None
+    np.testing.assert_allclose(record.fine_tuned["left"], [panel.step_m, 0.0, 0.0])
+
+
+def test_a_session_in_use_elsewhere_cannot_be_resumed(
+    technician: Technician, studio: Any, record: SessionRecord
+) -> None:
+    with Session(record.path):
+        technician.program.resume_session(record.path)
+        technician.wait(lambda: "in use by process" in technician.banner)
+        assert technician.program.window.page == "start"
+        assert technician.program.start.isEnabled()
+
+
+def test_a_session_broken_off_is_offered_and_gone_on_with(
+    open_program: Callable[[], Technician], studio: Any
+) -> None:
+    first = open_program()
+    first.program.start_calibration(studio.settings, "Ada")
+    first.wait_for_page("live")
+    first.wait(lambda: first.snapshot.link.connected)
+    align(first, studio)
+    path = first.snapshot.session_path
+    first.program.window.close()
+
+    second = open_program()
+    listed = second.program.start.findChild(QWidget, "resume")
+    second.wait(listed.isVisible)
+    second.program.start.resume_requested.emit(path)
+    second.wait_for_page("live")
+    assert second.snapshot.session_path == path
+    assert second.snapshot.procedure.state is State.ALIGNED
+    second.wait(lambda: second.snapshot.link.connected)
+    solve_and_apply(second)
+    assert second.record.is_applied
+
+
+@pytest.mark.parametrize(
+    "moment",
+    ["start page", "opening", "connect", "align", "applying", "review", "opening a session"],
+)
+def test_the_window_can_be_closed_at_any_moment(
+    technician: Technician, studio: Any, record: SessionRecord, moment: str
+) -> None:
+    program = technician.program
+    if moment in ("opening", "connect", "align", "applying"):
+        program.start_calibration(studio.settings, "Ada")
+    if moment in ("connect", "align", "applying"):
+        technician.wait_for_page("live")
+        technician.wait(lambda: technician.snapshot.link.connected)
+    if moment == "align":
+        make_cursor(technician, studio)
+    if moment == "applying":
+        align(technician, studio)
+        technician.press_space_for(Action.SOLVE)
+        technician.wait(lambda: technician.can(Action.APPLY))
+        studio.headset.fall_silent()
+        technician.press_space_for(Action.APPLY)
+        technician.wait_for_state(State.APPLYING)
+    if moment in ("review", "opening a session"):
+        program.open_session(record.path)
+    if moment == "review":
+        technician.wait_for_page("review")
+    program.window.close()
+    assert [t.name for t in threading.enumerate() if t.name.startswith("handcal")] == []
+    assert not program.window.isVisible()
+    for path in Path(studio.settings.sessions).glob("session-*"):
+        Session(path).close()  # free, and not damaged
