@@ -18,10 +18,22 @@ def check_rig(rig: Rig) -> None:
     for eye in EYES:
         _check_display(eye, rig.eyes[eye])
     _check_rigid("T_H_D", rig.T_H_D)
-    _check_depth_camera(rig.depth_intrinsics)
+    check_intrinsics("depth_camera", rig.depth_intrinsics)
     for part, origin in rig.origins.items():
         require(part in RIG_PARTS, f"origins may be of {', '.join(RIG_PARTS)}, not of {part}")
         _check_origin(f"origins.{part}", origin)
+
+
+def check_intrinsics(name: str, intrinsics: Intrinsics) -> None:
+    """Raise ValueError, naming the field of `name` and what is expected, if implausible."""
+    _check_size(name, intrinsics.width, intrinsics.height)
+    fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy
+    _check_camera(name, np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
+    require(
+        len(intrinsics.distortion) in (0, 4, 5, 8, 12, 14)
+        and bool(np.isfinite(intrinsics.distortion).all()),
+        f"{name}.distortion must hold 0, 4, 5, 8, 12 or 14 finite numbers (OpenCV's order)",
+    )
 
 
 def require(condition: bool, problem: str) -> None:
@@ -47,17 +59,6 @@ def _check_display(eye: str, display: EyeDisplay) -> None:
     )
     _check_size(eye, display.width_px, display.height_px)
     _check_rigid(f"{eye}.T_V_H", display.T_V_H)
-
-
-def _check_depth_camera(intrinsics: Intrinsics) -> None:
-    _check_size("depth_camera", intrinsics.width, intrinsics.height)
-    fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy
-    _check_camera("depth_camera", np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
-    require(
-        len(intrinsics.distortion) in (0, 4, 5, 8, 12, 14)
-        and bool(np.isfinite(intrinsics.distortion).all()),
-        "depth_camera.distortion must hold 0, 4, 5, 8, 12 or 14 finite numbers (OpenCV's order)",
-    )
 
 
 def _check_origin(name: str, origin: Origin) -> None:
