@@ -38,20 +38,25 @@ from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.wizard.wizard import WizardPanel
 
 _FIRST_SIZE = QSize(1600, 1000)
-_KEYS = """
-<table cellspacing="6">
-<tr><td><b>Space</b></td><td>What the wizard's large button says</td></tr>
-<tr><td><b>Esc</b></td><td>Close the message at the top</td></tr>
-<tr><td><b>F</b></td><td>Freeze the camera's picture</td></tr>
-<tr><td><b>1, 2, 3, R</b></td><td>Hand cloud: front, side, top, reset</td></tr>
-<tr><td><b>Arrows, Page Up, Page Down</b></td><td>φ1, φ2, φ3 of the eye chosen (fine-tune)</td></tr>
-<tr><td><b>Ctrl+Z, Ctrl+Shift+Z</b></td><td>Undo and redo (fine-tune, session)</td></tr>
-<tr><td><b>T</b></td><td>Record a trial</td></tr>
-<tr><td><b>Ctrl+N</b></td><td>Next wearer</td></tr>
-<tr><td><b>Ctrl+O</b></td><td>Open a session</td></tr>
-<tr><td><b>Ctrl+E</b></td><td>Export</td></tr>
-</table>
-"""
+_KEYS = (
+    ("Space", "What the wizard's large button says"),
+    ("Esc", "Close the message at the top"),
+    ("Tab", "Go to the next button or field"),
+    ("F", "Freeze the camera's picture"),
+    ("T", "Record a trial"),
+    ("1, 2, 3, R", "Hand cloud: front, side, top, reset"),
+    ("Arrows, Page Up, Page Down", "Fine-tune: φ1, φ2, φ3 of the chosen eye"),
+    ("1, 2, 3", "Fine-tune: steps of 0.1, 0.5, 1 mm"),
+    ("E, L", "Fine-tune: the other eye, both eyes together"),
+    ("S, B", "Fine-tune: show the solved φ, show φ = 0"),
+    ("Ctrl+Z, Ctrl+Shift+Z", "Fine-tune: undo, redo; session and trials: undo a deletion"),
+    ("Del", "Delete the chosen alignment or trial"),
+    ("Ctrl+C", "Copy the results as text"),
+    ("Ctrl+1 to Ctrl+9", "Go to a panel, in the order of the View menu"),
+    ("Ctrl+N, Ctrl+O", "Next wearer, open a session"),
+    ("Ctrl+E", "Export"),
+    ("Ctrl+,  Ctrl+Q  F1", "Preferences, quit, these keys"),
+)
 
 
 class Program(QObject):
@@ -276,7 +281,11 @@ class Program(QObject):
             self.window.banner.show_message(f"The preferences cannot be saved: {error}")
 
     def _show_keys(self) -> None:
-        QMessageBox.information(self.window, "Keys", _KEYS)
+        rows = (
+            f"<tr><td><b>{keys}</b></td><td style='padding-left: 16px'>{meaning}</td></tr>"
+            for keys, meaning in _KEYS
+        )
+        QMessageBox.information(self.window, "Keys", f"<table>{''.join(rows)}</table>")
 
     def _show_about(self) -> None:
         QMessageBox.about(

@@ -78,7 +78,7 @@ class Tour(QObject):
         yield _LOOK_MS
         self._save("export", dialog)
         dialog.start()
-        yield _TURN_MS
+        yield _LOOK_MS // 2
         self._save("export-runs", dialog)
 
     def afterwards(self, dialog: ExportDialog) -> Walk:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Literal, Protocol
 
 from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
@@ -67,7 +68,7 @@ _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
 _PERCENT_OF_PAGE: dict[Page, tuple[int, int]] = {
     "start": (0, 0),
     "live": (28, 32),
-    "review": (34, 34),
+    "review": (30, 32),
 }
 """Of the window's width, for the docks on the left and on the right."""
 
@@ -139,7 +140,14 @@ class MainWindow(QMainWindow):
         layout.addWidget(self.banner)
         layout.addWidget(self._stack, 1)
         self.setCentralWidget(middle)
-        self.setDockNestingEnabled(True)
+        # Grouped: a dock without title is taken out by its tab.
+        options = QMainWindow.DockOption
+        self.setDockOptions(
+            options.AnimatedDocks
+            | options.AllowNestedDocks
+            | options.AllowTabbedDocks
+            | options.GroupedDragging
+        )
         self.setCorner(Qt.Corner.BottomLeftCorner, _LEFT)
         self.setCorner(Qt.Corner.BottomRightCorner, _RIGHT)
         self._titles_timer = QTimer(self, interval=0, singleShot=True)
@@ -186,6 +194,14 @@ class MainWindow(QMainWindow):
         docks, focus = self._docks.values(), QApplication.focusWidget()
         if name in self._docks and not any(focus and dock.isAncestorOf(focus) for dock in docks):
             self._docks[name].raise_()
+
+    def go_to(self, name: str) -> None:
+        """Show a panel before the others and give it the keyboard, if it belongs to the page."""
+        if name in _DOCKS_OF_PAGE[self._page]:
+            dock = self._docks[name]
+            dock.show()
+            dock.raise_()
+            dock.widget().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def reset_layout(self) -> None:
         """Put the docks of the page back to where they were at the first start."""
@@ -297,6 +313,9 @@ class MainWindow(QMainWindow):
             name: self.menuBar().addMenu(f"&{name}") for name in ("File", "View", "Help")
         }
         view = self._menus["View"]
+        go_to = view.addMenu("&Go to")
+        for number, (name, title) in enumerate(_TITLES.items(), 1):
+            go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
         self._dock_actions_start = view.addSeparator()
         for dock in self._docks.values():
             view.addAction(dock.toggleViewAction())
