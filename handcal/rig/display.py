@@ -7,8 +7,9 @@ projection K H0 from the viewpoint C0 (Hu et al. 2021, homography-corrected off-
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -16,9 +17,12 @@ from scipy.spatial.transform import Rotation
 
 from handcal.geometry import camera_matrix, invert
 from handcal.rig.check import MAX_SIDE_PX
+from handcal.rig.covariance import clustered_covariance
 from handcal.rig.grid import GridView
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose, plane_pose
+from handcal.rig.views import ViewsError
+from handcal.rig.worst import rms
 from handcal.types import EyeDisplay, Float64, Intrinsics, freeze
 
 DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
@@ -94,7 +98,7 @@ class DisplayHomography:
     ----------
     H_C_S : (3, 3) float64
         Pixels of the camera from those of the display.
-    residuals_px : tuple of float
+    residuals_px : mapping of name to float
         Root mean square error of each view, px of the camera.
     rms_px : float
     sigma_px : float
@@ -103,12 +107,13 @@ class DisplayHomography:
     """
 
     H_C_S: Float64
-    residuals_px: tuple[float, ...]
+    residuals_px: Mapping[str, float]
     rms_px: float
     sigma_px: float
 
     def __post_init__(self) -> None:
         freeze(self, "H_C_S", np.float64, 3, 3)
+        object.__setattr__(self, "residuals_px", MappingProxyType(dict(self.residuals_px)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,13 +163,13 @@ def pixel_size_m(angle_rad: float, pixels: float, distance_m: float) -> float:
 
 
 def fit_homography(
-    views: Sequence[GridView], camera: Intrinsics, width_px: int, height_px: int
+    views: Mapping[str, GridView], camera: Intrinsics, width_px: int, height_px: int
 ) -> DisplayHomography:
     """Find the plane-induced homography between display and camera, the camera held still.
 
     Parameters
     ----------
-    views : sequence of GridView
+    views : mapping of name to GridView
     camera : Intrinsics
         The viewpoint camera; its distortion is taken out first.
     width_px, height_px : int
@@ -172,27 +177,26 @@ def fit_homography(
 
     Raises
     ------
-    ValueError
+    ViewsError
         If there is no view, or one of another size than the camera's images.
     """
     if not views:
-        raise ValueError("no image shows the grid")
-    for number, view in enumerate(views):
+        raise ViewsError("no image shows the grid: darken the room, or focus on the display")
+    for name, view in views.items():
         if view.size != (camera.width, camera.height):
-            raise ValueError(
-                f"image {number + 1} has {view.size[0]}×{view.size[1]} pixels, the viewpoint "
-                f"camera's calibration {camera.width}×{camera.height}: take all at one resolution"
+            raise ViewsError(
+                f"{name} has {view.size[0]}×{view.size[1]} pixels, the viewpoint camera's "
+                f"calibration {camera.width}×{camera.height}: take all at one resolution"
             )
-    display_px = np.concatenate([view.display_px for view in views])
-    pixels = np.concatenate([_undistort(view.pixels, camera) for view in views])
+    display_px = np.concatenate([view.display_px for view in views.values()])
+    pixels = np.concatenate([undistort(view.pixels, camera) for view in views.values()])
+    of_view = np.repeat(np.arange(len(views)), [len(view.pixels) for view in views.values()])
     H = np.asarray(cv2.findHomography(display_px, pixels, 0)[0], dtype=np.float64)
-    off_px = cv2.perspectiveTransform(display_px[None], H)[0] - pixels
-    of_view = np.repeat(np.arange(len(views)), [len(view.pixels) for view in views])
-    residuals_px = tuple(_rms(off_px[of_view == number]) for number in range(len(views)))
+    off_px: Float64 = cv2.perspectiveTransform(display_px[None], H)[0] - pixels
     return DisplayHomography(
         H_C_S=H,
-        residuals_px=residuals_px,
-        rms_px=_rms(off_px),
+        residuals_px={name: rms(off_px[of_view == number]) for number, name in enumerate(views)},
+        rms_px=rms(off_px),
         sigma_px=_corner_sigma_px(H, display_px, off_px, width_px, height_px),
     )
 
@@ -255,7 +259,8 @@ def calibrate_display(
     )
 
 
-def _undistort(pixels: Float64, camera: Intrinsics) -> Float64:
+def undistort(pixels: Float64, camera: Intrinsics) -> Float64:
+    """Return where pixels (N, 2) of a camera were without its lens distortion."""
     K = camera_matrix(camera)
     straight = cv2.undistortPoints(
         pixels[:, None],
@@ -267,22 +272,16 @@ def _undistort(pixels: Float64, camera: Intrinsics) -> Float64:
     return np.asarray(straight, dtype=np.float64).reshape(-1, 2)
 
 
-def _rms(off_px: Float64) -> float:
-    return float(np.sqrt((off_px**2).sum(axis=1).mean()))
-
-
 def _corner_sigma_px(
     H: Float64, display_px: Float64, off_px: Float64, width_px: int, height_px: int
 ) -> float:
-    """Propagate the corners' noise through the homography to the display's own corners."""
-    degrees = off_px.size - 8
-    if degrees <= 0:
-        return float("inf")
+    """Propagate the corners' errors, repeated in every image, to the display's own corners."""
+    same = np.unique(display_px, axis=0, return_inverse=True)[1].ravel()
     # The display's pixels are brought near 1, or the normal equations lose their digits.
     scale = float(max(width_px, height_px))
     H = H @ np.diag([scale, scale, 1.0])
     J = _jacobian(H, display_px / scale)
-    covariance = np.linalg.pinv(J.T @ J) * (off_px**2).sum() / degrees
+    covariance = clustered_covariance(J, off_px.ravel(), np.repeat(same, 2))
     corners_px = np.array([[x, y] for x in (0, width_px - 1) for y in (0, height_px - 1)])
     J = _jacobian(H, corners_px / scale).reshape(4, 2, 8)
     variances_px2 = np.einsum("kia,ab,kib->k", J, covariance, J)
@@ -321,16 +320,14 @@ def _judge(
     turn_rad: float,
     settings: DisplaySettings,
 ) -> CalibrationVerdict:
-    worst = int(np.argmax(homography.residuals_px))
-    residuals = (
-        f"residual {homography.rms_px:.2f} px (image {worst + 1} "
-        f"{homography.residuals_px[worst]:.2f} px)"
-    )
+    residuals_px = homography.residuals_px
+    worst = max(residuals_px, key=lambda name: residuals_px[name])
+    residual = f"residual {homography.rms_px:.2f} px ({worst} {residuals_px[worst]:.2f} px)"
     offset_m = float(np.linalg.norm(display.t_C0_V_m))
     if homography.rms_px > settings.bad_px:
         return CalibrationVerdict(
             "bad",
-            f"the grid does not lie on a plane, {residuals}: the camera moved between the images, "
+            f"the grid does not lie on a plane, {residual}: the camera moved between the images, "
             "or its intrinsics are not these",
         )
     if turn_rad > settings.largest_turn_rad:
@@ -350,9 +347,9 @@ def _judge(
     if homography.rms_px > settings.good_px or homography.sigma_px > settings.good_sigma_px:
         return CalibrationVerdict(
             "needs more views",
-            f"the display's corners are known to {homography.sigma_px:.2f} px, {residuals}: take "
+            f"the display's corners are known to {homography.sigma_px:.2f} px, {residual}: take "
             "more images of the grid, or show it on more of the display",
         )
     return CalibrationVerdict(
-        "good", f"the display's corners are known to {homography.sigma_px:.2f} px; {residuals}"
+        "good", f"the display's corners are known to {homography.sigma_px:.2f} px; {residual}"
     )

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from handcal.geometry import camera_matrix, image_points, invert, rigid, transform
 from handcal.rig.board import BoardView
+from handcal.rig.covariance import clustered_covariance
+from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.views import ViewsError
+from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, freeze
 
 MIN_VIEWS = 3
@@ -49,7 +53,7 @@ class ViewpointPose:
         From the viewpoint camera to the headset rig.
     covariance : (6, 6) float64
         Of a small rotation about the camera's axes, rad, and of its position in H, m.
-    residuals_px : tuple of float
+    residuals_px : mapping of name to float
         Root mean square reprojection error of each view.
     rms_px : float
     verdict : CalibrationVerdict
@@ -57,13 +61,14 @@ class ViewpointPose:
 
     T_H_C: Float64
     covariance: Float64
-    residuals_px: tuple[float, ...]
+    residuals_px: Mapping[str, float]
     rms_px: float
     verdict: CalibrationVerdict
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_C", np.float64, 4, 4)
         freeze(self, "covariance", np.float64, 6, 6)
+        object.__setattr__(self, "residuals_px", MappingProxyType(dict(self.residuals_px)))
 
 
 def board_pose(view: BoardView, camera: Intrinsics) -> Float64:
@@ -84,31 +89,32 @@ def plane_pose(points: Float64, pixels: Float64, camera: Intrinsics) -> Float64:
     return rigid(rotation.ravel(), translation.ravel())
 
 
-def locate_viewpoint(views: Sequence[TrackedView], camera: Intrinsics) -> ViewpointPose:
+def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> ViewpointPose:
     """Find the viewpoint camera's place by the least reprojection error over all views.
 
     The covariance takes the views, not their corners, for independent: a wrong tracked pose moves
-    all corners of its view (Liang & Zeger 1986).
+    all corners of its view.
 
     Parameters
     ----------
-    views : sequence of TrackedView
+    views : mapping of name to TrackedView
         At least `MIN_VIEWS`, the camera in the same place behind the display.
     camera : Intrinsics
         The viewpoint camera.
 
     Raises
     ------
-    ValueError
+    ViewsError
         If there are too few views.
     """
     if len(views) < MIN_VIEWS:
-        raise ValueError(
+        raise ViewsError(
             f"{len(views)} views with a tracked board are too few: take {MIN_VIEWS} or more, with "
             "the board at other distances and angles"
         )
-    points_H_m = np.concatenate([transform(one.T_H_B, one.view.points_m) for one in views])
-    pixels = np.concatenate([one.view.pixels for one in views])
+    points_H_m = np.concatenate([transform(one.T_H_B, one.view.points_m) for one in views.values()])
+    pixels = np.concatenate([one.view.pixels for one in views.values()])
+    of_view = np.repeat(np.arange(len(views)), [len(one.view.pixels) for one in views.values()])
     T_H_C0 = _first_guess(points_H_m, pixels, camera)
 
     def off_px(x: Float64) -> Float64:
@@ -116,20 +122,31 @@ def locate_viewpoint(views: Sequence[TrackedView], camera: Intrinsics) -> Viewpo
         off: Float64 = image_points(points_C_m, camera) - pixels
         return off.ravel()
 
-    solved = least_squares(off_px, np.zeros(6), x_scale=np.repeat([1e-3, 1e-3], 3), method="lm")
-    of_view = np.repeat(np.arange(len(views)), [2 * len(one.view.pixels) for one in views])
-    residuals_px = tuple(
-        float(np.sqrt(2.0 * np.mean(solved.fun[of_view == number] ** 2)))
-        for number in range(len(views))
-    )
-    covariance = _clustered_covariance(np.asarray(solved.jac), solved.fun, of_view)
-    rms_px = float(np.sqrt(2.0 * np.mean(solved.fun**2)))
+    solved = least_squares(off_px, np.zeros(6), method="lm")
+    off = solved.fun.reshape(-1, 2)
+    covariance = clustered_covariance(np.asarray(solved.jac), solved.fun, np.repeat(of_view, 2))
+    residuals_px = {name: rms(off[of_view == number]) for number, name in enumerate(views)}
     return ViewpointPose(
         T_H_C=_moved(T_H_C0, solved.x),
         covariance=covariance,
         residuals_px=residuals_px,
-        rms_px=rms_px,
-        verdict=_judge(residuals_px, rms_px, float(np.sqrt(np.trace(covariance[3:, 3:])))),
+        rms_px=rms(off),
+        verdict=_judge(residuals_px, rms(off), float(np.sqrt(np.trace(covariance[3:, 3:])))),
+    )
+
+
+def viewpoint_from_stereo(stereo: StereoCalibration) -> ViewpointPose:
+    """Take the place from a stereo calibration with the viewpoint camera as its depth camera.
+
+    Raises
+    ------
+    ViewsError
+        If the pairs do not determine it.
+    """
+    if stereo.covariance is None:
+        raise ViewsError("these pairs do not tell where the viewpoint camera is: add others")
+    return ViewpointPose(
+        stereo.T_H_D, stereo.covariance, stereo.residuals_px, stereo.rms_px, stereo.verdict
     )
 
 
@@ -151,30 +168,16 @@ def _moved(T_H_C: Float64, x: Float64) -> Float64:
     return T
 
 
-def _clustered_covariance(J: Float64, residuals: Float64, cluster: NDArray[np.integer]) -> Float64:
-    bread = np.linalg.pinv(J.T @ J)
-    count = int(cluster[-1]) + 1
-    scores = [J[cluster == number].T @ residuals[cluster == number] for number in range(count)]
-    filling = np.einsum("ni,nj->ij", scores, scores) * count / (count - 1)
-    covariance: Float64 = bread @ filling @ bread
-    return 0.5 * (covariance + covariance.T)
-
-
-def _judge(residuals_px: Sequence[float], rms_px: float, sigma_m: float) -> CalibrationVerdict:
-    worst = int(np.argmax(residuals_px))
+def _judge(residuals_px: Mapping[str, float], rms_px: float, sigma_m: float) -> CalibrationVerdict:
+    worst = max(residuals_px, key=lambda name: residuals_px[name])
+    residual = f"residual {rms_px:.2f} px ({worst} {residuals_px[worst]:.2f} px)"
     if rms_px > _BAD_PX:
         return CalibrationVerdict(
             "bad",
-            f"boards are seen {rms_px:.1f} px from where they were tracked (view {worst + 1} "
-            f"{residuals_px[worst]:.1f} px): the camera moved, or poses and images do not belong "
-            "together",
+            f"boards are not seen where they were tracked, {residual}: the camera moved, or poses "
+            "and images do not belong together",
         )
+    place = f"the camera's place is known to {1e3 * sigma_m:.2f} mm, {residual}"
     if sigma_m > _GOOD_SIGMA_M or rms_px > _GOOD_PX:
-        return CalibrationVerdict(
-            "needs more views",
-            f"its place is known to {1e3 * sigma_m:.1f} mm, its residual is {rms_px:.2f} px (view "
-            f"{worst + 1} {residuals_px[worst]:.2f} px): add views, or drop the worst",
-        )
-    return CalibrationVerdict(
-        "good", f"its place is known to {1e3 * sigma_m:.2f} mm; residual {rms_px:.2f} px"
-    )
+        return CalibrationVerdict("needs more views", f"{place}: add views, or drop the worst")
+    return CalibrationVerdict("good", place)

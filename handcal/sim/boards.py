@@ -46,7 +46,7 @@ class BoardPainter:
         print_ = draw_board(board, _SQUARE_PX).astype(np.float32) / 255
         texture = _BLACK + (_WHITE - _BLACK) * print_
         self._texture = texture
-        self._rays = _rays(camera, self._settings.samples)
+        self._rays = pixel_rays(camera, self._settings.samples)
 
     def paint(self, T_C_B: Float64, rng: np.random.Generator) -> UInt8:
         """Return an image (H, W) of the board at a pose in the camera's frame."""
@@ -126,7 +126,7 @@ def _sees(points_m: Float64, camera: Intrinsics) -> bool:
     return bool((pixels > edge_px).all() and (pixels < size - edge_px).all())
 
 
-def _rays(camera: Intrinsics, samples: int) -> Float32:
+def pixel_rays(camera: Intrinsics, samples: int) -> Float32:
     """Return directions (H * samples, W * samples, 3) of rays through parts of the pixels."""
     within = (np.arange(samples) + 0.5) / samples - 0.5
     x = (np.arange(camera.width)[:, None] + within).ravel()

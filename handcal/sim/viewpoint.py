@@ -7,16 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.display import eye_projection
-from handcal.geometry import camera_matrix
-from handcal.sim.boards import PictureSettings
+from handcal.sim.boards import PictureSettings, pixel_rays
 from handcal.types import EyeDisplay, Float64, Intrinsics, UInt8
 
 _BLACK, _WHITE = 12.0, 190.0  # a display shows light only; the dark is not quite dark
 
 VIEWPOINT_CAMERA = Intrinsics(
-    1920, 1080, 2690.0, 2690.0, 965.0, 534.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0)
+    1280, 720, 1800.0, 1797.0, 644.0, 355.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0)
 )
-"""An eye-replacement camera of 1.28 arcmin a pixel (Hu et al. 2021, implementation)."""
+"""An eye-replacement camera of 1.9 arcmin a pixel; that of Hu et al. 2021 had 1.28."""
 
 
 def photograph_display(
@@ -44,25 +43,19 @@ def photograph_display(
     shift_m : (3,) array_like
         Where the camera's centre is from C0, E axes.
     settings : PictureSettings, optional
-        Its `samples` are not used: a display's pixels are about as large as the camera's.
 
     Returns
     -------
     (H, W) uint8
     """
     settings = settings or PictureSettings()
-    row, column = np.indices((camera.height, camera.width), dtype=np.float64)
-    pixels = np.stack([column, row], axis=-1).reshape(-1, 1, 2)
-    rays = cv2.undistortPoints(
-        pixels,
-        camera_matrix(camera),
-        np.array(camera.distortion),
-        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
-    )
+    rays = pixel_rays(camera, settings.samples)
     # From where a ray of the camera falls onto the display: the model's own rays, from φ.
     P = eye_projection(display, shift_m)[:, :3] @ R_E_C
-    seen_px = cv2.perspectiveTransform(rays, P).reshape(*row.shape, 2).astype(np.float32)
-    light = cv2.remap(shown, seen_px, None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
+    homogeneous = rays @ P.T.astype(np.float32)
+    x, y = (homogeneous[..., axis] / homogeneous[..., 2] for axis in range(2))
+    fine = cv2.remap(shown, x, y, cv2.INTER_LINEAR)
+    light = cv2.resize(fine, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     image = _BLACK + (_WHITE - _BLACK) / 255.0 * light.astype(np.float64)
     image = cv2.GaussianBlur(image, (0, 0), settings.blur_px)
     noisy = image + rng.normal(0.0, settings.noise, image.shape)

@@ -1,0 +1,119 @@
+"""A rig from its calibrated parts, each with how it came about.
+
+A rig is made by calibrating part after part of one that only says what the headset itself tells:
+displays' sizes and T_V_H. So can one part of a finished rig be calibrated again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from handcal.rig.check import MAX_TEXT
+from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen
+from handcal.rig.stereo import StereoCalibration
+from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.views import ViewsError
+from handcal.types import Eye, Float64, Intrinsics, Origin, Rig, RigPart
+
+STEREO_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m")
+"""What the covariance of T_H_D is of."""
+
+
+def screen_of(rig: Rig, eye: Eye) -> Screen:
+    """Return what the headset itself tells of an eye's display."""
+    display = rig.eyes[eye]
+    return Screen(display.width_px, display.height_px, display.T_V_H)
+
+
+def with_display(rig: Rig, eye: Eye, calibration: DisplayCalibration, made: str) -> Rig:
+    """Return `rig` with one eye's display calibrated.
+
+    Parameters
+    ----------
+    rig : Rig
+    eye : {"left", "right"}
+    calibration : DisplayCalibration
+    made : str
+        When: ISO 8601.
+    """
+    homography = calibration.homography
+    origin = _origin(
+        "grid on the display, viewpoint camera",
+        made,
+        len(homography.residuals_px),
+        homography.rms_px,
+        calibration.verdict,
+        DISPLAY_PARAMETERS,
+        calibration.covariance,
+    )
+    eyes = {**rig.eyes, eye: calibration.display}
+    return _with_origin(replace(rig, eyes=eyes), eye, origin)
+
+
+def with_stereo(
+    rig: Rig,
+    stereo: StereoCalibration,
+    made: str,
+    *,
+    depth_intrinsics: Intrinsics | None = None,
+    T_C_D: Float64 | None = None,
+) -> Rig:
+    """Return `rig` with the depth camera's place calibrated.
+
+    Parameters
+    ----------
+    rig : Rig
+    stereo : StereoCalibration
+    made : str
+        When: ISO 8601.
+    depth_intrinsics, T_C_D : Intrinsics, (4, 4) float64, optional
+        If the stereo calibration is of the depth camera's colour imager and depth is not aligned
+        to it: the depth imager's own, and from the depth to the colour imager, as the device
+        tells them.
+
+    Raises
+    ------
+    ViewsError
+        If the pairs do not determine the place.
+    """
+    if stereo.covariance is None:
+        raise ViewsError("these pairs do not tell where the depth camera is: add others")
+    origin = _origin(
+        "stereo calibration with the headset's camera",
+        made,
+        len(stereo.residuals_px),
+        stereo.rms_px,
+        stereo.verdict,
+        STEREO_PARAMETERS,
+        stereo.covariance,
+    )
+    T_H_D = stereo.T_H_D if T_C_D is None else stereo.T_H_D @ T_C_D
+    intrinsics = stereo.depth if depth_intrinsics is None else depth_intrinsics
+    return _with_origin(replace(rig, T_H_D=T_H_D, depth_intrinsics=intrinsics), "T_H_D", origin)
+
+
+def _origin(
+    method: str,
+    made: str,
+    views: int,
+    rms_px: float,
+    verdict: CalibrationVerdict,
+    parameters: tuple[str, ...],
+    covariance: Float64,
+) -> Origin:
+    return Origin(
+        method=method,
+        made=made,
+        views=views,
+        rms_px=rms_px,
+        verdict=verdict.name,
+        reason=verdict.reason[:MAX_TEXT],
+        parameters=parameters,
+        covariance=0.5 * (covariance + np.transpose(covariance)),
+    )
+
+
+def _with_origin(rig: Rig, part: RigPart, origin: Origin) -> Rig:
+    return replace(rig, origins={**rig.origins, part: origin})

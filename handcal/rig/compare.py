@@ -1,0 +1,110 @@
+"""What differs between two rigs, in a person's units, and what that does to what is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handcal.display import (
+    TARGET_DEPTHS_M,
+    arcmin_from_px,
+    projection_matrix,
+    target_corners_m,
+    view_of_eye,
+)
+from handcal.geometry import image_points, invert, project, transform
+from handcal.types import EYES, Eye, EyeDisplay, Float64, Intrinsics, Rig
+
+
+@dataclass(frozen=True, slots=True)
+class RigDifference:
+    """One difference.
+
+    Attributes
+    ----------
+    name : str
+        What differs.
+    value : float
+        By how much; not negative.
+    unit : str
+        mm, °, px, ′ or %.
+    """
+
+    name: str
+    value: float
+    unit: str
+
+
+def compare_rigs(a: Rig, b: Rig) -> tuple[RigDifference, ...]:
+    """Return by how much rig `b` differs from rig `a`, part by part.
+
+    Each eye ends with the mean distance, seen from C0, between what both rigs draw of the user
+    test's target, as the depth camera tracks it.
+    """
+    differences = _between_poses("T_H_D", a.T_H_D, b.T_H_D)
+    differences.append(
+        RigDifference(
+            "depth camera: largest move of a pixel",
+            _pinhole_move_px(a.depth_intrinsics, b.depth_intrinsics),
+            "px",
+        )
+    )
+    for eye in EYES:
+        ours, theirs = a.eyes[eye], b.eyes[eye]
+        differences += _between_poses(f"{eye}: T_V_H", ours.T_V_H, theirs.T_V_H)
+        differences += [
+            RigDifference(f"{eye}: C0 in V", 1e3 * _distance(ours.t_C0_V_m, theirs.t_C0_V_m), "mm"),
+            RigDifference(
+                f"{eye}: z(C0→S)", 100.0 * abs(theirs.z_C0_S_m / ours.z_C0_S_m - 1.0), "%"
+            ),
+            RigDifference(
+                f"{eye}: largest move of a display pixel", _display_move_px(ours, theirs), "px"
+            ),
+            RigDifference(f"{eye}: target is drawn elsewhere", _drawn_apart(a, b, eye), "′"),
+        ]
+    return tuple(differences)
+
+
+def _between_poses(name: str, a: Float64, b: Float64) -> list[RigDifference]:
+    turn = Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).magnitude()
+    return [
+        RigDifference(f"{name}: turned", float(np.degrees(turn)), "°"),
+        RigDifference(f"{name}: moved", 1e3 * _distance(a[:3, 3], b[:3, 3]), "mm"),
+    ]
+
+
+def _distance(a: Float64, b: Float64) -> float:
+    return float(np.linalg.norm(a - b))
+
+
+def _pinhole_move_px(a: Intrinsics, b: Intrinsics) -> float:
+    """Return the largest distance between where both see the points that `a` has on its image."""
+    x = (np.linspace(0.0, a.width - 1.0, 9) - a.cx) / a.fx
+    y = (np.linspace(0.0, a.height - 1.0, 9) - a.cy) / a.fy
+    points_m = np.dstack([*np.meshgrid(x, y), np.ones((9, 9))]).reshape(-1, 3)
+    off_px = image_points(points_m, a) - image_points(points_m, b)
+    return float(np.linalg.norm(off_px, axis=1).max())
+
+
+def _display_move_px(a: EyeDisplay, b: EyeDisplay) -> float:
+    """Return the largest distance on the display between where both have the same ray from C0."""
+    x, y = np.linspace(0.0, a.width_px - 1.0, 9), np.linspace(0.0, a.height_px - 1.0, 9)
+    pixels = np.dstack([*np.meshgrid(x, y), np.ones((9, 9))]).reshape(-1, 3)
+    rays = np.linalg.solve(a.K @ a.H0, pixels.T).T
+    moved = rays @ (b.K @ b.H0).T
+    return float(np.linalg.norm(moved[:, :2] / moved[:, 2:] - pixels[:, :2], axis=1).max())
+
+
+def _drawn_apart(a: Rig, b: Rig, eye: Eye) -> float:
+    """Return the mean distance between what both draw of a target before the eye of `a`, arcmin."""
+    target_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
+    T_D_E = invert(view_of_eye(a.eyes[eye], np.eye(4)) @ a.T_H_D)
+    target_D_m = transform(T_D_E, target_E_m)
+    drawn_px = [
+        project(projection_matrix(display), transform(display.T_V_H @ rig.T_H_D, target_D_m))
+        for rig, display in ((a, a.eyes[eye]), (b, b.eyes[eye]))
+    ]
+    apart_px = np.linalg.norm(drawn_px[0] - drawn_px[1], axis=1)
+    return float(arcmin_from_px(a.eyes[eye], apart_px.mean()))

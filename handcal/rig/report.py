@@ -1,0 +1,128 @@
+"""Whether a plausible rig is also a sensible one: what a person would ask of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.display import arcmin_from_px, view_of_eye
+from handcal.geometry import image_points, invert, transform
+from handcal.types import EYES, RIG_PARTS, EyeDisplay, Float64, Rig
+
+_EYE_DISTANCE_M = 0.050, 0.075
+_FOCAL_DISTANCE_M = 0.3, 10.0
+_LARGEST_OFFSET_M = 0.02
+_LARGEST_REACH_M = 0.25
+_LEAST_SEEN = 0.95
+_HAND_DEPTHS_M = (0.4, 0.5, 0.6)
+
+
+@dataclass(frozen=True, slots=True)
+class RigFinding:
+    """One thing about a rig.
+
+    Attributes
+    ----------
+    what, found : str
+    is_fine : bool
+    expected : str
+        Empty where anything is.
+    """
+
+    what: str
+    found: str
+    is_fine: bool = True
+    expected: str = ""
+
+
+def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
+    """Return what there is to say about a rig that `check_rig` accepts."""
+    return tuple(_findings(rig))
+
+
+def _findings(rig: Rig) -> Iterator[RigFinding]:
+    left_m, right_m = (invert(view_of_eye(rig.eyes[eye], np.eye(4)))[:3, 3] for eye in EYES)
+    apart_m = float(np.linalg.norm(right_m - left_m))
+    yield _within("Distance of the viewpoints", apart_m, _EYE_DISTANCE_M, 1e3, "mm")
+    facing = view_of_eye(rig.eyes["left"], np.eye(4))[:3, :3] @ (right_m - left_m)
+    yield RigFinding(
+        "Viewpoints",
+        "right is right of left" if facing[0] > 0 else "left and right are exchanged",
+        bool(facing[0] > 0),
+        "right is right of left",
+    )
+    for eye in EYES:
+        yield from _display_findings(eye, rig.eyes[eye])
+        seen = _seen_by_depth_camera(rig, rig.eyes[eye])
+        yield RigFinding(
+            f"{eye}: seen by the depth camera at 0.4 to 0.6 m",
+            f"{100 * seen:.0f} % of the display",
+            seen >= _LEAST_SEEN,
+            f"{100 * _LEAST_SEEN:.0f} % or more",
+        )
+    reach_m = float(np.linalg.norm(rig.T_H_D[:3, 3]))
+    yield _within("Depth camera from the headset rig", reach_m, (0.0, _LARGEST_REACH_M), 1e3, "mm")
+    for part in RIG_PARTS:
+        yield _origin_finding(rig, part)
+
+
+def _display_findings(eye: str, display: EyeDisplay) -> Iterator[RigFinding]:
+    arcmin = float(arcmin_from_px(display, 1.0))
+    yield RigFinding(
+        f"{eye}: display",
+        f"{display.width_px}×{display.height_px} px, {arcmin:.2f}′ a pixel, "
+        f"{_angle_deg(display):.0f}° across",
+    )
+    yield _within(f"{eye}: z(C0→S)", display.z_C0_S_m, _FOCAL_DISTANCE_M, 1.0, "m")
+    offset_m = float(np.linalg.norm(display.t_C0_V_m))
+    yield _within(f"{eye}: C0 from V", offset_m, (0.0, _LARGEST_OFFSET_M), 1e3, "mm")
+
+
+def _within(
+    what: str, value: float, bounds: tuple[float, float], scale: float, unit: str
+) -> RigFinding:
+    low, high = bounds
+    return RigFinding(
+        what,
+        f"{scale * value:.3g} {unit}",
+        low <= value <= high,
+        f"{scale * low:g} to {scale * high:g} {unit}",
+    )
+
+
+def _angle_deg(display: EyeDisplay) -> float:
+    middle = (display.height_px - 1) / 2.0
+    ends_px = np.array([[-0.5, middle, 1.0], [display.width_px - 0.5, middle, 1.0]])
+    a, b = np.linalg.solve(display.K @ display.H0, ends_px.T).T
+    return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
+
+
+def _seen_by_depth_camera(rig: Rig, display: EyeDisplay) -> float:
+    """Return the share of the display's pixels behind which the depth camera sees a hand."""
+    x = np.linspace(0.0, display.width_px - 1.0, 15)
+    y = np.linspace(0.0, display.height_px - 1.0, 9)
+    pixels = np.dstack([*np.meshgrid(x, y), np.ones((9, 15))]).reshape(-1, 3)
+    rays = np.linalg.solve(display.K @ display.H0, pixels.T).T
+    rays /= rays[:, 2:]
+    points_E_m: Float64 = np.concatenate([depth_m * rays for depth_m in _HAND_DEPTHS_M])
+    T_D_E = invert(view_of_eye(display, np.eye(4)) @ rig.T_H_D)
+    points_D_m = transform(T_D_E, points_E_m)
+    camera = rig.depth_intrinsics
+    places_px = image_points(points_D_m, camera)
+    size = camera.width - 0.5, camera.height - 0.5
+    seen = (points_D_m[:, 2] > 0) & ((places_px > -0.5) & (places_px < size)).all(axis=1)
+    return float(seen.mean())
+
+
+def _origin_finding(rig: Rig, part: str) -> RigFinding:
+    origin = next((origin for name, origin in rig.origins.items() if name == part), None)
+    if origin is None:
+        return RigFinding(f"Calibration of {part}", "not told in this file")
+    return RigFinding(
+        f"Calibration of {part}",
+        f"{origin.verdict}: {origin.reason} ({origin.method}, {origin.made})",
+        origin.verdict == "good",
+        "good",
+    )
