@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
@@ -13,7 +14,7 @@ from handcal.snapshot import Snapshot
 from handcal.station import Station
 from handcal_gui.compare import Comparison
 from handcal_gui.stream import Command, Stream
-from handcal_gui.window import MainWindow
+from handcal_gui.window import MainWindow, Panel
 from handcal_gui.wizard.steps import Action, EyePlan, Step, Wizard
 from handcal_gui.wizard.wizard import WizardPanel
 
@@ -134,6 +135,8 @@ class Live(QObject):
             lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
         )
         self._window.space_pressed.connect(self._wizard_panel.press_main)
+        for name, dock in self._window.docks.items():
+            dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
         self._connect_fine_tuning()
         self._connect_session()
         panels.link.restart_headset_requested.connect(
@@ -214,6 +217,11 @@ class Live(QObject):
         )
         self._watch_views(not panels.wearer_view.visibleRegion().isEmpty())
         self.polled.emit(snapshot)
+
+    def _catch_up(self, panel: Panel, is_seen: bool) -> None:
+        """Let a panel that comes into sight show how things stand, before it is used."""
+        if is_seen and self._snapshot is not None:
+            panel.show_snapshot(self._snapshot)
 
     def _watch_views(self, wanted: bool) -> None:
         """Have the wearer's views rendered only while they are seen."""

@@ -52,6 +52,7 @@ def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: M
 
 def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:
     wizard = window.centralWidget()
+    assert wizard is not None
     assert wizard.height() > wizard.sizeHint().height()
     assert window.docks["camera"].width() >= 350
 
