@@ -57,7 +57,7 @@ def photograph_display(
     fine = cv2.remap(shown, x, y, cv2.INTER_LINEAR)
     light = cv2.resize(fine, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     image = _BLACK + (_WHITE - _BLACK) / 255.0 * light.astype(np.float64)
-    image = cv2.GaussianBlur(image, (0, 0), settings.blur_px)
-    noisy = image + rng.normal(0.0, settings.noise, image.shape)
+    blurred = cv2.GaussianBlur(image, (0, 0), settings.blur_px)
+    noisy = blurred + rng.normal(0.0, settings.noise, image.shape)
     seen: UInt8 = np.rint(noisy).clip(0, 255).astype(np.uint8)
     return seen
