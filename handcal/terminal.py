@@ -1,0 +1,113 @@
+"""What the commands share: how arguments are read, and results and progress shown."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn, TypeAlias
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from handcal.files import make_folder, write_json
+
+console = Console(soft_wrap=True, highlight=False)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong with the arguments, and end."""
+        fail(f"{message}; see {self.prog} --help", 2)
+
+
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+
+
+class _Help(argparse.ArgumentDefaultsHelpFormatter):
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        has_default = action.default is not None and action.default is not False
+        return super()._get_help_string(action) if has_default else action.help
+
+
+def add_command(
+    commands: Commands, command: Callable[[argparse.Namespace], None], *, json: bool = True
+) -> Parser:
+    """Add a command that is called and described as its function; with `json`, ``--json`` too."""
+    text = command.__doc__
+    added: Parser = commands.add_parser(
+        command.__name__, help=text, description=text, formatter_class=_Help
+    )
+    added.set_defaults(command=command)
+    if json:
+        added.add_argument("--json", type=Path, metavar="FILE", help="write the results here too")
+    return added
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """Say one line on standard error, and end with an exit code."""
+    sys.stderr.write(f"handcal: {' '.join(message.split())}\n")
+    sys.exit(code)
+
+
+def number(kind: type[int] | type[float], low: float, high: float) -> Callable[[str], float]:
+    """Return a converter for argparse that accepts numbers from `low` to `high`."""
+
+    def convert(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            what = "whole number" if kind is int else "number"
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what} from {low} to {high}")
+        return value
+
+    return convert
+
+
+def save(path: Path | None, result: dict[str, Any]) -> None:
+    """Write a result as JSON, if a path is given."""
+    if path is not None:
+        make_folder(path.parent)
+        write_json(path, result)
+
+
+def table(*columns: str) -> Table:
+    """Return an empty table, its numbers to the right of a first column that gives way."""
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for place, column in enumerate(columns):
+        made.add_column(
+            column,
+            justify="right" if place else "left",
+            no_wrap=place > 0,
+            overflow="ellipsis" if place else "fold",
+        )
+    return made
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float], None]]:
+    """Yield a function that shows what is going on: a bar on a terminal, else plain lines."""
+    if not console.is_terminal:
+        last = ("", 0)
+
+        def say(what: str, share: float) -> None:
+            nonlocal last
+            if last != (what, int(10 * share)):
+                last = what, int(10 * share)
+                console.print(f"{100 * share:3.0f} % {what}")
+
+        yield say
+        return
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda what, share: bar.update(task, description=what, completed=share)
