@@ -323,7 +323,7 @@ def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio:
     window = live.program.window
     window.docks["session"].raise_()
     live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
-    window.panels.session.findChild(QPlainTextEdit).setPlainText("wears glasses")
+    live.child(QPlainTextEdit, "").setPlainText("wears glasses")
     window.docks["fine_tune"].raise_()
     panel = window.panels.fine_tune
     live.wait(lambda: panel.isVisible() and panel.isEnabled())
@@ -359,8 +359,7 @@ def test_a_session_broken_off_is_offered_and_gone_on_with(
     first.program.window.close()
 
     second = open_program()
-    listed = second.program.start.findChild(QWidget, "resume")
-    second.wait(listed.isVisible)
+    second.wait(second.child(QWidget, "resume").isVisible)
     second.program.start.resume_requested.emit(path)
     second.wait_for_page("live")
     assert second.snapshot.session_path == path

@@ -1,0 +1,114 @@
+"""The command line: what is wrong is one line and exit status 2."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from handcal_gui import app
+
+START_S = 40.0
+
+
+def complaint(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *words: str
+) -> str:
+    """Return the one line that the program ends with, exit status 2."""
+    monkeypatch.setattr(sys, "argv", ["handcal-gui", *words])
+    with pytest.raises(SystemExit) as ended:
+        app.main()
+    errors = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert errors.count("\n") == 1
+    assert errors.startswith("handcal-gui: ")
+    return errors
+
+
+def run(*words: str | Path) -> subprocess.Popen[str]:
+    environment = os.environ | {"QT_QPA_PLATFORM": "offscreen", "OMP_NUM_THREADS": "1"}
+    environment["QT_LOGGING_RULES"] = "default.warning=false"  # what offscreen cannot do
+    return subprocess.Popen(
+        [sys.executable, "-m", "handcal_gui", *map(str, words)],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (["--seed", "-1"], "must be a whole number from 0 to 4294967295"),
+        (["--seed", "one"], "must be a whole number from 0 to 4294967295"),
+        (["--colour"], "unrecognized arguments: --colour"),
+        (["--rig"], "expected one argument"),
+        (["a", "b"], "unrecognized arguments: b"),
+    ],
+)
+def test_wrong_arguments(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    what: str,
+) -> None:
+    assert what in complaint(capsys, monkeypatch, *words)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux may be without a display")
+def test_without_a_display(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    assert "handcal demo" in complaint(capsys, monkeypatch)
+
+
+def test_help_tells_every_option(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["handcal-gui", "--help"])
+    with pytest.raises(SystemExit) as ended:
+        app.main()
+    text = capsys.readouterr().out
+    assert ended.value.code == 0
+    for option in ("--source", "--rig", "--seed", "--autopilot", "--output", "--screenshots"):
+        assert option in text
+
+
+def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    process = run(
+        "--screenshots", tmp_path / "file", "--preferences", tmp_path / "preferences.json"
+    )
+    _, errors = process.communicate(timeout=START_S)
+    assert process.returncode == 2, errors
+    assert errors.count("\n") == 1
+    assert "file" in errors
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what a process listens to is told by Linux")
+def test_it_ends_well_when_told_to(tmp_path: Path) -> None:
+    preferences = tmp_path / "preferences.json"
+    process = run("--preferences", preferences, tmp_path / "no session")
+    deadline_s = time.monotonic() + START_S
+    while not is_listening(process.pid):
+        assert time.monotonic() < deadline_s
+        time.sleep(0.1)
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=START_S)
+    assert (process.returncode, errors) == (0, "")
+    assert preferences.exists()  # the window's place is remembered
+
+
+def is_listening(pid: int) -> bool:
+    """Tell whether a process has said what to do on SIGTERM."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    (caught,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
+    return bool(int(caught, 16) & 1 << signal.SIGTERM - 1)
