@@ -32,7 +32,7 @@ def board(arguments: argparse.Namespace) -> None:
 
     if arguments.pdf is None and arguments.png is None:
         raise HandcalError("say where the board goes: --pdf FILE, --png FILE or both")
-    made = _board(arguments)
+    made = board_of(arguments)
     try:
         if arguments.pdf:
             make_folder(arguments.pdf.parent)
@@ -54,7 +54,7 @@ def camera(arguments: argparse.Namespace) -> None:
 
     views = _views(arguments.images, arguments, arguments.drop)
     result = calibrate_camera(views, CameraSettings(lens=arguments.lens))
-    _show_views(views, result.residuals_px)
+    show_views(views, result.residuals_px)
     solved = result.intrinsics
     sigma = result.sigma
     console.print(
@@ -92,8 +92,8 @@ def stereo(arguments: argparse.Namespace) -> None:
     )
     settings = StereoSettings(camera=CameraSettings(lens=arguments.lens))
     result = calibrate_stereo(pairs, depth, headset, settings)
-    _show_views([first for first, _ in pairs], result.residuals_px)
-    _show_views([second for _, second in pairs if second.problem], {})
+    show_views([first for first, _ in pairs], result.residuals_px)
+    show_views([second for _, second in pairs if second.problem], {})
     shift_mm = 1e3 * result.T_H_D[:3, 3]
     angle_rad = np.arccos(np.clip((np.trace(result.T_H_D[:3, :3]) - 1) / 2, -1, 1))
     console.print(
@@ -135,9 +135,10 @@ def add_rig_commands(commands: Commands) -> None:
     from handcal.rig.board_print import PAPERS
     from handcal.rig.camera import LensModel
     from handcal.rig.formats import FORMATS
+    from handcal.rig_file_commands import add_rig_file_commands
 
     one = add_command(commands, board, json=False)
-    _add_board(one)
+    add_board_options(one)
     one.add_argument("--pdf", type=Path, metavar="FILE", help="to scale, with a ruler to check")
     one.add_argument("--paper", choices=tuple(PAPERS), default="a4", help="of the PDF")
     one.add_argument("--png", type=Path, metavar="FILE", help="for a screen")
@@ -167,8 +168,10 @@ def add_rig_commands(commands: Commands) -> None:
     one.add_argument("output", type=Path, help="the file to write")
     one.add_argument("--format", choices=FORMATS, required=True, help="of the output")
 
+    add_rig_file_commands(commands)
 
-def _add_board(command: Parser) -> None:
+
+def add_board_options(command: Parser) -> None:
     """Add the options that say which board is used."""
     from handcal.rig.board import Board, BoardKind
 
@@ -195,7 +198,7 @@ def _add_board(command: Parser) -> None:
 
 
 def _add_calibration(command: Parser, lenses: tuple[str, ...], formats: tuple[str, ...]) -> None:
-    _add_board(command)
+    add_board_options(command)
     command.add_argument("--lens", choices=lenses, default="full", help="model of distortion")
     command.add_argument(
         "--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"
@@ -206,7 +209,8 @@ def _add_calibration(command: Parser, lenses: tuple[str, ...], formats: tuple[st
     )
 
 
-def _board(arguments: argparse.Namespace) -> Board:
+def board_of(arguments: argparse.Namespace) -> Board:
+    """Return the board that the options describe; HandcalError if there can be none."""
     from handcal.rig.board import Board
 
     try:
@@ -228,11 +232,12 @@ def _views(
     from handcal.rig.views import drop, image_files, read_views
 
     with progress() as report:
-        views = read_views(image_files(paths), _board(arguments), report)
+        views = read_views(image_files(paths), board_of(arguments), report)
     return drop(views, dropped)
 
 
-def _show_views(views: Iterable[View], residuals_px: Mapping[str, float]) -> None:
+def show_views(views: Iterable[View], residuals_px: Mapping[str, float]) -> None:
+    """Print what was found on each image, and how far off that is."""
     shown = table("image", "corners", "off, px", "edges, px")
     for view in views:
         found, off_px = view.found, residuals_px.get(view.name)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.rig.board import Board, charuco, find_board
+from handcal.rig.board import Board, BoardView, charuco, find_board
 from handcal.rig.check import MAX_SIDE_PX
 from handcal.types import Float64, UInt8, freeze
 
@@ -112,7 +112,11 @@ def find_grid(image: UInt8, grid: Grid) -> GridView:
     BoardError
         If too few are seen; the text says why.
     """
-    view = find_board(image, grid.board)
+    return on_display(find_board(image, grid.board), grid)
+
+
+def on_display(found: BoardView, grid: Grid) -> GridView:
+    """Return what was found of `grid.board` as corners on the display."""
     # A board begins at the outer edge of its first pixel, half a pixel before the centre.
-    display_px = view.points_m[:, :2] / _BOARD_M + np.array(grid.corner_px) - 0.5
-    return GridView(display_px, view.pixels, view.size)
+    display_px = found.points_m[:, :2] / _BOARD_M + np.array(grid.corner_px) - 0.5
+    return GridView(display_px, found.pixels, found.size)

@@ -1,0 +1,274 @@
+"""``handcal rig grid, display, make, check, compare, migrate``: displays, and whole rig files."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from handcal.errors import FileError, HandcalError
+from handcal.files import make_folder, write_atomic
+from handcal.rig_commands import add_board_options, board_of, show_views
+from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
+
+if TYPE_CHECKING:
+    from handcal.rig.display import DisplaySettings
+    from handcal.rig.grid import Grid
+    from handcal.rig.viewpoint import ViewpointPose
+    from handcal.types import Intrinsics, Rig
+
+
+def grid(arguments: argparse.Namespace) -> None:
+    """Make the image that a display shows to the viewpoint camera, pixel for pixel."""
+    import cv2
+
+    from handcal.rig.grid import draw_grid
+
+    made = _grid(arguments, *arguments.display)
+    make_folder(arguments.png.parent)
+    write_atomic(arguments.png, cv2.imencode(".png", draw_grid(made))[1].tobytes())
+    columns, rows = made.squares
+    console.print(
+        f"{arguments.png}: {columns}×{rows} squares of {made.square_px} px; show it unscaled"
+    )
+
+
+def display(arguments: argparse.Namespace) -> None:
+    """Calibrate one eye's display from images of its grid taken by the viewpoint camera."""
+    import numpy as np
+
+    from handcal.rig.assemble import screen_of, with_display
+    from handcal.rig.display import calibrate_display, fit_homography
+    from handcal.rig.formats import read_intrinsics
+    from handcal.rig.grid import on_display
+    from handcal.rig.views import drop, image_files, read_views, used
+
+    rig, eye = _read_rig(arguments.rig), arguments.eye
+    camera = read_intrinsics(arguments.camera_intrinsics)
+    viewpoint = _viewpoint(arguments, camera)
+    screen = screen_of(rig, eye)
+    shown = _grid(arguments, screen.width_px, screen.height_px)
+    with progress() as report:
+        views = read_views(image_files(arguments.images), shown.board, report)
+    views = drop(views, arguments.drop)
+    seen = {name: on_display(found, shown) for name, found in used(views, 1).items()}
+    homography = fit_homography(seen, camera, screen.width_px, screen.height_px)
+    result = calibrate_display(homography, camera, viewpoint, screen, _distance(arguments))
+    show_views(views, homography.residuals_px)
+    place_mm = " ".join(f"{one:.2f}" for one in -1e3 * result.display.t_C0_V_m)
+    console.print(
+        f"z(C0→S) {result.display.z_C0_S_m:.3f} m; C0 at {place_mm} mm in V; the display is turned "
+        f"by {np.degrees(result.turn_rad):.2f}° against V; RMS {homography.rms_px:.3f} px"
+    )
+    console.print(f"{result.verdict.name}: {result.verdict.reason}")
+    _write(arguments.output, with_display(rig, eye, result, _now()))
+
+
+def make(arguments: argparse.Namespace) -> None:
+    """Put the depth camera's place, a stereo calibration, into a rig file."""
+    from handcal.rig.assemble import with_stereo
+    from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
+
+    rig = with_stereo(
+        _read_rig(arguments.rig),
+        read_stereo(arguments.stereo),
+        _now(),
+        depth_intrinsics=read_intrinsics(arguments.depth_intrinsics)
+        if arguments.depth_intrinsics
+        else None,
+        T_C_D=read_pose(arguments.depth_to_color) if arguments.depth_to_color else None,
+    )
+    _write(arguments.output, replace(rig, name=arguments.name or rig.name))
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Check a rig file: every field, what a person would ask of it, and how it was calibrated."""
+    from handcal.rig.report import report_rig
+
+    rig = _read_rig(arguments.input)
+    findings = report_rig(rig)
+    console.print(rig.name)
+    for one in findings:
+        doubt = "" if one.is_fine else f"  → doubtful: {one.expected} is expected"
+        console.print(f"{'ok' if one.is_fine else 'check':6} {one.what}: {one.found}{doubt}")
+    save(arguments.json, {"findings": [asdict(one) for one in findings]})
+    doubtful = sum(not one.is_fine for one in findings)
+    if doubtful:
+        raise HandcalError(f"{doubtful} of {len(findings)} findings are doubtful; see above")
+
+
+def compare(arguments: argparse.Namespace) -> None:
+    """Compare two rig files, and say how far apart they draw."""
+    from handcal.rig.compare import compare_rigs
+
+    differences = compare_rigs(_read_rig(arguments.a), _read_rig(arguments.b))
+    shown = table("what", "differs by")
+    for one in differences:
+        shown.add_row(one.name, f"{one.value:.3g} {one.unit}")
+    console.print(shown)
+    save(arguments.json, {"differences": [asdict(one) for one in differences]})
+
+
+def migrate(arguments: argparse.Namespace) -> None:
+    """Write a rig file of any known version as one of the newest."""
+    _write(arguments.output, _read_rig(arguments.input))
+
+
+def add_rig_file_commands(commands: Commands) -> None:
+    """Add the commands below ``handcal rig``."""
+    from handcal.types import EYES
+
+    one = add_command(commands, grid, json=False)
+    side = number(int, 60, 16384)
+    one.add_argument(
+        "--display",
+        type=side,
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        default=(1268, 720),
+        help="size of the display",
+    )
+    one.add_argument("--png", type=Path, metavar="FILE", required=True, help="where to write it")
+    _add_square(one)
+
+    one = add_command(commands, display, json=False)
+    one.add_argument("images", type=Path, nargs="+", help="images of the grid, or folders of them")
+    one.add_argument("--eye", choices=EYES, required=True, help="whose display")
+    one.add_argument("--camera-intrinsics", type=Path, required=True, help="the viewpoint camera's")
+    place = one.add_mutually_exclusive_group(required=True)
+    place.add_argument(
+        "--stereo",
+        type=Path,
+        metavar="FILE",
+        help="its place, as JSON from 'handcal rig stereo' with it as the depth camera",
+    )
+    place.add_argument(
+        "--tracked",
+        type=Path,
+        metavar="FILE",
+        help="poses of the board in the --board-images, as JSON",
+    )
+    one.add_argument(
+        "--board-images", type=Path, nargs="+", default=(), help="of the board that was tracked"
+    )
+    metres = number(float, 0.1, 100.0)
+    distance = one.add_mutually_exclusive_group(required=True)
+    distance.add_argument("--distance-m", type=metres, help="z(C0→S) as measured")
+    distance.add_argument(
+        "--square-arcmin",
+        type=number(float, 1.0, 10_000.0),
+        help="what a square of the grid subtends at the --nominal-distance-m, to solve z(C0→S)",
+    )
+    one.add_argument("--nominal-distance-m", type=metres, default=2.0, help="of the virtual image")
+    one.add_argument("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out")
+    _add_square(one)
+    add_board_options(one)
+    _add_rig_and_output(one)
+
+    one = add_command(commands, make, json=False)
+    one.add_argument("--stereo", type=Path, required=True, help="JSON from 'handcal rig stereo'")
+    one.add_argument(
+        "--depth-intrinsics",
+        type=Path,
+        help="the depth imager's own, if the stereo images are the colour imager's",
+    )
+    one.add_argument(
+        "--depth-to-color", type=Path, metavar="FILE", help="pose from depth to colour, as well"
+    )
+    one.add_argument("--name", help="of the rig; as before if absent")
+    _add_rig_and_output(one)
+
+    one = add_command(commands, check)
+    one.add_argument("input", type=Path, help="rig file")
+
+    one = add_command(commands, compare)
+    one.add_argument("a", type=Path, help="rig file")
+    one.add_argument("b", type=Path, help="rig file")
+
+    one = add_command(commands, migrate, json=False)
+    one.add_argument("input", type=Path, help="rig file")
+    one.add_argument("--output", type=Path, required=True, help="rig file to write")
+
+
+def _add_square(command: Parser) -> None:
+    command.add_argument(
+        "--square-px", type=number(int, 20, 2000), default=80, help="side of the grid's squares"
+    )
+
+
+def _add_rig_and_output(command: Parser) -> None:
+    command.add_argument(
+        "--rig", type=Path, help="rig file to start from; the shipped example if absent"
+    )
+    command.add_argument("--output", type=Path, required=True, help="rig file to write")
+
+
+def _grid(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
+    from handcal.rig.grid import Grid
+
+    try:
+        return Grid(width_px, height_px, arguments.square_px)
+    except ValueError as error:
+        raise HandcalError(str(error)) from error
+
+
+def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:
+    from handcal.rig.formats import read_stereo
+    from handcal.rig.tracked_file import read_tracked
+    from handcal.rig.viewpoint import TrackedView, locate_viewpoint, viewpoint_from_stereo
+    from handcal.rig.views import image_files, read_views, used
+
+    if arguments.stereo:
+        return viewpoint_from_stereo(read_stereo(arguments.stereo))
+    poses = read_tracked(arguments.tracked)
+    with progress() as report:
+        views = read_views(image_files(arguments.board_images), board_of(arguments), report)
+    found = used(views, 1)
+    missing = sorted(set(found) - set(poses))
+    if missing:
+        raise FileError(f"{arguments.tracked} holds no pose for {', '.join(missing)}")
+    viewpoint = locate_viewpoint(
+        {name: TrackedView(one, poses[name]) for name, one in found.items()}, camera
+    )
+    show_views(views, viewpoint.residuals_px)
+    return viewpoint
+
+
+def _distance(arguments: argparse.Namespace) -> DisplaySettings:
+    import numpy as np
+
+    from handcal.rig.display import DisplaySettings, pixel_size_m
+
+    if arguments.distance_m is not None:
+        return DisplaySettings(distance_m=arguments.distance_m)
+    return DisplaySettings(
+        pixel_m=pixel_size_m(
+            np.radians(arguments.square_arcmin / 60.0),
+            arguments.square_px,
+            arguments.nominal_distance_m,
+        )
+    )
+
+
+def _read_rig(path: Path | None) -> Rig:
+    from handcal.resources import resource_path
+    from handcal.rig.rig_file import read_rig
+
+    return read_rig(path or resource_path("example_rig.yaml"))
+
+
+def _write(path: Path, rig: Rig) -> None:
+    from handcal.rig.rig_file import write_rig
+
+    make_folder(path.parent)
+    try:
+        write_rig(path, rig)
+    except ValueError as error:
+        raise HandcalError(f"this is no plausible rig: {error}") from error
+    console.print(f"{path}")
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
