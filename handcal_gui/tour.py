@@ -17,6 +17,7 @@ from handcal_gui.screenshots import Screenshots
 _LOOK_MS = 600
 """Until what was done is seen, also on a busy computer."""
 _TURN_MS = 50
+_PATIENCE_MS = 20_000
 _STEPS = 6
 _TRIALS = 2
 
@@ -88,8 +89,7 @@ class Tour(QObject):
         dialog.stop()
         assert program.live.snapshot is not None
         program.open_session(program.live.snapshot.session_path)
-        while program.window.page != "review":
-            yield _TURN_MS
+        yield from _until(lambda: program.window.page == "review")
         yield _LOOK_MS
         self._save("review")
         preferences = PreferencesDialog(program.preferences, program.window)
@@ -114,11 +114,27 @@ class Tour(QObject):
         self._save("fine-tune-moved", panel)
         self._save("window-fine-tune")
         for _ in range(_TRIALS):
-            window.panels.trials.record_action.trigger()
-            yield 2 * _LOOK_MS
+            yield from self._record_trial()
         panel.reset_action.trigger()
         yield 2 * _LOOK_MS
         self._save("fine-tune-back", panel)
+
+    def _record_trial(self) -> Walk:
+        wanted = self._trials() + 1
+        self._program.window.panels.trials.record_action.trigger()
+        yield from _until(lambda: self._trials() == wanted)
+
+    def _trials(self) -> int:
+        snapshot = self._program.live.snapshot
+        return len(snapshot.record.trials) if snapshot else 0
+
+
+def _until(holds: Callable[[], bool]) -> Walk:
+    """Wait for something, but not forever: a picture will show that it is missing."""
+    for _ in range(_PATIENCE_MS // _TURN_MS):
+        if holds():
+            return
+        yield _TURN_MS
 
 
 def _press(widget: QWidget, key: Qt.Key) -> None:

@@ -65,12 +65,6 @@ _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
     "live": frozenset(_TITLES),
     "review": frozenset({"cloud", "results", "trials", "session"}),
 }
-_PERCENT_OF_PAGE: dict[Page, tuple[int, int]] = {
-    "start": (0, 0),
-    "live": (28, 32),
-    "review": (30, 32),
-}
-"""Of the window's width, for the docks on the left and on the right."""
 
 
 class Panel(Protocol):
@@ -286,9 +280,11 @@ class MainWindow(QMainWindow):
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
         width, height = self.width(), self.height()
         left, right = (
-            min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX)
-            for percent in _PERCENT_OF_PAGE[self._page]
+            min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (28, 32)
         )
+        if self._page == "review":  # which needs little room itself
+            page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
+            left = right = (width - page) // 2
         wizard = self._pages["live"].sizeHint().height() + 12 * SPACING_PX  # with the banner
         self.resizeDocks([docks["camera"], docks["rotation"]], [left, right], across)
         camera = left * 9 // 16 + 15 * SPACING_PX
