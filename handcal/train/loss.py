@@ -56,7 +56,7 @@ def detection_loss(raw: Tensor, targets: list[Tensor], grid: Grid) -> tuple[Tens
         counts[image, points] = 1.0
         box_losses.append(1.0 - generalised)
     positives = max(1, sum(map(len, box_losses)))
-    error = (logits.sigmoid() - quality).detach().square()
+    error = (logits.sigmoid() - quality).square()
     cross = functional.binary_cross_entropy_with_logits(logits, quality, reduction="none")
     box_loss = torch.cat(box_losses).sum() if box_losses else boxes.sum() * 0.0
     return (counts * error * cross).sum() / positives, _BOX_WEIGHT * box_loss / positives

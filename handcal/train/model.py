@@ -52,6 +52,20 @@ def _normalised(inputs: int, outputs: int, size: int = 1, groups: int = 1) -> nn
     )
 
 
+def _tower() -> nn.Sequential:
+    """Return two separable convolutions of 5x5."""
+    layers = []
+    for _ in range(2):
+        layers += [_normalised(_WIDTH, _WIDTH, 5, _WIDTH), _normalised(_WIDTH, _WIDTH)]
+    return nn.Sequential(*layers)
+
+
+def _share_convolutions(tower: nn.Sequential, other: nn.Sequential) -> None:
+    """Let two levels have their convolutions in common, but not what they are normalised by."""
+    for layer, other_layer in zip(tower, other, strict=True):
+        other_layer[0].weight = layer[0].weight
+
+
 class HandNet(nn.Module):
     """Maps (B, 3, H, W) RGB of 0 to 255, H and W multiples of 32, to (B, 5, N) raw predictions.
 
@@ -69,13 +83,9 @@ class HandNet(nn.Module):
         self.stem = nn.Sequential(nn.Conv2d(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
         self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)
         self.lateral = nn.ModuleList(_normalised(_BLOCKS[tap - 1][1], _WIDTH) for tap in _TAPS)
-        self.tower = nn.Sequential(
-            *(
-                layer
-                for _ in range(2)
-                for layer in (_normalised(_WIDTH, _WIDTH, 5, _WIDTH), _normalised(_WIDTH, _WIDTH))
-            )
-        )
+        self.towers = nn.ModuleList(_tower() for _ in _TAPS)
+        for tower in self.towers[1:]:
+            _share_convolutions(self.towers[0], tower)
         self.predict = nn.Conv2d(_WIDTH, 5, 1)
         nn.init.normal_(self.predict.weight, std=0.01)
         # At first a point is rarely a hand, and boxes are four strides wide.
@@ -97,7 +107,13 @@ class HandNet(nn.Module):
             pyramid[level] = pyramid[level] + functional.interpolate(
                 pyramid[level + 1], scale_factor=2.0, mode="nearest"
             )
-        return torch.cat([self.predict(self.tower(level)).flatten(2) for level in pyramid], 2)
+        return torch.cat(
+            [
+                self.predict(tower(level)).flatten(2)
+                for tower, level in zip(self.towers, pyramid, strict=True)
+            ],
+            2,
+        )
 
 
 assert len(_TAPS) == len(STRIDES)

@@ -29,3 +29,11 @@ def test_the_first_blocks_are_not_trained() -> None:
     assert "blocks.4.pointwise.weight" not in trained
     assert "blocks.5.depthwise.weight" in trained
     assert "predict.bias" in trained
+
+
+def test_levels_share_what_they_look_for_but_not_how_they_are_normalised() -> None:
+    first, *others = HandNet().towers
+    for other in others:
+        weights, other_weights = dict(first.named_parameters()), dict(other.named_parameters())
+        assert other_weights["0.0.weight"] is weights["0.0.weight"]
+        assert other_weights["0.1.weight"] is not weights["0.1.weight"]
