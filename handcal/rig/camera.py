@@ -6,12 +6,13 @@ The method is Zhang's, "A flexible new technique for camera calibration", 2000, 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
 from handcal.geometry import camera_matrix, rigid
 from handcal.rig.board import BoardView
@@ -133,7 +134,7 @@ def calibrate_camera(
     intrinsics, poses = _solve(found, settings.lens)
     fits = {name: linearise(seen, poses[name], intrinsics) for name, seen in found.items()}
     off_px = {name: off for name, (off, _) in fits.items()}
-    solved = [*range(6, 10), *(10 + number for number in _SOLVED[settings.lens])]
+    solved = solved_columns(settings.lens)
     everything_px = np.vstack(list(off_px.values()))
     covariance = marginal_covariance(
         ((by[:, solved], by[:, :6]) for _, by in fits.values()), everything_px.ravel()
@@ -171,6 +172,29 @@ def linearise(seen: BoardView, T_C_B: Float64, intrinsics: Intrinsics) -> tuple[
     return off_px, np.asarray(by, dtype=np.float64)
 
 
+def solved_columns(lens: LensModel) -> list[int]:
+    """Return which of `linearise`'s derivatives are by intrinsics that a lens model solves for."""
+    return [*range(6, 10), *(10 + number for number in _SOLVED[lens])]
+
+
+def lens_flags(lens: LensModel) -> int:
+    """Return OpenCV's flags for a lens model."""
+    return _FLAGS[lens]
+
+
+def refined(intrinsics: Intrinsics, K: ArrayLike, coefficients: ArrayLike) -> Intrinsics:
+    """Return the intrinsics with OpenCV's result, as many coefficients as there were."""
+    K, found = np.asarray(K), np.asarray(coefficients).ravel()
+    return replace(
+        intrinsics,
+        fx=float(K[0, 0]),
+        fy=float(K[1, 1]),
+        cx=float(K[0, 2]),
+        cy=float(K[1, 2]),
+        distortion=tuple(float(one) for one in found[: len(intrinsics.distortion)]),
+    )
+
+
 def tilt(T_C_B: Float64, seen: BoardView) -> float:
     """Return the angle between the board's normal and the line of sight, rad."""
     middle_m = T_C_B[:3, :3] @ seen.points_m.mean(axis=0) + T_C_B[:3, 3]
@@ -197,16 +221,14 @@ def _solve(
             (width, height),
             np.eye(3),
             np.zeros(8),
-            flags=_FLAGS[lens],
+            flags=lens_flags(lens),
         )
     except cv2.error as error:
         raise ViewsError(
             "nothing can be solved from these views: take more, of a board tilted to every side"
         ) from error
-    fx, fy, cx, cy = (float(K[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
     count = {"none": 0, "rational": 8}.get(lens, 5)
-    distortion = tuple(float(one) for one in coefficients.ravel()[:count])
-    intrinsics = Intrinsics(width, height, fx, fy, cx, cy, distortion)
+    intrinsics = refined(Intrinsics(width, height, 1, 1, 0, 0, (0.0,) * count), K, coefficients)
     if not np.isfinite([intrinsics.fx, intrinsics.fy, *intrinsics.distortion]).all():
         raise ViewsError("these views determine no camera: tilt the board to every side")
     poses = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -15,9 +16,13 @@ from handcal.rig.board import BoardView, Int64
 from handcal.rig.camera import (
     CameraCalibration,
     CameraSettings,
+    LensModel,
     calibrate_camera,
+    lens_flags,
     linearise,
     normal_spread,
+    refined,
+    solved_columns,
     tilt,
 )
 from handcal.rig.least_squares import marginal_covariance
@@ -25,6 +30,8 @@ from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import View, ViewsError, one_size
 from handcal.rig.worst import WorstView, rms, worst_view
 from handcal.types import Float64, Intrinsics, freeze
+
+_Both: TypeAlias = tuple[Float64, Float64]  # of the depth camera's and the headset's image
 
 MIN_PAIRS = 3
 _MIN_SHARED_CORNERS = 8
@@ -55,7 +62,7 @@ class StereoSettings:
     good_pairs: int = 10
     good_spread_rad: float = 0.15
     max_rms_px: float = 1.0
-    max_angle_sigma_rad: float = 5e-4
+    max_angle_sigma_rad: float = 1e-3
     max_shift_sigma_m: float = 3e-4
     max_shift_m: float = 0.5
 
@@ -69,8 +76,8 @@ class StereoCalibration:
     T_H_D : (4, 4) float64
         From the depth camera (or its colour imager) to the headset's.
     covariance : (6, 6) float64 or None
-        Of T_H_D's rotation vector (rad) and translation (m); the intrinsics are taken as exact.
-        None if not determined.
+        Of T_H_D's rotation vector (rad) and translation (m), with the uncertainty of intrinsics
+        that were solved, not of given ones. None if not determined.
     depth, headset : Intrinsics
         Given or solved.
     rms_px : float
@@ -137,16 +144,20 @@ def calibrate_stereo(
     settings = settings or StereoSettings()
     both = _found_by_both(pairs)
     _check_sizes(both, depth, headset)
+    lens = settings.camera.lens
+    free = solved_columns(lens)
+    solved = (free if depth is None else [], free if headset is None else [])
     depth = depth or _solved([first for first, _ in pairs], "depth", settings.camera)
     headset = headset or _solved([second for _, second in pairs], "headset", settings.camera)
-    T_H_D, T_D_B = _solve(both, depth, headset)
-    off_px, blocks = _fit(both, depth, headset, T_H_D, T_D_B)
+    # Both cameras' own solutions are improved by what they see together.
+    T_H_D, T_D_B, depth, headset = _solve(both, depth, headset, lens if all(solved) else None)
+    off_px, by = _fit(both, depth, headset, T_H_D, T_D_B)
     everything_px = np.vstack([off for pair in off_px.values() for off in pair])
     rms_px = rms(everything_px)
     _check_not_swapped(both, depth, headset, rms_px)
     if rms_px > settings.max_rms_px:
         _check_not_mirrored(both, depth, headset, rms_px)
-    covariance = marginal_covariance(blocks, everything_px.ravel())
+    covariance = _covariance(by, T_H_D, T_D_B, solved, everything_px)
     alone = np.stack([_alone(pair, depth, headset) for pair in both.values()])
     apart = _differences(T_H_D, alone)
     worst = _worst(both, off_px, T_H_D, T_D_B)
@@ -227,22 +238,27 @@ def _solved(views: Sequence[View], which: str, settings: CameraSettings) -> Intr
 
 
 def _solve(
-    both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics
-) -> tuple[Float64, dict[str, Float64]]:
-    """Return T_H_D, and T_D_B of each pair."""
+    both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics, lens: LensModel | None = None
+) -> tuple[Float64, dict[str, Float64], Intrinsics, Intrinsics]:
+    """Return T_H_D, T_D_B of each pair, and the intrinsics, refined if a lens model is given."""
+    flags = cv2.CALIB_FIX_INTRINSIC
+    if lens is not None:
+        flags = cv2.CALIB_USE_INTRINSIC_GUESS | lens_flags(lens)
     try:
-        _, _, _, _, _, R, t, _, _, rotations, translations, _ = cv2.stereoCalibrateExtended(
-            [pair.depth.points_m.astype(np.float32) for pair in both.values()],
-            [pair.depth.pixels.astype(np.float32) for pair in both.values()],
-            [pair.headset.pixels.astype(np.float32) for pair in both.values()],
-            camera_matrix(depth),
-            _coefficients(depth),
-            camera_matrix(headset),
-            _coefficients(headset),
-            (depth.width, depth.height),
-            np.eye(3),
-            np.zeros(3),
-            flags=cv2.CALIB_FIX_INTRINSIC,
+        _, K_D, lens_D, K_H, lens_H, R, t, _, _, rotations, translations, _ = (
+            cv2.stereoCalibrateExtended(
+                [pair.depth.points_m.astype(np.float32) for pair in both.values()],
+                [pair.depth.pixels.astype(np.float32) for pair in both.values()],
+                [pair.headset.pixels.astype(np.float32) for pair in both.values()],
+                camera_matrix(depth),
+                _coefficients(depth),
+                camera_matrix(headset),
+                _coefficients(headset),
+                (depth.width, depth.height),
+                np.eye(3),
+                np.zeros(3),
+                flags=flags,
+            )
         )
     except cv2.error as error:
         raise ViewsError(
@@ -252,7 +268,9 @@ def _solve(
         name: rigid(cv2.Rodrigues(rotation)[0], translation.ravel())
         for name, rotation, translation in zip(both, rotations, translations, strict=True)
     }
-    return rigid(R, t.ravel()), T_D_B
+    if lens is not None:
+        depth, headset = refined(depth, K_D, lens_D), refined(headset, K_H, lens_H)
+    return rigid(R, t.ravel()), T_D_B, depth, headset
 
 
 def _coefficients(intrinsics: Intrinsics) -> Float64:
@@ -265,22 +283,38 @@ def _fit(
     headset: Intrinsics,
     T_H_D: Float64,
     T_D_B: Mapping[str, Float64],
-) -> tuple[dict[str, tuple[Float64, Float64]], list[tuple[Float64, Float64]]]:
-    """Return each pair's residuals in both images, and its derivatives by T_H_D and T_D_B."""
-    off_px, blocks = {}, []
+) -> tuple[dict[str, _Both], dict[str, _Both]]:
+    """Return each pair's residuals in both images, and the derivatives that `linearise` gives."""
+    off_px, by = {}, {}
     for name, pair in both.items():
         off_depth, by_depth = linearise(pair.depth, T_D_B[name], depth)
         off_headset, by_headset = linearise(pair.headset, T_H_D @ T_D_B[name], headset)
         off_px[name] = off_depth, off_headset
-        by_first, by_second = _composed(T_D_B[name], T_H_D)
-        rest = np.zeros((len(by_depth), 6))
-        blocks.append(
-            (
-                np.vstack([rest, by_headset[:, :6] @ by_second]),
-                np.vstack([by_depth[:, :6], by_headset[:, :6] @ by_first]),
-            )
+        by[name] = by_depth, by_headset
+    return off_px, by
+
+
+def _covariance(
+    by: Mapping[str, _Both],
+    T_H_D: Float64,
+    T_D_B: Mapping[str, Float64],
+    solved: tuple[list[int], list[int]],
+    off_px: Float64,
+) -> Float64 | None:
+    """Return the covariance of T_H_D, with that of the intrinsics `solved` from the same views."""
+    blocks = []
+    for name, (by_depth, by_headset) in by.items():
+        by_board, by_place = _composed(T_D_B[name], T_H_D)
+        of_depth, of_headset = by_depth[:, solved[0]], by_headset[:, solved[1]]
+        shared = np.block(
+            [
+                [np.zeros((len(by_depth), 6)), of_depth, np.zeros_like(of_headset)],
+                [by_headset[:, :6] @ by_place, np.zeros_like(of_depth), of_headset],
+            ]
         )
-    return off_px, blocks
+        blocks.append((shared, np.vstack([by_depth[:, :6], by_headset[:, :6] @ by_board])))
+    covariance = marginal_covariance(blocks, off_px.ravel())
+    return None if covariance is None else covariance[:6, :6]
 
 
 def _composed(T_D_B: Float64, T_H_D: Float64) -> tuple[Float64, Float64]:
@@ -329,7 +363,8 @@ def _check_not_mirrored(
 
 
 def _rms_px(both: Mapping[str, _Pair], depth: Intrinsics, headset: Intrinsics) -> float:
-    off_px, _ = _fit(both, depth, headset, *_solve(both, depth, headset))
+    T_H_D, T_D_B, _, _ = _solve(both, depth, headset)
+    off_px, _ = _fit(both, depth, headset, T_H_D, T_D_B)
     return rms(np.vstack([off for pair in off_px.values() for off in pair]))
 
 
@@ -363,7 +398,7 @@ def _mirror(seen: BoardView, axis: int) -> BoardView:
 
 def _worst(
     both: Mapping[str, _Pair],
-    off_px: Mapping[str, tuple[Float64, Float64]],
+    off_px: Mapping[str, _Both],
     T_H_D: Float64,
     T_D_B: Mapping[str, Float64],
 ) -> WorstView:

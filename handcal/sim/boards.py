@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from handcal.geometry import camera_matrix, image_points, invert, rigid, transform
-from handcal.rig.board import Board, corners_m
+from handcal.rig.board import Board, BoardView, corners_m
 from handcal.rig.board_print import draw_board
 from handcal.types import Float32, Float64, Intrinsics, UInt8
 
@@ -75,6 +75,21 @@ class BoardPainter:
         noisy = image * light + rng.normal(scale=self._settings.noise, size=image.shape)
         shades: UInt8 = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
         return shades
+
+
+def board_view(
+    board: Board, T_C_B: Float64, camera: Intrinsics, rng: np.random.Generator, noise_px: float
+) -> BoardView:
+    """Return the corners that a detector with Gaussian errors would find, without an image."""
+    points_m = corners_m(board)
+    pixels = image_points(transform(T_C_B, points_m), camera)
+    return BoardView(
+        points_m=points_m,
+        pixels=pixels + rng.normal(scale=noise_px, size=pixels.shape),
+        size=(camera.width, camera.height),
+        ids=np.arange(len(points_m)),
+        blur_px=2.0,
+    )
 
 
 def board_poses(
