@@ -9,12 +9,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from handcal.closable import Closable
 from handcal.errors import FileError
 from handcal.session import Session, SessionRecord
+from handcal_gui.start.session_entries import find_offers
 
 ARTEFACTS = Path(__file__).parents[2] / "artefacts"
 PATIENCE_S = 90.0
@@ -37,8 +40,8 @@ def display() -> Iterator[str]:
     server.wait(10)
 
 
-class Window:
-    """A running program, and the technician's hands."""
+class Window(Closable):
+    """A running program, and the technician's hands; killed if it is left running."""
 
     def __init__(self, display: str, *arguments: str | Path) -> None:
         self._environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
@@ -73,6 +76,10 @@ class Window:
         _, errors = self.process.communicate(timeout=PATIENCE_S)
         return self.process.returncode, errors
 
+    def close(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
     def _xdotool(self, *arguments: str) -> str:
         return subprocess.run(
             ["xdotool", *arguments],
@@ -92,6 +99,15 @@ def wait_for(what: str, condition: Callable[[], bool], window: Window) -> None:
         time.sleep(0.2)
 
 
+def newest_session(folder: Path) -> SessionRecord | None:
+    """Return the newest session in a folder; None while there is none, or it is being created."""
+    paths = sorted(folder.glob("session-*"))
+    try:
+        return Session.open(paths[-1]) if paths else None
+    except FileError:
+        return None
+
+
 @pytest.fixture
 def preferences(tmp_path: Path) -> Path:
     path = tmp_path / "config" / "preferences.json"
@@ -107,32 +123,31 @@ def preferences(tmp_path: Path) -> Path:
 def test_a_technician_calibrates_with_the_keyboard_alone(
     display: str, tmp_path: Path, preferences: Path
 ) -> None:
-    window = Window(display, "--preferences", preferences)
-
     def record() -> SessionRecord | None:
-        folders = list((tmp_path / "sessions").glob("*"))
-        try:
-            return Session.open(folders[0]) if folders else None
-        except FileError:
-            return None  # being created
+        return newest_session(tmp_path / "sessions")
 
     def events(name: str) -> int:
         session = record()
         return sum(event.name == name for event in session.events) if session else 0
 
+    def has(name: str, count: int) -> bool:
+        return events(name) >= count
+
     def press_space_until(name: str, count: int) -> None:
         """Press the space bar as one who watches the screen: no faster than it changes."""
 
         def tried() -> bool:
-            if events(name) >= count:
-                return True
-            window.press("space")
-            time.sleep(0.8)
-            return events(name) >= count
+            if not has(name, count):
+                window.press("space")
+                time.sleep(0.8)
+            return has(name, count)
 
         wait_for(f"{name} {count}", tried, window)
 
-    try:
+    def reports() -> list[Path]:
+        return list((tmp_path / "out").glob("*/report.pdf"))
+
+    with Window(display, "--preferences", preferences) as window:
         window.find()
         time.sleep(2.0)
         window.type("Ada")
@@ -143,7 +158,7 @@ def test_a_technician_calibrates_with_the_keyboard_alone(
             press_space_until("cursor_made", eye)
             window.shoot(f"real-2-align-{eye}")
             # The wearer confirms in the headset.
-            wait_for("an alignment", lambda eye=eye: events("alignment_saved") >= eye, window)
+            wait_for("an alignment", partial(has, "alignment_saved", eye), window)
             press_space_until("applied", eye)
             window.shoot(f"real-3-applied-{eye}")
         press_space_until("finished", 1)
@@ -151,43 +166,73 @@ def test_a_technician_calibrates_with_the_keyboard_alone(
         time.sleep(1.5)
         window.shoot("real-4-export")
         window.press("Return")
-        wait_for("the report", lambda: (tmp_path / "out" / "report.pdf").exists(), window)
+        wait_for("the report", lambda: bool(reports()), window)
         time.sleep(1.0)
         window.shoot("real-5-exported")
         window.press("Escape")
         time.sleep(0.5)
+        window.find()  # without a window manager, nobody gives the keyboard back
         window.press("ctrl+q")
-        code, errors = window.end()
-    finally:
-        window.process.kill()
-        window.process.wait()
-    assert (code, errors) == (0, "")
+        assert window.end() == (0, "")
     session = record()
     assert session is not None
     assert session.wearer == "Ada"
     assert session.is_finished
     assert {eye for alignment in session.alignments for eye in alignment.eyes} == {"left", "right"}
-    assert (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF")
+    (report,) = reports()
+    assert report.read_bytes().startswith(b"%PDF")
     assert json.loads(preferences.read_text())["wearers"] == ["Ada"]
+
+
+def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
+    display: str, tmp_path: Path, preferences: Path, headset_of: Callable[[int], int]
+) -> None:
+    sessions = tmp_path / "sessions"
+
+    def alignments() -> int:
+        session = newest_session(sessions)
+        return len(session.alignments) if session else 0
+
+    with Window(display, "--autopilot", "--output", sessions) as killed:
+        wait_for("an alignment", lambda: alignments() > 0, killed)
+        headset = headset_of(killed.process.pid)
+        killed.process.kill()
+    session = newest_session(sessions)
+    assert session is not None
+    assert not session.is_finished
+    (offer,) = find_offers(sessions, ()).unfinished
+    assert offer.is_enabled
+    deadline_s = time.monotonic() + PATIENCE_S
+    while Path(f"/proc/{headset}").exists():  # it hears no PC any more
+        assert time.monotonic() < deadline_s
+        time.sleep(0.2)
+
+    with Window(display, session.path, "--preferences", preferences) as window:
+        window.find()
+        time.sleep(2.0)
+
+        def is_resumed() -> bool:
+            window.press("alt+g")
+            time.sleep(1.0)
+            return not find_offers(sessions, ()).unfinished[0].is_enabled
+
+        wait_for("the session in use again", is_resumed, window)
+        window.shoot("real-6-resumed")
+        window.press("ctrl+q")
+        assert window.end() == (0, "")
+    assert alignments() == len(session.alignments)
 
 
 def test_the_autopilot_calibrates_exports_and_takes_pictures(
     display: str, tmp_path: Path, preferences: Path
 ) -> None:
     pictures = ARTEFACTS / "autopilot"
-    window = Window(
+    with Window(
         display,
-        "--source",
-        "simulator",
-        "--autopilot",
-        "--output",
-        tmp_path / "result",
-        "--screenshots",
-        pictures,
-        "--preferences",
-        preferences,
-    )
-    assert window.end() == (0, "")
+        *("--source", "simulator", "--autopilot", "--output", tmp_path / "result"),
+        *("--screenshots", pictures, "--preferences", preferences),
+    ) as window:
+        assert window.end() == (0, "")
     assert (tmp_path / "result" / "export" / "report.pdf").exists()
     names = {path.stem for path in pictures.glob("*.png")}
     assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
@@ -197,17 +242,12 @@ def test_the_autopilot_calibrates_exports_and_takes_pictures(
 def test_the_autopilot_says_where_it_got_stuck(display: str, tmp_path: Path) -> None:
     rig = tmp_path / "rig.yaml"
     rig.write_text("%YAML:1.0\n")
-    window = Window(
+    with Window(
         display,
-        "--autopilot",
-        "--rig",
-        rig,
-        "--output",
-        tmp_path / "result",
-        "--preferences",
-        tmp_path / "preferences.json",
-    )
-    code, errors = window.end()
+        *("--autopilot", "--rig", rig, "--output", tmp_path / "result"),
+        *("--preferences", tmp_path / "preferences.json"),
+    ) as window:
+        code, errors = window.end()
     assert code == 1
     assert errors.count("\n") == 1
     assert "rig" in errors
