@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, get_args
 
 from rich import box
 from rich.console import Console
@@ -25,6 +27,7 @@ from handcal.files import make_folder, write_json
 from handcal.types import METHODS
 
 if TYPE_CHECKING:
+    from handcal.camera.camera import Camera
     from handcal.replay import ReplayStep
 
 console = Console(soft_wrap=True, highlight=False)
@@ -136,14 +139,16 @@ def export(arguments: argparse.Namespace) -> None:
 
 
 def replay(arguments: argparse.Namespace) -> None:
-    """Play a RealSense recording and segment the hand in every frame."""
-    from handcal.camera.recording import RecordingCamera
+    """Play a recording and segment the hand in every frame."""
+    from handcal.camera.playback import PlaybackSettings
+    from handcal.camera.recordings import open_recording
     from handcal.hand.segment import SegmentSettings
     from handcal.replay import replay as play
 
     table = _table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
     rows: list[dict[str, Any]] = []
-    with RecordingCamera(arguments.recording, real_time=arguments.real_time) as camera:
+    playback = PlaybackSettings(real_time=arguments.real_time)
+    with open_recording(arguments.recording, playback) as camera:
         for step in play(camera, SegmentSettings()):
             rows.append(_replay_row(step))
             shown = list(rows[-1].values())[:-1]
@@ -155,6 +160,26 @@ def replay(arguments: argparse.Namespace) -> None:
             console.print(f"Frame {row['frame']}: {row['problem']}")
     found = sum(not row["problem"] for row in rows)
     console.print(f"{found} of {len(rows)} frames show a hand.")
+
+
+def record(arguments: argparse.Namespace) -> None:
+    """Record a camera: into a .db3 file through librealsense, or into a folder of images."""
+    from handcal.record import RecordSettings
+    from handcal.record import record as record_camera
+
+    settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
+    with _open_source(arguments) as camera, _until_interrupted() as is_stopped:
+        console.print(f"Recording {camera.name}; Ctrl+C ends it and keeps what there is.")
+        try:
+            with _progress() as report:
+                recorded = record_camera(camera, arguments.output, settings, report, is_stopped)
+        except ValueError as error:
+            raise HandcalError(str(error)) from error
+    _save(arguments.json, asdict(recorded))
+    console.print(
+        f"{recorded.frames} frames, {recorded.duration_s:.1f} s, {recorded.dropped} dropped; "
+        f"ended: {recorded.stop_reason}. Recording: {arguments.output}"
+    )
 
 
 def headset(arguments: argparse.Namespace) -> None:
@@ -311,10 +336,24 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--far-m", type=metres, default=100.0, help="OpenGL's far plane")
 
     one = add(replay)
-    one.add_argument("recording", type=Path, help=".db3 or .bag file")
+    one.add_argument("recording", type=Path, help=".db3 or .bag file, or a recorded folder")
     one.add_argument(
         "--real-time", action="store_true", help="at the recorded pace, dropping frames"
     )
+
+    one = add(record)
+    one.add_argument("output", type=Path, help="a .db3 file, or a new folder")
+    one.add_argument(
+        "--source", default="realsense", help="realsense, simulator, or a recording to convert"
+    )
+    one.add_argument(
+        "--seconds", type=_number(float, 0.01, 86_400.0), default=60.0, help="end after so long"
+    )
+    one.add_argument(
+        "--frames", type=_number(int, 1, 100_000), default=100_000, help="end after so many"
+    )
+    one.add_argument("--seed", type=seed, default=1, help="of the simulated hand and room")
+    _add_realsense_options(one)
 
     one = add(headset, json=False)
     port = _number(int, 1, 65535)
@@ -342,6 +381,58 @@ def _parser() -> argparse.ArgumentParser:
     add(bench).add_argument("--quick", action="store_true", help="few repetitions: only a look")
     add(doctor, json=False)
     return parser
+
+
+def _add_realsense_options(command: _Parser) -> None:
+    from handcal.camera.settings import Preset, Profile
+
+    command.add_argument("--serial", default="", help="of the RealSense; the first if absent")
+    command.add_argument("--profile", choices=get_args(Profile), default="auto", help="size")
+    command.add_argument("--preset", choices=get_args(Preset), help="the SDK's visual preset")
+    positive = _number(float, 0.0, 1e6)
+    command.add_argument("--exposure-us", type=positive, help="of the depth; automatic if absent")
+    command.add_argument("--laser-power-mw", type=positive, help="of the projector")
+    for name in ("spatial-filter", "temporal-filter", "hole-filling"):
+        command.add_argument(f"--{name}", action="store_true", help="the SDK's, on the depth")
+
+
+def _open_source(arguments: argparse.Namespace) -> Camera:
+    """Open the camera that a command's ``--source`` names."""
+    from handcal.camera.realsense import RealSenseCamera
+    from handcal.camera.recordings import open_recording
+    from handcal.camera.settings import RealSenseSettings
+    from handcal.camera.synthetic import SyntheticCamera
+    from handcal.sim.hand import make_hand
+    from handcal.sim.render import World
+    from handcal.sim.room import make_room
+    from handcal.sim.sway import swaying_hand
+
+    match arguments.source:
+        case "simulator":
+            world = World(make_hand(arguments.seed), make_room(arguments.seed))
+            return SyntheticCamera(world, swaying_hand, seed=arguments.seed)
+        case "realsense":
+            names = [field.name for field in fields(RealSenseSettings)]
+            chosen = {name: getattr(arguments, name) for name in names}
+            return RealSenseCamera(RealSenseSettings(**chosen))
+        case path:
+            return open_recording(Path(path))
+
+
+@contextmanager
+def _until_interrupted() -> Iterator[Callable[[], bool]]:
+    """Yield what tells whether Ctrl+C was pressed; the second time it interrupts as ever."""
+    is_stopped = threading.Event()
+
+    def stop(*_: object) -> None:
+        is_stopped.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield is_stopped.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[[str], float]:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from handcal.camera.realsense import Device, connected_devices
+from handcal.camera.sdk_devices import Device, connected_devices
+from handcal.camera.usb import explain_absence
 from handcal.errors import HandcalError
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
@@ -118,16 +119,21 @@ def _cameras() -> list[Finding]:
     except HandcalError as error:
         return [Finding("RealSense SDK", Health.LIMITED, str(error), "needed for real cameras")]
     if not devices:
-        advice = "plug a RealSense into a USB 3 port; the simulator works without"
-        return [Finding("Camera", Health.LIMITED, "none connected", advice)]
+        advice = "the simulator and recordings work without"
+        return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
     return [examine_camera(device) for device in devices]
 
 
 def examine_camera(device: Device) -> Finding:
     """Tell what a device is, and whether it is connected well enough."""
     found = f"{device.name}, serial {device.serial}, firmware {device.firmware}, USB {device.usb}"
+    if device.temperature_c is not None:
+        found += f", {device.temperature_c:.0f} °C"
     if device.is_slow:
-        advice = "USB 2 is too slow for 1280x720: use a USB 3 port and cable"
+        advice = "USB 2 is too slow for 1280x720, and gives less power: use a USB 3 port and cable"
+        return Finding("Camera", Health.LIMITED, found, advice)
+    if device.has_old_firmware:
+        advice = f"update the firmware to {device.recommended_firmware} with RealSense Viewer"
         return Finding("Camera", Health.LIMITED, found, advice)
     return Finding("Camera", Health.GOOD, found)
 

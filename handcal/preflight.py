@@ -9,7 +9,8 @@ from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from handcal.camera.realsense import choose_device, connected_devices, librealsense
+from handcal.camera.folder import FolderCamera
+from handcal.camera.sdk_devices import choose_device, connected_devices, librealsense
 from handcal.doctor import Finding, Health, examine_camera, examine_disk
 from handcal.errors import HandcalError, LinkError
 from handcal.link.server import LOOPBACK
@@ -78,7 +79,7 @@ def _broken(found: str, advice: str) -> Finding:
 def _camera(settings: StationSettings) -> Finding:
     match settings.source:
         case "realsense":
-            return examine_camera(choose_device(connected_devices(), settings.serial))
+            return examine_camera(choose_device(connected_devices(), settings.realsense.serial))
         case "recording":
             return _recording(settings.recording)
         case "simulator":
@@ -86,6 +87,9 @@ def _camera(settings: StationSettings) -> Finding:
 
 
 def _recording(name: str) -> Finding:
+    if name and Path(name).is_dir():
+        with FolderCamera(Path(name)) as camera:
+            return _good(f"{camera.name}, played over and over")
     librealsense()
     path = Path(name)
     if not name:

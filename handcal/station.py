@@ -15,8 +15,9 @@ import numpy as np
 from handcal.calibrate import Calibration, PlacedHand, ProcedureError, State
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
+from handcal.camera.playback import PlaybackSettings
 from handcal.camera.realsense import RealSenseCamera
-from handcal.camera.recording import RecordingCamera
+from handcal.camera.recordings import open_recording
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.closable import Closable
 from handcal.config import settings_json
@@ -207,9 +208,9 @@ class Station(Closable):
     def _open_camera(self) -> Camera:
         settings = self.settings
         if settings.source == "realsense":
-            return RealSenseCamera(settings.serial)
+            return RealSenseCamera(settings.realsense)
         if settings.source == "recording":
-            return RecordingCamera(Path(settings.recording), real_time=True)
+            return open_recording(Path(settings.recording), PlaybackSettings(real_time=True))
         if self._simulation is None:
             raise CameraError("the simulated camera needs the virtual headset, with its wearer")
         return SyntheticCamera(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from handcal.calibrate import CalibrationSettings
+from handcal.camera.settings import RealSenseSettings
 from handcal.resources import resource_path
 
 Source = Literal["simulator", "recording", "realsense"]
@@ -22,9 +23,8 @@ class StationSettings:
     ----------
     source : {"simulator", "recording", "realsense"}
     recording : str
-        Path of the recording that `source` plays, over and over.
-    serial : str
-        Of the RealSense; empty takes the first.
+        Path of the recording that `source` plays, over and over: a file or a folder.
+    realsense : RealSenseSettings
     headset : {"virtual", "network"}
         The virtual headset is a process of its own on this machine; it brings the simulated wearer.
     host, port : str, int
@@ -44,7 +44,7 @@ class StationSettings:
 
     source: Source = "simulator"
     recording: str = ""
-    serial: str = ""
+    realsense: RealSenseSettings = field(default_factory=RealSenseSettings)
     headset: HeadsetKind = "virtual"
     host: str = "0.0.0.0"  # noqa: S104 (a headset is another device; the datagrams are signed)
     port: int = DEFAULT_PORT

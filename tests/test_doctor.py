@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import pytest
 
 from handcal import doctor
-from handcal.camera.realsense import Device
+from handcal.camera.sdk_devices import Device
+from handcal.camera.usb import explain_absence
 from handcal.doctor import Finding, Health, examine
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.link.pairing import KEY_VARIABLE
@@ -85,7 +86,9 @@ def test_the_pairing_key(
 @pytest.mark.parametrize(
     ("devices", "found", "health"),
     [
-        ([], "none connected", Health.LIMITED),
+        ([], "no RealSense camera is connected", Health.LIMITED),
+        ([Device("D415", "123", "5.9.1", "3.2", "5.16.0")], "firmware 5.9.1", Health.LIMITED),
+        ([Device("D415", "123", "5.16", "3.2", "5.9.1", 41.3)], ", 41 °C", Health.GOOD),
         ([Device("D415", "123", "5.16", "3.2")], "D415, serial 123", Health.GOOD),
         ([Device("D415", "123", "5.16", "2.1")], "USB 2.1", Health.LIMITED),
     ],
@@ -94,6 +97,7 @@ def test_the_camera(
     monkeypatch: pytest.MonkeyPatch, devices: list[Device], found: str, health: Health
 ) -> None:
     monkeypatch.setattr(doctor, "connected_devices", lambda: devices)
+    monkeypatch.setattr(doctor, "explain_absence", lambda: explain_absence(Path("nowhere")))
     assert found in of("Camera").found
     assert of("Camera").health is health
 

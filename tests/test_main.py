@@ -8,6 +8,8 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ import pytest
 
 from handcal import bench, doctor
 from handcal.__main__ import main
+from handcal.camera.folder import record_folder
 from handcal.doctor import Finding, Health
 from handcal.geometry import rigid
 from handcal.link.pairing import KEY_VARIABLE
@@ -159,6 +162,51 @@ def test_replay_tells_every_frame(
     assert "2 of 2 frames show a hand." in shown
 
 
+def test_record_converts_a_recording_and_tells_what_it_did(
+    handcal: Callable[..., None],
+    fails: Callable[..., tuple[int, str]],
+    frame: Frame,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    frames = [
+        Frame(i, 33_333_333 * i, 0, frame.depth, frame.depth_scale_m, CAMERA) for i in (1, 2, 4)
+    ]
+    record_folder(tmp_path / "three", frames)
+    told = tmp_path / "record.json"
+    handcal("record", tmp_path / "copy", "--source", tmp_path / "three", "--json", told)
+    assert json.loads(told.read_text()) == {
+        "frames": 3,
+        "dropped": 1,
+        "duration_s": pytest.approx(0.1),
+        "stop_reason": "the recording played has ended",
+    }
+    assert "3 frames, 0.1 s, 1 dropped" in capsys.readouterr().out
+    handcal("replay", tmp_path / "copy")
+    assert "3 of 3 frames show a hand." in capsys.readouterr().out
+    code, error = fails("record", tmp_path / "copy", "--source", tmp_path / "three")
+    assert (code, "is not empty; give a new folder" in error) == (1, True)
+    code, error = fails("record", tmp_path / "copy.bag", "--source", tmp_path / "three")
+    assert (code, "records only .db3 files" in error) == (1, True)
+
+
+def test_record_sees_the_simulated_hand_until_it_is_interrupted(
+    handcal: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt() -> None:
+        while not (tmp_path / "hand" / "frames.csv").exists():
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    stop = threading.Thread(target=interrupt, daemon=True)
+    stop.start()
+    handcal("record", tmp_path / "hand", "--source", "simulator", "--seconds", "600")
+    stop.join()
+    assert "ended: stopped" in capsys.readouterr().out
+    handcal("replay", tmp_path / "hand")
+    assert "frames show a hand." in capsys.readouterr().out
+
+
 def test_bench_shows_and_saves_its_figures(
     handcal: Callable[..., None],
     tmp_path: Path,
@@ -217,6 +265,9 @@ def test_doctor_fails_only_for_what_must_be_mended(
         ("solve somewhere --method fast", "invalid choice: 'fast'"),
         ("headset --port 0 --scene-port 1", "'0' is no whole number from 1 to 65535"),
         ("headset --port 5000", "required: --scene-port"),
+        ("record", "required: output"),
+        ("record a --seconds 0", "'0' is no number from 0.01"),
+        ("record a --profile 640x480", "invalid choice: '640x480'"),
         ("bench --json", "expected one argument"),
         ("doctor --json it", "unrecognized arguments"),
     ],

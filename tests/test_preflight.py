@@ -11,16 +11,20 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from handcal import preflight
-from handcal.camera.realsense import Device
+from handcal.camera.folder import record_folder
+from handcal.camera.sdk_devices import Device
+from handcal.camera.settings import RealSenseSettings
 from handcal.doctor import Finding, Health
 from handcal.errors import LinkError
 from handcal.link.pairing import new_pairing_key
 from handcal.preflight import PARTS, Part, check_station, is_ready
 from handcal.resources import resource_path
 from handcal.station_settings import StationSettings
+from handcal.types import Frame, Intrinsics
 
 KEY = new_pairing_key()
 D415 = Device("Intel RealSense D415", "123", "5.16", "3.2")
@@ -76,7 +80,10 @@ def test_a_realsense_is_found_or_missed(
     devices.append(D415)
     assert find("camera", live).health is Health.GOOD
     assert "serial 123" in find("camera", live).found
-    assert "serial 9 is not connected" in find("camera", replace(live, serial="9")).found
+    assert (
+        "serial 9 is not connected"
+        in find("camera", replace(live, realsense=RealSenseSettings(serial="9"))).found
+    )
     devices[0] = replace(D415, usb="2.1")
     assert find("camera", live).health is Health.LIMITED
 
@@ -103,6 +110,20 @@ def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) ->
     path.write_bytes(bytes(2**21))
     assert find("camera", with_path).found == "2.0 MiB, played over and over"
     assert find("camera", replace(played, recording="\0.db3")).health is Health.BROKEN
+
+
+def test_a_recorded_folder_needs_no_sdk(
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyrealsense2", None)
+    played = replace(settings, source="recording", recording=str(tmp_path))
+    assert "recording.json" in find("camera", played).found
+    assert find("camera", played).health is Health.BROKEN
+    camera = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
+    record_folder(tmp_path / "hand", [Frame(1, 1, 0, np.ones((3, 4), np.uint16), 1e-3, camera)])
+    finding = find("camera", replace(played, recording=str(tmp_path / "hand")))
+    assert finding.found == "Recording hand, played over and over"
+    assert finding.health is Health.GOOD
 
 
 def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: Path) -> None:

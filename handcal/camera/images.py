@@ -1,4 +1,4 @@
-"""A frame from image files: depth aligned to colour, and the camera's intrinsics as JSON."""
+"""Frames from image files, with the camera's intrinsics as JSON."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from handcal.errors import FileError
 from handcal.files import read_json
 from handcal.image_file import MAX_SIDE_PX, read_image
-from handcal.types import Frame, Intrinsics
+from handcal.types import Frame, Intrinsics, UInt8, UInt16
+
+DEPTH_SCALES_M = 1e-6, 0.1
+"""Least and largest metres per unit of depth that make sense."""
+DISTORTION_COUNTS = 0, 4, 5, 8, 12, 14
+"""How many coefficients OpenCV's lens models have."""
 
 
 def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
@@ -33,18 +39,11 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
     FileError
         If a file is missing, malformed, too large, or they do not belong together.
     """
-    camera, depth_scale_m = _read_intrinsics(intrinsics)
-    depth_image = read_image(depth, cv2.IMREAD_UNCHANGED)
-    if depth_image.dtype != np.uint16 or depth_image.ndim != 2:
-        raise FileError(f"{depth} must be a 16-bit image of one channel")
-    color_image = read_image(color, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
-    for path, image in ((depth, depth_image), (color, color_image)):
-        height, width = image.shape[:2]
-        if (width, height) != (camera.width, camera.height):
-            raise FileError(
-                f"{path} is {width}x{height} pixels, but {intrinsics} says "
-                f"{camera.width}x{camera.height}"
-            )
+    values = read_json(intrinsics)
+    camera = intrinsics_from(values, intrinsics)
+    depth_scale_m = number_from(values, intrinsics, "depth_scale", *DEPTH_SCALES_M)
+    depth_image = read_depth(depth, camera)
+    color_image = read_color(color, camera)
     return Frame(
         index=0,
         t_camera_ns=0,
@@ -57,26 +56,64 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
     )
 
 
-def _read_intrinsics(path: Path) -> tuple[Intrinsics, float]:
-    values = read_json(path)
-    width, height = (_number(values, path, key, 1, MAX_SIDE_PX) for key in ("width", "height"))
+def intrinsics_from(values: dict[str, Any], path: Path) -> Intrinsics:
+    """Return a camera from JSON values: width, height, fx, fy, cx, cy, and distortion if any.
+
+    Raises
+    ------
+    FileError
+        If one is missing or nonsense; it names `path`, where they come from.
+    """
+    width, height = (number_from(values, path, key, 1, MAX_SIDE_PX) for key in ("width", "height"))
     if width != int(width) or height != int(height):
         raise FileError(f"{path}: width and height must be whole numbers")
-    camera = Intrinsics(
+    distortion = values.get("distortion", [])
+    if not isinstance(distortion, list) or len(distortion) not in DISTORTION_COUNTS:
+        counts = ", ".join(map(str, DISTORTION_COUNTS))
+        raise FileError(f"{path}: distortion must be a list of {counts} numbers")
+    return Intrinsics(
         width=int(width),
         height=int(height),
-        fx=_number(values, path, "fx", 1.0, 1e5),
-        fy=_number(values, path, "fy", 1.0, 1e5),
-        cx=_number(values, path, "cx", -width, 2 * width),
-        cy=_number(values, path, "cy", -height, 2 * height),
+        fx=number_from(values, path, "fx", 1.0, 1e5),
+        fy=number_from(values, path, "fy", 1.0, 1e5),
+        cx=number_from(values, path, "cx", -width, 2 * width),
+        cy=number_from(values, path, "cy", -height, 2 * height),
+        distortion=tuple(
+            number_from({"distortion": value}, path, "distortion", -1e3, 1e3)
+            for value in distortion
+        ),
     )
-    return camera, _number(values, path, "depth_scale", 1e-6, 0.1)
 
 
-def _number(values: dict[str, Any], path: Path, key: str, low: float, high: float) -> float:
+def number_from(values: dict[str, Any], path: Path, key: str, low: float, high: float) -> float:
+    """Return one of JSON values as a number from `low` to `high`; FileError otherwise."""
     value = values.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise FileError(f"{path} must give {key} as a number")
     if not low <= value <= high:
         raise FileError(f"{path}: {key} is {value:g}, but must lie between {low:g} and {high:g}")
     return float(value)
+
+
+def read_depth(path: Path, camera: Intrinsics) -> UInt16:
+    """Read a depth image: a 16-bit grey PNG of the camera's size; FileError otherwise."""
+    image = read_image(path, cv2.IMREAD_UNCHANGED)
+    if image.dtype != np.uint16 or image.ndim != 2:
+        raise FileError(f"{path} must be a 16-bit image of one channel")
+    return _of_size(image, path, camera)
+
+
+def read_color(path: Path, camera: Intrinsics) -> UInt8:
+    """Read a colour image as RGB: a PNG or JPEG of the camera's size; FileError otherwise."""
+    image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+    return _of_size(image, path, camera)
+
+
+def _of_size(image: NDArray[Any], path: Path, camera: Intrinsics) -> NDArray[Any]:
+    height, width = image.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise FileError(
+            f"{path} is {width}x{height} pixels, but its camera's intrinsics say "
+            f"{camera.width}x{camera.height}"
+        )
+    return image

@@ -1,13 +1,20 @@
-"""Intel RealSense devices: the SDK itself, what is plugged in, and frames from it."""
+"""Frames from an Intel RealSense camera."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
+from handcal.camera.sdk_devices import (
+    Device,
+    choose_device,
+    connected_devices,
+    describe_device,
+    librealsense,
+    sdk_devices,
+)
 from handcal.camera.sdk_frames import (
     apart_ms,
     extrinsics_between,
@@ -15,135 +22,92 @@ from handcal.camera.sdk_frames import (
     intrinsics_of,
     with_color,
 )
+from handcal.camera.sdk_options import apply_options, depth_filter
+from handcal.camera.settings import Profile, RealSenseSettings
 from handcal.closable import Closable
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.errors import CameraError, CameraTimeoutError
 from handcal.types import Frame
 
-_SIZES_PX = ((1280, 720), (848, 480))
+_SIZES = ("1280x720", "848x480")
 _RATE_HZ = 30
-
-
-@dataclass(frozen=True, slots=True)
-class Device:
-    """A RealSense device as the SDK lists it.
-
-    Attributes
-    ----------
-    name, serial, firmware : str
-    usb : str
-        As in "3.2"; empty if not told.
-    """
-
-    name: str
-    serial: str
-    firmware: str
-    usb: str
-
-    @property
-    def is_slow(self) -> bool:
-        """Whether it is connected by USB 2, too slow for 1280x720 at 30 Hz."""
-        return self.usb.startswith("2")
-
-
-def librealsense() -> Any:
-    """Return the module pyrealsense2.
-
-    Raises
-    ------
-    CameraError
-        If it is not installed.
-    """
-    try:
-        import pyrealsense2  # imported late: absent on macOS
-    except ImportError as error:
-        raise CameraError(
-            "RealSense cameras and recordings need librealsense: pip install pyrealsense2 "
-            "(no package exists for macOS)"
-        ) from error
-    return pyrealsense2
-
-
-def connected_devices() -> list[Device]:
-    """Return the devices plugged in, without opening any.
-
-    Raises
-    ------
-    CameraError
-        If the SDK is missing or cannot look.
-    """
-    rs = librealsense()
-    try:
-        return [
-            Device(
-                *(
-                    device.get_info(info) if device.supports(info) else ""
-                    for info in (
-                        rs.camera_info.name,
-                        rs.camera_info.serial_number,
-                        rs.camera_info.firmware_version,
-                        rs.camera_info.usb_type_descriptor,
-                    )
-                )
-            )
-            for device in rs.context().query_devices()
-        ]
-    except RuntimeError as error:
-        raise CameraError(f"the RealSense SDK cannot list devices: {error}") from error
+_QUEUE_FRAMES = 2
+_Stream: TypeAlias = tuple[Any, Any]
+"""A sensor of the SDK, and the profile of it to run."""
 
 
 class RealSenseCamera(Closable):
-    """Live depth with colour, both 1280x720 at 30 Hz or else 848x480; implements `Camera`.
+    """Live depth with colour of the same size, at 30 Hz; implements `Camera`.
 
     Depth is given as measured, not aligned to colour. Written after the SDK's documentation and
-    tested on played recordings: it has not been run on a device.
+    tested with its software device: it has not been run on a camera.
 
     Parameters
     ----------
-    serial : str
-        Of the device; empty takes the first.
+    settings : RealSenseSettings
 
     Raises
     ------
     CameraError
-        If the SDK or the device is missing, in use, or refuses both sizes.
+        If the SDK or the device is missing, in use, or does not offer what the settings say.
     """
 
-    def __init__(self, serial: str = "") -> None:
-        rs = librealsense()
-        self._device = choose_device(connected_devices(), serial)
-        self._pipeline = rs.pipeline()
-        profile = _start(rs, self._pipeline, self._device)
-        depth, color = profile.get_stream(rs.stream.depth), profile.get_stream(rs.stream.color)
-        self.depth_intrinsics = intrinsics_of(depth)
-        self._T_C_D = extrinsics_between(depth, color)
-        self._is_open = True
+    def __init__(self, settings: RealSenseSettings | None = None) -> None:
+        settings = settings or RealSenseSettings()
+        handles = sdk_devices()
+        devices = [describe_device(handle) for handle in handles]
+        self._device = choose_device(devices, settings.serial)
+        handle = handles[devices.index(self._device)]
+        self._sensors: list[Any] = []
+        self._syncer = librealsense().syncer(_QUEUE_FRAMES)
+        self._filter = depth_filter(settings)
+        try:
+            streams = _choose_streams(handle, self._device, settings.profile)
+            (_, depth), (_, color) = streams
+            self.depth_intrinsics = intrinsics_of(depth)
+            self._T_C_D = extrinsics_between(depth, color)
+            apply_options(handle, settings)
+            self._start(streams)
+        except RuntimeError as error:
+            self.close()
+            raise CameraError(
+                f"{self._device.name} does not start: {error}; "
+                "close other programs that use it, or plug it in again"
+            ) from error
         size = f"{self.depth_intrinsics.width}x{self.depth_intrinsics.height}"
         slow = f", only USB {self._device.usb}" if self._device.is_slow else ""
         self.name = f"{self._device.name} ({size}{slow})"
 
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame with depth; see `Camera.read`."""
-        if not self._is_open:
-            raise CameraEndError(f"{self.name} is closed")
+        if not self._sensors:
+            raise CameraError(f"{self.name} is closed; open it again")
         depth, color = self._wait(timeout_s)
-        frame = frame_of(depth, self.depth_intrinsics)
+        frame = frame_of(self._filter(depth), self.depth_intrinsics)
         if not color or apart_ms(color, depth) > 1e3 / _RATE_HZ:
             return frame
         return with_color(frame, color, self._T_C_D)
 
     def close(self) -> None:
         """Stop the device; safe to call twice."""
-        if self._is_open:
-            self._is_open = False
+        for sensor in self._sensors:
             with suppress(RuntimeError):  # it may have been unplugged
-                self._pipeline.stop()
+                sensor.stop()
+            with suppress(RuntimeError):
+                sensor.close()
+        self._sensors = []
+
+    def _start(self, streams: Sequence[_Stream]) -> None:
+        for sensor in {id(sensor): sensor for sensor, _ in streams}.values():
+            self._sensors.append(sensor)
+            sensor.open([profile for owner, profile in streams if owner is sensor])
+            sensor.start(self._syncer)
 
     def _wait(self, timeout_s: float) -> tuple[Any, Any]:
         """Return the next depth frame, and the colour frame that the SDK paired with it, if any."""
         deadline_s = time.monotonic() + timeout_s
         while (left_s := deadline_s - time.monotonic()) > 0:
             try:
-                arrived, frames = self._pipeline.try_wait_for_frames(max(1, round(1e3 * left_s)))
+                arrived, frames = self._syncer.try_wait_for_frames(max(1, round(1e3 * left_s)))
             except RuntimeError as error:
                 raise CameraError(f"{self.name} failed: {error}; plug it in again") from error
             if arrived and (depth := frames.get_depth_frame()):
@@ -153,46 +117,33 @@ class RealSenseCamera(Closable):
         raise CameraTimeoutError(f"{self.name}: no frame for {timeout_s:g} s")
 
 
-def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
-    """Return the device with a serial number, or the first.
-
-    Raises
-    ------
-    CameraError
-        If it is not among them.
-    """
-    if not devices:
-        raise CameraError("no RealSense camera is connected; plug one into a USB 3 port")
-    for device in devices:
-        if serial in ("", device.serial):
-            return device
-    there = ", ".join(f"{device.name} {device.serial}" for device in devices)
-    raise CameraError(f"the RealSense with serial {serial} is not connected; there is {there}")
-
-
-def _start(rs: Any, pipeline: Any, device: Device) -> Any:
-    """Start the largest size that the device grants, and return the profile of its streams."""
-    problem = ""
-    for width, height in _SIZES_PX:
-        config = rs.config()
-        config.enable_device(device.serial)
-        config.enable_stream(rs.stream.depth, width, height, rs.format.z16, _RATE_HZ)
-        config.enable_stream(rs.stream.color, width, height, rs.format.rgb8, _RATE_HZ)
-        try:
-            _put_streams_on_one_clock(rs, config.resolve(rs.pipeline_wrapper(pipeline)))
-            return pipeline.start(config)
-        except RuntimeError as error:
-            problem = str(error)
-    advice = (
-        f"it is on USB {device.usb}: use a USB 3 port and cable"
-        if device.is_slow
-        else "close other programs that use it, or plug it in again"
+def _choose_streams(handle: Any, device: Device, wanted: Profile) -> tuple[_Stream, _Stream]:
+    """Return depth and colour, of the largest size wanted that the device offers for both."""
+    rs = librealsense()
+    offered = {
+        (profile.stream_type(), profile.format(), f"{profile.width()}x{profile.height()}"): (
+            sensor,
+            profile,
+        )
+        for sensor in handle.query_sensors()
+        for profile in map(_video, sensor.get_stream_profiles())
+        if profile and profile.fps() == _RATE_HZ
+    }
+    sizes = _SIZES if wanted == "auto" else (wanted,)
+    for size in sizes:
+        depth = offered.get((rs.stream.depth, rs.format.z16, size))
+        color = offered.get((rs.stream.color, rs.format.rgb8, size))
+        if depth and color:
+            return depth, color
+    advice = "choose another profile or camera"
+    if device.is_slow:
+        advice = f"it is on USB {device.usb}: use a USB 3 port and cable"
+    raise CameraError(
+        f"{device.name} offers no depth with colour of {' or '.join(sizes)} at {_RATE_HZ} Hz; "
+        f"{advice}"
     )
-    raise CameraError(f"{device.name} does not start: {problem}; {advice}")
 
 
-def _put_streams_on_one_clock(rs: Any, profile: Any) -> None:
-    """Have the SDK map the times of all sensors to the host's clock, where it can."""
-    for sensor in profile.get_device().query_sensors():
-        if sensor.supports(rs.option.global_time_enabled):
-            sensor.set_option(rs.option.global_time_enabled, 1.0)
+def _video(profile: Any) -> Any:
+    """Return a profile as that of images; None for one of motion or pose."""
+    return profile.as_video_stream_profile() if profile.is_video_stream_profile() else None

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from itertools import chain
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handcal.camera.realsense import librealsense
+from handcal.camera.one_camera import of_one_camera
+from handcal.camera.playback import PlaybackSettings, PlayedCamera
+from handcal.camera.sdk_devices import librealsense
 from handcal.camera.sdk_frames import (
     apart_ms,
     extrinsics_between,
@@ -18,29 +20,33 @@ from handcal.camera.sdk_frames import (
     intrinsics_of,
     with_color,
 )
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.types import Float64, Frame, Intrinsics
 
 _POLL_MS = 100
 _COLOR_TIMEOUT_S = 1.0
+_SKIP_TIMEOUT_S = 10.0
+_SETTLE_S = 0.2
+_ROUNDING_MS = 1e-3  # of the SDK's times, kept as floating-point numbers
 _RATE_HZ = 30
+_COEFFICIENTS = 5
 _BACKLOG_BYTES = 64 * 2**20
 _DISK_TIMEOUT_S = 10.0
 
 
-class RecordingCamera(Closable):
-    """Plays a recording back once, depth with colour if it has any; implements `Camera`.
+class RecordingCamera(PlayedCamera):
+    """Plays a recording back, depth with colour if it has any; implements `Camera`.
 
     Depth is given as it was recorded, not aligned to colour, with the colour nearest in time.
+    librealsense keeps the times at which a file was written, not those of the frames, and its own
+    seeking leaves frames queued: so pace and place go by the frames' times, and going back reads
+    from the beginning.
 
     Parameters
     ----------
     path : Path
         A ``.db3`` or ``.bag`` recording.
-    real_time : bool
-        Play at the recorded speed and drop what is read too late; otherwise every frame, as fast
-        as it is read.
+    settings : PlaybackSettings
 
     Raises
     ------
@@ -48,56 +54,70 @@ class RecordingCamera(Closable):
         If librealsense is not installed, or the file is missing, damaged or without depth.
     """
 
-    def __init__(self, path: Path, real_time: bool = False) -> None:
-        rs = librealsense()
-        if not path.is_file():
-            raise CameraError(f"there is no recording {path}")
+    def __init__(self, path: Path, settings: PlaybackSettings | None = None) -> None:
+        super().__init__(settings)
         self.name = f"Recording {path.name}"
+        self._path = path
         self._depth: _Playback | None = None
         self._color: _ColorTrack | None = None
-        try:
-            self._depth = _Playback(rs, path, rs.stream.depth, real_time)
-            color = self._depth.recorded_profile(rs.stream.color)
-            if color is not None:
-                T_C_D = extrinsics_between(self._depth.profile, color)
-                self._color = _ColorTrack(_Playback(rs, path, rs.stream.color, real_time), T_C_D)
-        except RuntimeError as error:
-            self.close()
-            raise CameraError(
-                f"{path} cannot be played as a RealSense recording with depth: {error}"
-            ) from error
-        self.depth_intrinsics = intrinsics_of(self._depth.profile)
-
-    def read(self, timeout_s: float = 1.0) -> Frame:
-        """Return the next frame with depth; see `Camera.read`."""
-        if self._depth is None:
-            raise CameraEndError(f"{self.name} is closed")
-        depth = self._depth.read(timeout_s).get_depth_frame()
-        frame = frame_of(depth, self.depth_intrinsics)
-        return frame if self._color is None else self._color.add_to(frame, depth)
+        if not path.is_file():
+            raise CameraError(f"there is no recording {path}")
+        self._open()
 
     def close(self) -> None:
         """Stop the playback; safe to call twice."""
+        super().close()
+        self._stop()
+
+    def _open(self) -> None:
+        rs = librealsense()
+        try:
+            self._depth = _Playback(rs, self._path, rs.stream.depth)
+            color = self._depth.recorded_profile(rs.stream.color)
+            if color is not None:
+                T_C_D = extrinsics_between(self._depth.profile, color)
+                self._color = _ColorTrack(_Playback(rs, self._path, rs.stream.color), T_C_D)
+            self.depth_intrinsics = intrinsics_of(self._depth.profile)
+        except (CameraError, RuntimeError) as error:
+            self.close()
+            raise CameraError(
+                f"{self._path} cannot be played as a RealSense recording with depth: {error}"
+            ) from error
+
+    def _stop(self) -> None:
         if self._color is not None:
             self._color.playback.close()
         if self._depth is not None:
             self._depth.close()
         self._depth = self._color = None
 
+    def _next(self, timeout_s: float) -> Frame:
+        assert self._depth is not None
+        depth = self._depth.read(timeout_s).get_depth_frame()
+        frame = frame_of(depth, self.depth_intrinsics)
+        return frame if self._color is None else self._color.add_to(frame, depth)
+
+    def _go_to(self, t_camera_ns: int) -> None:
+        assert self._depth is not None
+        self._stop()
+        self._open()
+        self._depth.skip_to(t_camera_ns * 1e-6 - _ROUNDING_MS)
+
 
 class _Playback:
     """One stream of a recording: librealsense's pairing of several loses frames under load."""
 
-    def __init__(self, rs: Any, path: Path, stream: Any, real_time: bool) -> None:
+    def __init__(self, rs: Any, path: Path, stream: Any) -> None:
         self._name = path.name
         self._stopped = rs.playback_status.stopped
+        self._waiting: Any | None = None
         self._pipeline = rs.pipeline()
         config = rs.config()
         config.enable_device_from_file(str(path), repeat_playback=False)
         config.enable_stream(stream)
         self._device = config.resolve(rs.pipeline_wrapper(self._pipeline)).get_device()
         self._playback = self._device.as_playback()
-        self._playback.set_real_time(real_time)  # before it starts, or the first frames go by
+        self._playback.set_real_time(False)  # before it starts, or the first frames go by
         self.profile = self._pipeline.start(config).get_stream(stream)
 
     def recorded_profile(self, stream: Any) -> Any | None:
@@ -110,6 +130,9 @@ class _Playback:
 
     def read(self, timeout_s: float) -> Any:
         """Return the next frame set, of one frame."""
+        if self._waiting is not None:
+            frames, self._waiting = self._waiting, None
+            return frames
         deadline_s = time.monotonic() + timeout_s
         while True:
             ended = self._playback.current_status() == self._stopped
@@ -121,9 +144,19 @@ class _Playback:
             if time.monotonic() > deadline_s:
                 raise CameraTimeoutError(f"recording {self._name}: no frame for {timeout_s:g} s")
 
+    def skip_to(self, t_ms: float) -> None:
+        """Make the first frame at or after a time the next, if there is one."""
+        with suppress(CameraEndError):
+            while self._waiting is None:
+                frames = self.read(_SKIP_TIMEOUT_S)
+                self._waiting = frames if frames.get_timestamp() >= t_ms else None
+
     def close(self) -> None:
         """Stop the pipeline."""
+        ended = self._playback.current_status() == self._stopped
         self._pipeline.stop()
+        if not ended:  # its reading thread goes on for a moment, and must not outlive its objects
+            time.sleep(_SETTLE_S)
 
 
 class _ColorTrack:
@@ -168,7 +201,8 @@ def record_db3(path: Path, frames: Iterable[Frame]) -> int:
     path : Path
         Ends in ``.db3``; written under another name until complete.
     frames : iterable of Frame
-        All of one camera: the same intrinsics, depth scale and extrinsics.
+        All of one camera: the same intrinsics, depth scale and extrinsics. If the first has
+        colour, later ones may lack it.
 
     Returns
     -------
@@ -198,10 +232,7 @@ def record_db3(path: Path, frames: Iterable[Frame]) -> int:
 
 def _record(path: Path, frames: Iterable[Frame]) -> int:
     rs = librealsense()
-    remaining = iter(frames)
-    first = next(remaining, None)
-    if first is None:
-        raise ValueError("there is no frame to record")
+    first, frames = of_one_camera(frames)
     device = rs.software_device()
     outlets = [_Outlet(rs, device, "Stereo Module", rs.stream.depth, first.depth_intrinsics)]
     outlets[0].sensor.add_read_only_option(rs.option.depth_units, first.depth_scale_m)
@@ -216,9 +247,8 @@ def _record(path: Path, frames: Iterable[Frame]) -> int:
         sensor.open(sensor.get_stream_profiles())
         sensor.start(lambda _: None)
     count = written = 0
-    for frame in chain([first], remaining):
-        _check_same_camera(frame, first)
-        for outlet in outlets:
+    for frame in frames:
+        for outlet in outlets if frame.color is not None else outlets[:1]:
             written += outlet.push(frame)
         _wait_for_disk(path, written)
         count += 1
@@ -262,16 +292,6 @@ class _Outlet:
         return image.nbytes
 
 
-def _check_same_camera(frame: Frame, first: Frame) -> None:
-    if (
-        frame.depth_intrinsics != first.depth_intrinsics
-        or frame.color_intrinsics != first.color_intrinsics
-        or frame.depth_scale_m != first.depth_scale_m
-        or not np.array_equal(frame.T_C_D, first.T_C_D)
-    ):
-        raise ValueError(f"frame {frame.index} is not from the camera of the first frame")
-
-
 def _wait_for_disk(path: Path, written: int) -> None:
     """Wait until the recorder, which drops frames over some 250 MB behind, has nearly caught up."""
     deadline_s = time.monotonic() + _DISK_TIMEOUT_S
@@ -282,12 +302,17 @@ def _wait_for_disk(path: Path, written: int) -> None:
 
 
 def _rs_intrinsics(rs: Any, camera: Intrinsics) -> Any:
+    if any(camera.distortion[_COEFFICIENTS:]):
+        raise ValueError(
+            f"librealsense records {_COEFFICIENTS} distortion coefficients, not "
+            f"{len(camera.distortion)}; record into a folder"
+        )
     intrinsics = rs.intrinsics()
     intrinsics.width, intrinsics.height = camera.width, camera.height
     intrinsics.fx, intrinsics.fy = camera.fx, camera.fy
     intrinsics.ppx, intrinsics.ppy = camera.cx, camera.cy
     intrinsics.model = rs.distortion.brown_conrady
-    intrinsics.coeffs = [*camera.distortion, 0.0, 0.0, 0.0, 0.0, 0.0][:5]
+    intrinsics.coeffs = [*camera.distortion, *[0.0] * _COEFFICIENTS][:_COEFFICIENTS]
     return intrinsics
 
 

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.camera.distortion import opencv_distortion
 from handcal.geometry import rigid
 from handcal.types import Float64, Frame, Intrinsics, UInt8
 
@@ -43,15 +44,22 @@ def apart_ms(one: Any, other: Any) -> float:
 
 
 def intrinsics_of(profile: Any) -> Intrinsics:
-    """Return a stream's intrinsics; an inverse distortion, which OpenCV has not, is left out.
+    """Return a stream's intrinsics, distortion included.
 
-    It is zero for the depth of every RealSense camera, and within a pixel or two for colour.
+    Raises
+    ------
+    CameraError
+        If OpenCV has no such lens model.
     """
     camera = profile.as_video_stream_profile().get_intrinsics()
-    is_forward = "inverse" not in str(camera.model)
-    distortion = tuple(camera.coeffs) if is_forward and any(camera.coeffs) else ()
     return Intrinsics(
-        camera.width, camera.height, camera.fx, camera.fy, camera.ppx, camera.ppy, distortion
+        camera.width,
+        camera.height,
+        camera.fx,
+        camera.fy,
+        camera.ppx,
+        camera.ppy,
+        opencv_distortion(camera),
     )
 
 

@@ -49,7 +49,7 @@ class CameraField(QWidget):
     def show_settings(self, settings: StationSettings) -> None:
         """Show the camera of a station."""
         self._source.setCurrentIndex(self._source.findData(settings.source))
-        self._serial.setText(settings.serial)
+        self._serial.setText(settings.realsense.serial)
         self._recording.set_path(settings.recording)
 
     def take(self, settings: StationSettings) -> StationSettings:
@@ -57,6 +57,6 @@ class CameraField(QWidget):
         return replace(
             settings,
             source=self._source.currentData(),
-            serial=self._serial.text().strip(),
+            realsense=replace(settings.realsense, serial=self._serial.text().strip()),
             recording=self._recording.path,
         )

@@ -84,7 +84,7 @@ def test_sizes_must_agree(
     files: tuple[Path, Path, Path], which: int, image: np.ndarray[Any, Any]
 ) -> None:
     write(files[which], np.ascontiguousarray(image))
-    with pytest.raises(FileError, match=r"pixels, but .*intrinsics\.json says 40x30"):
+    with pytest.raises(FileError, match=r"pixels, but its camera's intrinsics say 40x30"):
         read_frame(*files)
 
 

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.camera.settings import RealSenseSettings
 from handcal.doctor import Finding, Health
 from handcal.preflight import PARTS, Part
 from handcal.station_settings import StationSettings
@@ -227,7 +228,7 @@ def test_every_choice_reaches_the_settings(
     assert settings == StationSettings(
         source="recording",
         recording="/Recording",
-        serial="42",
+        realsense=RealSenseSettings(serial="42"),
         headset="network",
         host="192.168.1.2",
         port=50_002,

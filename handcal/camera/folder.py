@@ -1,0 +1,223 @@
+"""Recordings as a folder that any program can read: PNG images, and JSON and CSV beside them.
+
+A folder is whole at any time: a frame is listed once its images are written.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handcal.camera.images import (
+    DEPTH_SCALES_M,
+    intrinsics_from,
+    number_from,
+    read_color,
+    read_depth,
+)
+from handcal.camera.one_camera import of_one_camera
+from handcal.camera.playback import PlaybackSettings, PlayedCamera
+from handcal.errors import CameraEndError, CameraError, FileError
+from handcal.files import make_folder, read_json, read_limited, write_json
+from handcal.geometry import is_rigid
+from handcal.types import Float64, Frame
+
+DESCRIPTION = "recording.json"
+LIST = "frames.csv"
+
+_VERSION = 1
+_COLUMNS = "index,t_camera_ns,has_color"
+_MAX_LIST_BYTES = 8 * 2**20
+_REACH_M = 1.0
+_WRITERS = min(4, os.cpu_count() or 1)
+_MOST_WAITING = 8
+# Little compression: it takes most of the time as it is.
+_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Listed:
+    index: int
+    t_camera_ns: int
+    has_color: bool
+
+
+class FolderCamera(PlayedCamera):
+    """Plays a folder of frames back; implements `Camera`.
+
+    Parameters
+    ----------
+    folder : Path
+        As `record_folder` writes it.
+    settings : PlaybackSettings
+
+    Raises
+    ------
+    CameraError
+        If it is no such folder, or of an unknown version.
+    """
+
+    def __init__(self, folder: Path, settings: PlaybackSettings | None = None) -> None:
+        super().__init__(settings)
+        self.name = f"Recording {folder.name}"
+        self._folder = folder
+        self._place = 0
+        try:
+            self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
+            self._frames = _read_list(folder / LIST)
+        except FileError as error:
+            raise CameraError(str(error)) from error
+
+    def _describe(self, values: dict[str, Any], path: Path) -> None:
+        if values.get("handcal_recording") != _VERSION:
+            raise FileError(f"{path} is no handcal recording of version {_VERSION}")
+        depth, color = values.get("depth"), values.get("color")
+        if not isinstance(depth, dict) or not isinstance(color, dict | None):
+            raise FileError(f"{path} must describe depth and, unless it is null, color")
+        self.depth_intrinsics = intrinsics_from(depth, path)
+        self._color_intrinsics = None if color is None else intrinsics_from(color, path)
+        self._depth_scale_m = number_from(values, path, "depth_scale", *DEPTH_SCALES_M)
+        self._T_C_D = _rigid_from(values.get("T_C_D"), path)
+
+    def _next(self, timeout_s: float) -> Frame:  # noqa: ARG002 (files do not keep one waiting)
+        if self._place == len(self._frames):
+            raise CameraEndError(f"{self.name} has ended")
+        listed = self._frames[self._place]
+        self._place += 1
+        depth_path, color_path = _image_paths(self._folder, self._place)
+        color_camera = self._color_intrinsics if listed.has_color else None
+        try:
+            return Frame(
+                index=listed.index,
+                t_camera_ns=listed.t_camera_ns,
+                t_host_ns=0,
+                depth=read_depth(depth_path, self.depth_intrinsics),
+                depth_scale_m=self._depth_scale_m,
+                depth_intrinsics=self.depth_intrinsics,
+                color=None if color_camera is None else read_color(color_path, color_camera),
+                color_intrinsics=color_camera,
+                T_C_D=np.eye(4) if color_camera is None else self._T_C_D,
+            )
+        except FileError as error:
+            raise CameraError(str(error)) from error
+
+    def _go_to(self, t_camera_ns: int) -> None:
+        later = (i for i, frame in enumerate(self._frames) if frame.t_camera_ns >= t_camera_ns)
+        self._place = next(later, len(self._frames))
+
+
+def record_folder(folder: Path, frames: Iterable[Frame]) -> int:
+    """Record frames of one camera as a folder of images, without loss.
+
+    Parameters
+    ----------
+    folder : Path
+        Created; it must not hold anything yet.
+    frames : iterable of Frame
+        All of one camera: the same intrinsics, depth scale and extrinsics. If the first has
+        colour, later ones may lack it.
+
+    Returns
+    -------
+    int
+        How many frames were recorded.
+
+    Raises
+    ------
+    FileError
+        If the folder holds something, or cannot be written; what is listed in it is whole.
+    ValueError
+        If there is no frame, or frames differ in camera.
+    """
+    first, frames = of_one_camera(frames)
+    make_folder(folder)
+    if any(folder.iterdir()):
+        raise FileError(f"{folder} is not empty; give a new folder")
+    write_json(
+        folder / DESCRIPTION,
+        {
+            "handcal_recording": _VERSION,
+            "depth_scale": first.depth_scale_m,
+            "depth": asdict(first.depth_intrinsics),
+            "color": None if first.color_intrinsics is None else asdict(first.color_intrinsics),
+            "T_C_D": first.T_C_D.tolist(),
+        },
+    )
+    try:
+        return _write_frames(folder, frames)
+    except OSError as error:
+        raise FileError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+def _write_frames(folder: Path, frames: Iterable[Frame]) -> int:
+    """Write images in several threads, as compressing them takes longer than a frame lasts."""
+    number = 0
+    waiting: deque[tuple[Frame, Future[None]]] = deque()
+    with (folder / LIST).open("x", encoding="ascii") as file, ThreadPoolExecutor(_WRITERS) as pool:
+
+        def list_oldest() -> None:
+            frame, written = waiting.popleft()
+            written.result()
+            file.write(f"{frame.index},{frame.t_camera_ns},{int(frame.color is not None)}\n")
+            file.flush()
+
+        file.write(f"{_COLUMNS}\n")
+        for number, frame in enumerate(frames, start=1):
+            waiting.append((frame, pool.submit(_write_images, folder, number, frame)))
+            if len(waiting) > _MOST_WAITING:
+                list_oldest()
+        while waiting:
+            list_oldest()
+    return number
+
+
+def _write_images(folder: Path, number: int, frame: Frame) -> None:
+    depth_path, color_path = _image_paths(folder, number)
+    depth_path.write_bytes(_png(frame.depth))
+    if frame.color is not None:
+        color_path.write_bytes(_png(frame.color[..., ::-1]))
+
+
+def _png(image: NDArray[Any]) -> bytes:
+    _, data = cv2.imencode(".png", image, _PNG)
+    return data.tobytes()
+
+
+def _image_paths(folder: Path, number: int) -> tuple[Path, Path]:
+    """Return where depth and colour of the frame on a line of the list are, from 1."""
+    return folder / f"depth-{number:06}.png", folder / f"color-{number:06}.png"
+
+
+def _read_list(path: Path) -> list[_Listed]:
+    """Read the list of frames; an unfinished last line, as after a crash, is left out."""
+    text = read_limited(path, _MAX_LIST_BYTES).decode("ascii", errors="replace")
+    columns, *lines = text.split("\n")[:-1] or [""]
+    if columns != _COLUMNS:
+        raise FileError(f"{path} must begin with the line {_COLUMNS}")
+    try:
+        return [_listed(*map(int, line.split(","))) for line in lines]
+    except (TypeError, ValueError) as error:
+        raise FileError(f"{path} must hold three whole numbers a line") from error
+
+
+def _listed(index: int, t_camera_ns: int, has_color: int) -> _Listed:
+    return _Listed(index, t_camera_ns, bool(has_color))
+
+
+def _rigid_from(value: object, path: Path) -> Float64:
+    try:
+        T = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        T = np.zeros(0)
+    if T.shape != (4, 4) or not is_rigid(T, _REACH_M):
+        raise FileError(f"{path}: T_C_D must be a rigid transform, 4 rows of 4 numbers")
+    return T

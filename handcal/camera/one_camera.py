@@ -1,0 +1,41 @@
+"""Frames to record must all come from one camera, which a recording describes once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import chain
+
+import numpy as np
+
+from handcal.types import Frame
+
+
+def of_one_camera(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:
+    """Return the first frame, and an iterator over all of them that checks each.
+
+    A frame may lack colour that the first has.
+
+    Raises
+    ------
+    ValueError
+        If there is no frame; from the iterator, if one differs in camera from the first.
+    """
+    remaining = iter(frames)
+    first = next(remaining, None)
+    if first is None:
+        raise ValueError("there is no frame to record")
+    return first, chain([first], (_checked(frame, first) for frame in remaining))
+
+
+def _checked(frame: Frame, first: Frame) -> Frame:
+    has_same_depth = (
+        frame.depth_intrinsics == first.depth_intrinsics
+        and frame.depth_scale_m == first.depth_scale_m
+    )
+    has_same_color = frame.color is None or (
+        frame.color_intrinsics == first.color_intrinsics
+        and np.array_equal(frame.T_C_D, first.T_C_D)
+    )
+    if not has_same_depth or not has_same_color:
+        raise ValueError(f"frame {frame.index} is not from the camera of the first frame")
+    return frame

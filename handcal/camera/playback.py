@@ -1,0 +1,112 @@
+"""What all recordings have in common: their pace, seeking, and starting over."""
+
+from __future__ import annotations
+
+import time
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+
+from handcal.closable import Closable
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.types import Frame, Intrinsics
+
+_LATE_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class PlaybackSettings:
+    """How a recording is played.
+
+    Attributes
+    ----------
+    real_time : bool
+        At the pace it was recorded at, dropping what is read too late; otherwise every frame, as
+        fast as it is read.
+    loop : bool
+        Begin again at the end; index and time of the frames then go back.
+    """
+
+    real_time: bool = False
+    loop: bool = False
+
+
+class PlayedCamera(Closable):
+    """Base of cameras that play a recording; implements `Camera.read`.
+
+    A subclass reads the frames one after the other, and goes to one of them by its time.
+    """
+
+    name: str
+    depth_intrinsics: Intrinsics
+
+    def __init__(self, settings: PlaybackSettings | None) -> None:
+        self._settings = settings or PlaybackSettings()
+        self._waiting: Frame | None = None
+        self._begin_ns: int | None = None
+        self._host_less_camera_ns: int | None = None
+        self._is_open = True
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        """Return the next frame; see `Camera.read`."""
+        if not self._is_open:
+            raise CameraError(f"{self.name} is closed; open it again")
+        deadline_s = time.monotonic() + timeout_s
+        frame = self._take(timeout_s)
+        if self._settings.real_time:
+            while self._early_s(frame) < -_LATE_S and time.monotonic() < deadline_s:
+                frame = self._take(timeout_s)
+            early_s, left_s = self._early_s(frame), max(0.0, deadline_s - time.monotonic())
+            if early_s > left_s:
+                self._waiting = frame
+                time.sleep(left_s)
+                raise CameraTimeoutError(f"{self.name}: the next frame is not due yet")
+            time.sleep(max(0.0, early_s))
+        return replace(frame, t_host_ns=time.monotonic_ns())
+
+    def seek(self, position_s: float) -> None:
+        """Make the first frame at or after a time since the recording's first frame the next one.
+
+        Beyond the end there is none.
+        """
+        if not self._is_open:
+            raise CameraError(f"{self.name} is closed; open it again")
+        if self._begin_ns is None:
+            self._take(1.0)
+        assert self._begin_ns is not None
+        self._waiting = None
+        self._host_less_camera_ns = None
+        self._go_to(self._begin_ns + round(1e9 * position_s))
+
+    def close(self) -> None:
+        """Stop playing; safe to call twice."""
+        self._is_open = False
+
+    @abstractmethod
+    def _next(self, timeout_s: float) -> Frame:
+        """Return the next frame of the recording, or raise CameraEndError after the last."""
+
+    @abstractmethod
+    def _go_to(self, t_camera_ns: int) -> None:
+        """Make the first frame at or after a time the next one."""
+
+    def _take(self, timeout_s: float) -> Frame:
+        """Return the frame kept waiting, or the next, which may be the first again."""
+        frame, self._waiting = self._waiting, None
+        try:
+            frame = frame or self._next(timeout_s)
+        except CameraEndError:
+            if not self._settings.loop or self._begin_ns is None:
+                raise
+            self._host_less_camera_ns = None
+            self._go_to(self._begin_ns)
+            frame = self._next(timeout_s)
+        if self._begin_ns is None:
+            self._begin_ns = frame.t_camera_ns
+        return frame
+
+    def _early_s(self, frame: Frame) -> float:
+        """Return how long it is until a frame is due, from the first one read at this pace."""
+        now_ns = time.monotonic_ns()
+        if self._host_less_camera_ns is None:
+            self._host_less_camera_ns = now_ns - frame.t_camera_ns
+        return (frame.t_camera_ns + self._host_less_camera_ns - now_ns) * 1e-9

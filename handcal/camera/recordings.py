@@ -1,0 +1,35 @@
+"""Recordings of either kind, librealsense's file or handcal's folder, played and made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from handcal.camera.folder import FolderCamera, record_folder
+from handcal.camera.playback import PlaybackSettings, PlayedCamera
+from handcal.camera.recording import RecordingCamera, record_db3
+from handcal.types import Frame
+
+
+def open_recording(path: Path, settings: PlaybackSettings | None = None) -> PlayedCamera:
+    """Return a camera that plays a ``.db3`` or ``.bag`` file, or a folder of images.
+
+    Raises
+    ------
+    CameraError
+        If it cannot be played.
+    """
+    return FolderCamera(path, settings) if path.is_dir() else RecordingCamera(path, settings)
+
+
+def record_frames(path: Path, frames: Iterable[Frame]) -> int:
+    """Record frames as `path` says, a ``.db3`` file or else a folder; return how many they were.
+
+    Raises
+    ------
+    CameraError, FileError
+        If it cannot be written.
+    ValueError
+        If there is no frame, or they are not all of one camera.
+    """
+    return record_folder(path, frames) if path.suffix == "" else record_db3(path, frames)

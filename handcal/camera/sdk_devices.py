@@ -1,0 +1,146 @@
+"""The RealSense SDK itself, and what it says of the devices plugged in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from handcal.camera.usb import explain_absence
+from handcal.errors import CameraError
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """A RealSense device as the SDK lists it; what it does not tell is empty.
+
+    Attributes
+    ----------
+    name, serial, firmware : str
+    usb : str
+        As in "3.2".
+    recommended_firmware : str
+        What this version of the SDK is tested with.
+    temperature_c : float or None
+        Of its processor; None if not told.
+    """
+
+    name: str
+    serial: str
+    firmware: str
+    usb: str
+    recommended_firmware: str = ""
+    temperature_c: float | None = None
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether it is connected by USB 2, too slow for 1280x720 at 30 Hz."""
+        return self.usb.startswith("2")
+
+    @property
+    def has_old_firmware(self) -> bool:
+        """Whether its firmware is older than the SDK recommends."""
+        installed, recommended = map(_numbers, (self.firmware, self.recommended_firmware))
+        return bool(installed) and installed < recommended
+
+
+def librealsense() -> Any:
+    """Return the module pyrealsense2.
+
+    Raises
+    ------
+    CameraError
+        If it is not installed.
+    """
+    try:
+        import pyrealsense2  # imported late: absent on macOS
+    except ImportError as error:
+        raise CameraError(
+            "RealSense cameras and recordings need librealsense: pip install pyrealsense2 "
+            "(no package exists for macOS)"
+        ) from error
+    return pyrealsense2
+
+
+def sdk_devices() -> list[Any]:
+    """Return the SDK's own handles of the devices plugged in, without opening any.
+
+    Raises
+    ------
+    CameraError
+        If the SDK is missing or cannot look.
+    """
+    try:
+        return _query()
+    except RuntimeError as error:
+        raise CameraError(
+            f"the RealSense SDK cannot list devices: {error}; plug the camera into a USB 3 port "
+            "of the computer itself, as others may give too little power"
+        ) from error
+
+
+def _query() -> list[Any]:
+    return list(librealsense().context().query_devices())
+
+
+def connected_devices() -> list[Device]:
+    """Return the devices plugged in, without opening any.
+
+    Raises
+    ------
+    CameraError
+        If the SDK is missing or cannot look.
+    """
+    return [describe_device(device) for device in sdk_devices()]
+
+
+def describe_device(device: Any) -> Device:
+    """Return what a device of the SDK tells of itself, as far as it answers."""
+    rs = librealsense()
+    info = rs.camera_info
+
+    def ask(what: Any) -> str:
+        with suppress(RuntimeError):  # it may be unplugged just now
+            return str(device.get_info(what)) if device.supports(what) else ""
+        return ""
+
+    return Device(
+        ask(info.name),
+        ask(info.serial_number),
+        ask(info.firmware_version),
+        ask(info.usb_type_descriptor),
+        ask(info.recommended_firmware_version),
+        _temperature_c(rs, device),
+    )
+
+
+def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
+    """Return the device with a serial number, or the first.
+
+    Raises
+    ------
+    CameraError
+        If it is not among them.
+    """
+    if not devices:
+        raise CameraError(explain_absence())
+    for device in devices:
+        if serial in ("", device.serial):
+            return device
+    there = ", ".join(f"{device.name} {device.serial}" for device in devices)
+    raise CameraError(f"the RealSense with serial {serial} is not connected; there is {there}")
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return "5.16.0.1" as (5, 16, 0, 1); empty if it is not of that form."""
+    parts = version.split(".")
+    return tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else ()
+
+
+def _temperature_c(rs: Any, device: Any) -> float | None:
+    with suppress(RuntimeError):  # some tell it only while they stream
+        for sensor in device.query_sensors():
+            if sensor.supports(rs.option.asic_temperature):
+                return float(sensor.get_option(rs.option.asic_temperature))
+    return None

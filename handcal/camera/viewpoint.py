@@ -1,0 +1,169 @@
+"""The camera put where the wearer's eye will be, for the offline calibration."""
+
+from __future__ import annotations
+
+import sys
+import time
+from abc import abstractmethod
+from contextlib import suppress
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from handcal.closable import Closable
+from handcal.errors import CameraEndError, CameraError, FileError
+from handcal.image_file import MAX_SIDE_PX, read_image
+from handcal.types import UInt8
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+_BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_DSHOW, "darwin": cv2.CAP_AVFOUNDATION}
+_MOST_CAMERAS = 10
+
+
+class ViewpointCamera(Closable):
+    """Colour images one after the other; opened by `open_viewpoint`.
+
+    Attributes
+    ----------
+    name : str
+    """
+
+    name: str
+
+    @abstractmethod
+    def read(self) -> tuple[UInt8, int]:
+        """Return the next image, and when it was taken.
+
+        Returns
+        -------
+        image : (H, W, 3) uint8
+            RGB.
+        t_ns : int
+            The host's monotonic time for a camera and for images from a folder, both when read;
+            for a video its own time from the beginning.
+
+        Raises
+        ------
+        CameraEndError
+            After the last image of a folder or video.
+        CameraError
+            If the camera was closed or unplugged, or an image cannot be read.
+        """
+
+
+def open_viewpoint(source: int | Path, size_px: tuple[int, int] | None = None) -> ViewpointCamera:
+    """Return the viewpoint camera that `source` names.
+
+    Parameters
+    ----------
+    source : int or Path
+        A camera's number in the operating system (V4L2, DirectShow, AVFoundation), a folder of
+        PNG and JPEG images, which come by name, or a video file.
+    size_px : (int, int), optional
+        Width and height asked of a camera; what it delivers may differ.
+
+    Raises
+    ------
+    CameraError
+        If there is nothing of the kind, or it is in use.
+    """
+    if isinstance(source, int):
+        return _Device(source, size_px)
+    return _Images(source) if source.is_dir() else _Video(source)
+
+
+def list_viewpoints() -> list[int]:
+    """Return the numbers of the cameras that can be opened now; each is opened for a moment."""
+    found = []
+    for number in range(_MOST_CAMERAS):
+        with suppress(CameraError), open_viewpoint(number):
+            found.append(number)
+    return found
+
+
+class _Images(ViewpointCamera):
+    def __init__(self, folder: Path) -> None:
+        self.name = f"Images in {folder.name}"
+        paths = (path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
+        self._remaining: list[Path] | None = sorted(paths, reverse=True)
+        if not self._remaining:
+            raise CameraError(f"{folder} holds no PNG or JPEG image")
+
+    def read(self) -> tuple[UInt8, int]:
+        if self._remaining is None:
+            raise CameraError(f"{self.name}: this camera is closed; open it again")
+        if not self._remaining:
+            raise CameraEndError(f"{self.name}: that was the last")
+        path = self._remaining.pop()
+        try:
+            image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+        except FileError as error:
+            raise CameraError(str(error)) from error
+        return image, time.monotonic_ns()
+
+    def close(self) -> None:
+        self._remaining = None
+
+
+class _Capture(ViewpointCamera):
+    """What OpenCV captures."""
+
+    def __init__(self, name: str, capture: cv2.VideoCapture) -> None:
+        self.name = name
+        self._capture = capture
+
+    def close(self) -> None:
+        self._capture.release()
+
+    def _read(self) -> UInt8 | None:
+        if not self._capture.isOpened():
+            raise CameraError(f"{self.name}: this camera is closed; open it again")
+        is_read, image = self._capture.read()
+        return np.ascontiguousarray(image[..., ::-1], np.uint8) if is_read else None
+
+
+class _Device(_Capture):
+    def __init__(self, number: int, size_px: tuple[int, int] | None) -> None:
+        if not _is_listed(number):
+            raise CameraError(f"there is no camera {number}; plug it in, or give another number")
+        capture = cv2.VideoCapture(number, _BACKENDS.get(sys.platform, cv2.CAP_ANY))
+        super().__init__(f"Camera {number}", capture)
+        if not capture.isOpened():
+            raise CameraError(f"camera {number} cannot be opened; close other programs that use it")
+        if size_px is not None:
+            capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
+            capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # the newest image, not one that waited
+
+    def read(self) -> tuple[UInt8, int]:
+        image = self._read()
+        if image is None:
+            raise CameraError(f"{self.name} gives no image; plug it in again")
+        return image, time.monotonic_ns()
+
+
+class _Video(_Capture):
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise CameraError(f"there is no video {path}")
+        capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        super().__init__(f"Video {path.name}", capture)
+        if not capture.isOpened():
+            raise CameraError(f"{path} is no video that OpenCV can play")
+        sides = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        if max(capture.get(side) for side in sides) > MAX_SIDE_PX:
+            self.close()
+            raise CameraError(f"{path} has images larger than {MAX_SIDE_PX} px")
+
+    def read(self) -> tuple[UInt8, int]:
+        image = self._read()
+        if image is None:
+            raise CameraEndError(f"{self.name}: that was the last")
+        return image, round(1e6 * self._capture.get(cv2.CAP_PROP_POS_MSEC))
+
+
+def _is_listed(number: int) -> bool:
+    """Tell whether Linux lists a camera; asking OpenCV for one that is absent prints warnings."""
+    return sys.platform != "linux" or Path(f"/dev/video{number}").exists()

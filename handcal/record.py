@@ -1,0 +1,173 @@
+"""Record what any camera sees, until told to stop."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from handcal.camera.camera import Camera
+from handcal.camera.recordings import record_frames
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.files import make_folder
+from handcal.types import Frame
+
+_POLL_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class RecordSettings:
+    """When a recording ends by itself.
+
+    Attributes
+    ----------
+    duration_s : float
+        By the camera's time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute.
+    frames : int
+    silent_s : float
+        A camera silent for so long has ended.
+    free_bytes : int
+        Left free on the disk.
+    lead_frames : int
+        So many frames at most are left out at the beginning, until one has colour: cameras pair
+        their first images badly.
+    """
+
+    duration_s: float = 60.0
+    frames: int = 100_000
+    silent_s: float = 5.0
+    free_bytes: int = 2**30
+    lead_frames: int = 30
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What was recorded.
+
+    Attributes
+    ----------
+    frames : int
+    dropped : int
+        Frames missing in between by the camera's own count.
+    duration_s : float
+        From the first to the last frame, by the camera's time.
+    stop_reason : str
+    """
+
+    frames: int
+    dropped: int
+    duration_s: float
+    stop_reason: str
+
+
+def record(
+    camera: Camera,
+    path: Path,
+    settings: RecordSettings,
+    report: Callable[[str, float], None],
+    is_stopped: Callable[[], bool],
+) -> Recorded:
+    """Record a camera until it ends or fails, a limit is reached, or it is stopped.
+
+    Whatever ends it, what was recorded by then is kept.
+
+    Parameters
+    ----------
+    camera : Camera
+        Stays open.
+    path : Path
+        A ``.db3`` file, which replaces another once complete, or a new folder.
+    settings : RecordSettings
+    report : callable
+        Given what is being done and the share done, for every frame.
+    is_stopped : callable
+        Asked for every frame.
+
+    Raises
+    ------
+    CameraError
+        If the camera gives no frame at all, or librealsense cannot write the file.
+    FileError
+        If the folder is not empty or cannot be written.
+    ValueError
+        If `path` has another suffix than ``.db3``, or the camera changes.
+    """
+    take = _Take(camera, make_folder(path.absolute().parent), settings, report, is_stopped)
+    first = next(take.frames, None)
+    if first is None:
+        raise CameraError(f"nothing was recorded: {take.stop_reason}")
+    count = record_frames(path, chain([first], take.frames))
+    return Recorded(count, take.dropped, take.duration_s, take.stop_reason)
+
+
+class _Take:
+    """The frames of one recording, and what is to be said of them."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        disk: Path,
+        settings: RecordSettings,
+        report: Callable[[str, float], None],
+        is_stopped: Callable[[], bool],
+    ) -> None:
+        self.stop_reason = ""
+        self.dropped = 0
+        self.duration_s = 0.0
+        self.frames = self._until_limit(self._from_first_color(self._live(camera)))
+        self._disk = disk
+        self._settings = settings
+        self._report = report
+        self._is_stopped = is_stopped
+
+    def _live(self, camera: Camera) -> Iterator[Frame]:
+        """Yield frames until the camera ends or the recording is stopped."""
+        heard_s = time.monotonic()
+        while not self._is_stopped():
+            try:
+                frame = camera.read(_POLL_S)
+            except CameraTimeoutError as error:
+                if time.monotonic() - heard_s > self._settings.silent_s:
+                    self.stop_reason = str(error)
+                    return
+            except CameraEndError:
+                self.stop_reason = "the recording played has ended"
+                return
+            except CameraError as error:
+                self.stop_reason = str(error)
+                return
+            else:
+                heard_s = time.monotonic()
+                yield frame
+        self.stop_reason = "stopped"
+
+    def _from_first_color(self, frames: Iterator[Frame]) -> Iterator[Frame]:
+        """Begin with a frame that has colour; with the very first if none of the next has."""
+        lead: list[Frame] = []
+        for frame in frames:
+            lead = [frame] if frame.color is not None else [*lead, frame]
+            if frame.color is not None or len(lead) > self._settings.lead_frames:
+                break
+        yield from lead
+        yield from frames
+
+    def _until_limit(self, frames: Iterator[Frame]) -> Iterator[Frame]:
+        settings = self._settings
+        first = last = None
+        for count, frame in enumerate(frames, start=1):
+            first, previous, last = first or frame, last or frame, frame
+            self.dropped += max(0, frame.index - previous.index - 1)
+            self.duration_s = (frame.t_camera_ns - first.t_camera_ns) * 1e-9
+            share = max(self.duration_s / settings.duration_s, count / settings.frames)
+            self._report("recording", min(1.0, share))
+            yield frame
+            if share >= 1.0:
+                self.stop_reason = "as long as asked for"
+            elif shutil.disk_usage(self._disk).free < settings.free_bytes:
+                self.stop_reason = "the disk is nearly full"
+            else:
+                continue
+            return

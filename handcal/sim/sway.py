@@ -1,0 +1,23 @@
+"""A hand held up before a camera that stands still: a scene that needs no headset."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from handcal.geometry import rigid
+from handcal.sim.scene import SceneState
+
+_SWAY_M = 0.03
+_SWAY_RAD = 0.1
+_PERIOD_S = 4.0
+
+
+def swaying_hand() -> SceneState:
+    """Return the scene as it is now: 0.5 m away, the hand sways 3 cm sideways and turns by 6°."""
+    t_ns = time.monotonic_ns()
+    swing = math.sin(2.0 * math.pi * (t_ns * 1e-9 % _PERIOD_S) / _PERIOD_S)
+    T_W_hand = rigid([0.1, 0.1, _SWAY_RAD * swing], [_SWAY_M * swing, 0.02, 0.5])
+    return SceneState(t_ns, np.eye(4), T_W_hand)

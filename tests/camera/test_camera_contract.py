@@ -1,0 +1,96 @@
+"""What every camera keeps to, whatever is behind it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import pytest
+
+from handcal.camera.camera import Camera
+from handcal.camera.realsense import RealSenseCamera
+from handcal.camera.recordings import open_recording, record_frames
+from handcal.camera.synthetic import SyntheticCamera
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World
+from handcal.sim.room import RoomSettings, make_room
+from handcal.sim.sway import swaying_hand
+from handcal.types import Frame, Intrinsics
+
+COUNT = 6
+KINDS = ("simulator", "realsense", "folder", "recording")
+OpenCamera: TypeAlias = Callable[[], Camera]
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return World(make_hand(1), make_room(0, RoomSettings(texel_m=0.02)))
+
+
+@pytest.fixture(params=KINDS)
+def open_camera(
+    request: pytest.FixtureRequest,
+    world: World,
+    plug_in: Callable[..., Any],
+    make_frames: Callable[..., Iterator[Frame]],
+    tmp_path: Path,
+) -> OpenCamera:
+    match request.param:
+        case "simulator":
+            small = Intrinsics(width=320, height=180, fx=251.0, fy=251.0, cx=159.5, cy=89.5)
+            return lambda: SyntheticCamera(world, swaying_hand, depth_intrinsics=small)
+        case "realsense":
+            plug_in(sizes=((848, 480),))
+            return RealSenseCamera
+        case kind:
+            path = tmp_path / ("made" if kind == "folder" else "made.db3")
+            record_frames(path, make_frames(COUNT))
+            return lambda: open_recording(path)
+
+
+def test_frames_come_in_order_with_both_clocks(open_camera: OpenCamera) -> None:
+    before_ns = time.monotonic_ns()
+    with open_camera() as camera:
+        frames = [camera.read(5.0) for _ in range(COUNT)]
+        assert camera.name
+        assert {frame.depth_intrinsics for frame in frames} == {camera.depth_intrinsics}
+    for clock in ("index", "t_camera_ns", "t_host_ns"):
+        times = [getattr(frame, clock) for frame in frames]
+        assert (np.diff(times) > 0).all(), clock
+    assert before_ns < frames[0].t_host_ns
+    assert frames[-1].t_host_ns < time.monotonic_ns()
+
+
+def test_frames_show_something_and_keep_it(open_camera: OpenCamera) -> None:
+    with open_camera() as camera:
+        first = camera.read(5.0)
+        copy = first.depth.copy()
+        later = [camera.read(5.0) for _ in range(COUNT - 1)]
+    assert first.depth.any()
+    np.testing.assert_array_equal(first.depth, copy)  # though the camera went on, and was closed
+    assert not np.array_equal(first.depth, later[-1].depth)
+    assert 1e-5 < first.depth_scale_m < 1e-2
+    with_color = [frame for frame in [first, *later] if frame.color is not None]
+    assert with_color
+    for frame in with_color:
+        assert np.linalg.det(frame.T_C_D[:3, :3]) == pytest.approx(1.0, abs=1e-5)
+        assert np.linalg.norm(frame.T_C_D[:3, 3]) < 0.1
+
+
+def test_a_camera_is_closed_once_and_for_all(open_camera: OpenCamera) -> None:
+    with open_camera() as camera:
+        camera.read(5.0)
+    camera.close()
+    with pytest.raises(CameraError, match="is closed; open it again") as raised:
+        camera.read(0.1)
+    assert not isinstance(raised.value, CameraTimeoutError | CameraEndError)
+
+
+def test_a_camera_can_be_opened_again(open_camera: OpenCamera) -> None:
+    for _ in range(2):
+        with open_camera() as camera:
+            assert camera.read(5.0).depth.any()

@@ -1,0 +1,141 @@
+"""Recordings as folders: exact, whole at any time, and refused when they are not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.camera.folder import DESCRIPTION, LIST, FolderCamera, record_folder
+from handcal.errors import CameraEndError, CameraError, FileError
+from handcal.types import Frame
+
+MakeFrames = Callable[..., Iterator[Frame]]
+
+
+def read_all(camera: FolderCamera) -> Iterator[Frame]:
+    while True:
+        try:
+            yield camera.read()
+        except CameraEndError:
+            return
+
+
+@pytest.fixture
+def folder(tmp_path: Path, make_frames: MakeFrames) -> Path:
+    path = tmp_path / "deep" / "hand"
+    assert record_folder(path, make_frames(12)) == 12
+    return path
+
+
+@pytest.mark.parametrize("with_color", [True, False])
+def test_a_folder_plays_back_exactly_what_was_recorded(
+    tmp_path: Path, make_frames: MakeFrames, with_color: bool
+) -> None:
+    recorded = list(make_frames(12, with_color))
+    recorded[5] = replace(recorded[5], color=None, color_intrinsics=None, T_C_D=np.eye(4))
+    record_folder(tmp_path / "hand", recorded)
+    with FolderCamera(tmp_path / "hand") as camera:
+        assert camera.depth_intrinsics == recorded[0].depth_intrinsics
+        for got, want in zip(read_all(camera), recorded, strict=True):
+            for name in ("index", "t_camera_ns", "depth_scale_m", "color_intrinsics"):
+                assert getattr(got, name) == getattr(want, name)
+            assert got.depth_intrinsics == want.depth_intrinsics
+            np.testing.assert_array_equal(got.depth, want.depth)
+            np.testing.assert_array_equal(got.T_C_D, want.T_C_D)
+            if want.color is None:
+                assert got.color is None
+            else:
+                np.testing.assert_array_equal(got.color, want.color)
+
+
+def test_frames_before_a_failure_are_kept(tmp_path: Path, make_frames: MakeFrames) -> None:
+    def failing() -> Iterator[Frame]:
+        yield from make_frames(12)
+        raise RuntimeError("the program is killed")
+
+    with pytest.raises(RuntimeError, match="killed"):
+        record_folder(tmp_path / "hand", failing())
+    with FolderCamera(tmp_path / "hand") as camera:
+        assert 3 <= len(list(read_all(camera))) <= 12
+
+
+def test_an_unfinished_line_is_left_out(folder: Path) -> None:
+    listing = folder / LIST
+    listing.write_bytes(listing.read_bytes()[:-3])
+    with FolderCamera(folder) as camera:
+        assert len(list(read_all(camera))) == 11
+
+
+def test_nothing_is_written_over(folder: Path, make_frames: MakeFrames) -> None:
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(FileError, match="is not empty; give a new folder"):
+        record_folder(folder, make_frames(1))
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "problem"),
+    [
+        ("handcal_recording", 2, "is no handcal recording of version 1"),
+        ("depth", None, "must describe depth"),
+        ("color", [], "must describe depth and"),
+        ("depth_scale", 0, "depth_scale is 0"),
+        ("T_C_D", [[1.0]], "must be a rigid transform"),
+        ("T_C_D", "here", "must be a rigid transform"),
+        ("T_C_D", np.diag([2.0, 1.0, 1.0, 1.0]).tolist(), "must be a rigid transform"),
+    ],
+)
+def test_a_nonsense_description_is_refused(
+    folder: Path, key: str, value: object, problem: str
+) -> None:
+    path = folder / DESCRIPTION
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(CameraError, match=problem):
+        FolderCamera(folder)
+
+
+@pytest.mark.parametrize("distortion", [[1.0], "none", [0.1, 0.1, 0.1, float("inf")], [1e9] * 4])
+def test_nonsense_distortion_is_refused(folder: Path, distortion: Any) -> None:
+    path = folder / DESCRIPTION
+    values = json.loads(path.read_text())
+    values["depth"]["distortion"] = distortion
+    path.write_text(json.dumps(values))
+    with pytest.raises(CameraError, match=r"recording\.json.*distortion"):
+        FolderCamera(folder)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "index\n1\n",
+        "index,t_camera_ns,has_color\n1,2\n",
+        "index,t_camera_ns,has_color\nx,2,1\n",
+    ],
+)
+def test_a_nonsense_list_is_refused(folder: Path, text: str) -> None:
+    (folder / LIST).write_text(text)
+    with pytest.raises(CameraError, match=r"frames\.csv must"):
+        FolderCamera(folder)
+
+
+def test_a_missing_or_foreign_image_is_named(folder: Path) -> None:
+    (folder / "depth-000001.png").unlink()
+    (folder / "color-000002.png").write_bytes((folder / "depth-000002.png").read_bytes())
+    with FolderCamera(folder) as camera:
+        with pytest.raises(CameraError, match=r"cannot read .*depth-000001\.png"):
+            camera.read()
+        with pytest.raises(CameraError, match=r"color-000002\.png is 64x48 pixels"):
+            camera.read()
+        assert camera.read().index == 3
+
+
+def test_no_folder_is_no_recording(tmp_path: Path) -> None:
+    with pytest.raises(CameraError, match=r"cannot read .*recording\.json"):
+        FolderCamera(tmp_path)

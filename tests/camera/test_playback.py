@@ -1,0 +1,88 @@
+"""Pace, seeking and starting over, the same for both kinds of recording."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from handcal.camera.playback import PlaybackSettings
+from handcal.camera.recordings import open_recording, record_frames
+from handcal.errors import CameraEndError, CameraTimeoutError
+from handcal.types import Frame
+
+COUNT = 20
+PERIOD_S = 0.033
+
+
+@pytest.fixture(params=["recording", "recording.db3"])
+def path(
+    request: pytest.FixtureRequest, tmp_path: Path, make_frames: Callable[..., Iterator[Frame]]
+) -> Path:
+    if request.param.endswith(".db3"):
+        pytest.importorskip("pyrealsense2")
+    made: Path = tmp_path / request.param
+    assert record_frames(made, make_frames(COUNT)) == COUNT
+    return made
+
+
+def test_every_frame_comes_as_fast_as_it_is_read(path: Path) -> None:
+    with open_recording(path) as camera:
+        time.sleep(0.1)  # which loses none
+        assert [camera.read().index for _ in range(COUNT)] == list(range(1, COUNT + 1))
+        for _ in range(2):
+            with pytest.raises(CameraEndError, match="has ended"):
+                camera.read()
+
+
+def test_in_real_time_frames_keep_their_distance(path: Path) -> None:
+    with open_recording(path, PlaybackSettings(real_time=True)) as camera:
+        frames = [camera.read()]
+        while frames[-1].index < COUNT:
+            frames.append(camera.read())
+    first, last = frames[0], frames[-1]
+    assert (last.t_host_ns - first.t_host_ns) * 1e-9 > 0.99 * PERIOD_S * (COUNT - 1)
+
+
+def test_in_real_time_what_is_read_too_late_is_dropped(path: Path) -> None:
+    with open_recording(path, PlaybackSettings(real_time=True)) as camera:
+        assert camera.read().index == 1
+        time.sleep(8 * PERIOD_S)
+        assert camera.read(5.0).index > 6
+
+
+def test_in_real_time_a_frame_not_yet_due_is_waited_for(path: Path) -> None:
+    with open_recording(path, PlaybackSettings(real_time=True)) as camera:
+        camera.read()
+        camera.seek(0.0)
+        assert camera.read().index == 1
+        with pytest.raises(CameraTimeoutError, match="not due yet"):
+            deque(iter(lambda: camera.read(0.001), None))
+        assert camera.read().index in range(2, COUNT)
+
+
+def test_seeking_goes_to_the_first_frame_from_there_on(path: Path) -> None:
+    with open_recording(path) as camera:
+        camera.seek(10 * PERIOD_S)
+        frames = [camera.read(), camera.read()]
+        assert [frame.index for frame in frames] == [11, 12]
+        assert all(frame.color is not None for frame in frames)
+        camera.seek(4.5 * PERIOD_S)
+        assert camera.read().index == 6
+        camera.seek(0.0)
+        assert camera.read().index == 1
+        camera.seek(COUNT * PERIOD_S)
+        with pytest.raises(CameraEndError):
+            camera.read()
+        camera.seek(0.0)
+        assert camera.read().index == 1
+
+
+def test_a_loop_begins_again(path: Path) -> None:
+    with open_recording(path, PlaybackSettings(loop=True)) as camera:
+        frames = [camera.read() for _ in range(2 * COUNT + 1)]
+    assert [frame.index for frame in frames] == [*range(1, COUNT + 1)] * 2 + [1]
+    assert all(frame.color is not None for frame in frames)

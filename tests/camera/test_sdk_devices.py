@@ -1,0 +1,74 @@
+"""What devices tell of themselves, told by a software device; no camera is attached."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from handcal.camera import sdk_devices
+from handcal.camera.sdk_devices import Device, choose_device, connected_devices, librealsense
+from handcal.errors import CameraError
+
+D415 = Device("Intel RealSense D415", "123", "5.16.0.1", "3.2", temperature_c=41.0)
+
+
+def test_devices_are_described_by_what_they_tell(plug_in: Callable[..., Any]) -> None:
+    assert connected_devices() == []
+    plug_in()
+    plug_in(about={"serial_number": "4", "recommended_firmware_version": "5.17.0.10"})
+    assert connected_devices() == [
+        D415,
+        replace(D415, serial="4", recommended_firmware="5.17.0.10"),
+    ]
+
+
+def test_the_installed_sdk_can_look() -> None:
+    pytest.importorskip("pyrealsense2")
+    assert all(isinstance(device, Device) for device in connected_devices())
+
+
+def test_a_failing_sdk_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> list[Any]:
+        raise RuntimeError("failed to set power state")
+
+    monkeypatch.setattr(sdk_devices, "_query", fail)
+    with pytest.raises(CameraError, match="cannot list devices: failed to set power state; plug"):
+        connected_devices()
+
+
+def test_a_missing_sdk_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyrealsense2", None)
+    with pytest.raises(CameraError, match="pip install pyrealsense2"):
+        librealsense()
+    with pytest.raises(CameraError, match="pip install pyrealsense2"):
+        connected_devices()
+
+
+@pytest.mark.parametrize(
+    ("firmware", "recommended", "is_old"),
+    [
+        ("5.9.15.1", "5.16.0.1", True),
+        ("5.16.0.1", "5.16.0.1", False),
+        ("5.17.0.10", "5.17.0.9", False),
+        ("5.16.0.1", "", False),
+        ("", "5.16.0.1", False),
+        ("unknown", "5.16.0.1", False),
+    ],
+)
+def test_old_firmware_is_known_by_its_number(firmware: str, recommended: str, is_old: bool) -> None:
+    device = replace(D415, firmware=firmware, recommended_firmware=recommended)
+    assert device.has_old_firmware is is_old
+
+
+def test_the_first_device_or_the_one_asked_for_is_chosen() -> None:
+    other = replace(D415, serial="999")
+    assert choose_device([D415, other]) == D415
+    assert choose_device([D415, other], "999") == other
+    with pytest.raises(CameraError, match=r"serial 7 is not connected; there is .*D415 123, "):
+        choose_device([D415, other], "7")
+    with pytest.raises(CameraError, match="RealSense"):
+        choose_device([])

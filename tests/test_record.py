@@ -1,0 +1,138 @@
+"""Recording any camera: when it ends, and that what there is by then is kept."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.camera.recordings import open_recording
+from handcal.closable import Closable
+from handcal.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
+from handcal.record import Recorded, RecordSettings, record
+from handcal.types import Frame, Intrinsics
+
+CAMERA = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)
+SETTINGS = RecordSettings(silent_s=0.1, free_bytes=0)
+PALE = "a frame without colour"
+UNPLUGGED = CameraError("the camera was unplugged; plug it in again")
+
+
+class Scripted(Closable):
+    """Gives what its script says: a frame for a number, and silence at the end."""
+
+    name = "Scripted camera"
+    depth_intrinsics = CAMERA
+
+    def __init__(self, script: Sequence[int | str | Exception]) -> None:
+        self.script = list(script)
+        self.number = 0
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        step = self.script.pop(0) if self.script else CameraTimeoutError("no frame came")
+        if isinstance(step, Exception):
+            time.sleep(0.05)
+            raise step
+        self.number = step if isinstance(step, int) else self.number + 1
+        color = np.full((12, 16, 3), self.number, np.uint8)
+        depth = np.full((12, 16), self.number, np.uint16)
+        frame = Frame(self.number, self.number * 100_000_000, 0, depth, 1e-3, CAMERA, color, CAMERA)
+        return frame if step != PALE else replace(frame, color=None, color_intrinsics=None)
+
+    def close(self) -> None:
+        pass
+
+
+def run(
+    script: Sequence[int | str | Exception],
+    path: Path,
+    settings: RecordSettings = SETTINGS,
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> tuple[Recorded, list[Frame], list[float]]:
+    """Record a script; return what is said of it, what plays back, and the shares reported."""
+    shares: list[float] = []
+    recorded = record(
+        Scripted(script), path, settings, lambda _, share: shares.append(share), is_stopped
+    )
+    with open_recording(path) as camera:
+        frames = [camera.read() for _ in range(recorded.frames)]
+        with pytest.raises(CameraEndError):
+            camera.read()
+    return recorded, frames, shares
+
+
+@pytest.mark.parametrize("name", ["folder", "file.db3"])
+def test_what_is_recorded_plays_back(tmp_path: Path, name: str) -> None:
+    pytest.importorskip("pyrealsense2")
+    end = CameraEndError("the recording has ended")
+    recorded, frames, _ = run([1, 2, 4, 5, end], tmp_path / "new" / name)
+    assert recorded == Recorded(4, 1, 0.4, "the recording played has ended")
+    assert [frame.index for frame in frames] == [1, 2, 4, 5]
+    assert [int(frame.depth[0, 0]) for frame in frames] == [1, 2, 4, 5]
+
+
+@pytest.mark.parametrize("name", ["folder", "file.db3"])
+def test_an_unplugged_camera_loses_nothing_recorded(tmp_path: Path, name: str) -> None:
+    pytest.importorskip("pyrealsense2")
+    recorded, frames, _ = run([1, 2, UNPLUGGED], tmp_path / name)
+    assert recorded.stop_reason == str(UNPLUGGED)
+    assert len(frames) == 2
+
+
+def test_stopping_keeps_what_there_is(tmp_path: Path) -> None:
+    answers = iter([False, False, False, True])
+    recorded, frames, _ = run(range(1, 10), tmp_path / "a", is_stopped=lambda: next(answers))
+    assert recorded.stop_reason == "stopped"
+    assert [frame.index for frame in frames] == [1, 2, 3]
+
+
+def test_it_ends_at_a_limit_and_reports_how_far_it_is(tmp_path: Path) -> None:
+    limited = replace(SETTINGS, frames=4)
+    recorded, _, shares = run(range(1, 10), tmp_path / "frames", limited)
+    assert (recorded.frames, recorded.stop_reason) == (4, "as long as asked for")
+    assert shares == pytest.approx([0.25, 0.5, 0.75, 1.0])
+    recorded, _, shares = run(range(1, 10), tmp_path / "s", replace(SETTINGS, duration_s=0.5))
+    assert recorded.frames == 6
+    assert recorded.duration_s == pytest.approx(0.5)
+    assert shares[-1] == 1.0
+
+
+def test_it_ends_before_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nearly_full = shutil.disk_usage(tmp_path)._replace(free=100)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: nearly_full)
+    recorded, _, _ = run([1, 2, 3], tmp_path / "a", replace(SETTINGS, free_bytes=101))
+    assert (recorded.frames, recorded.stop_reason) == (1, "the disk is nearly full")
+
+
+def test_a_silent_camera_ends_a_recording_and_a_short_silence_does_not(tmp_path: Path) -> None:
+    recorded, frames, _ = run([1, CameraTimeoutError("none yet"), 2], tmp_path / "a")
+    assert recorded.stop_reason == "no frame came"
+    assert [frame.index for frame in frames] == [1, 2]
+
+
+def test_it_begins_with_the_first_colour_if_there_is_any(tmp_path: Path) -> None:
+    _, frames, _ = run([PALE, PALE, 3, PALE, 5], tmp_path / "late")
+    assert [(frame.index, frame.color is not None) for frame in frames] == [
+        (3, True),
+        (4, False),
+        (5, True),
+    ]
+    _, frames, _ = run([PALE] * 4, tmp_path / "none", replace(SETTINGS, lead_frames=2))
+    assert [frame.index for frame in frames] == [1, 2, 3, 4]
+
+
+def test_nothing_at_all_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(CameraError, match="nothing was recorded: the camera was unplugged"):
+        run([UNPLUGGED], tmp_path / "a")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_is_not_written_over(tmp_path: Path) -> None:
+    run([1], tmp_path / "a")
+    with pytest.raises(FileError, match="not empty"):
+        run([1], tmp_path / "a")
