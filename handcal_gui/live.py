@@ -8,7 +8,7 @@ from functools import partial
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from handcal.calibrate import Calibration
+from handcal.calibrate import Calibration, State
 from handcal.errors import FileError
 from handcal.snapshot import Snapshot
 from handcal.station import Station
@@ -111,7 +111,7 @@ class Live(QObject):
         eyes = self._wizard_panel.wizard.eyes(snapshot)
         commands: dict[Action, Callable[[Calibration], object]] = {
             Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
-            Action.CONFIRM: Calibration.confirm,
+            Action.CONFIRM: _confirm,
             Action.SOLVE: Calibration.solve,
             Action.APPLY: Calibration.apply,
             Action.REDO: Calibration.redo,
@@ -207,9 +207,10 @@ class Live(QObject):
             )
         self._snapshot = snapshot
         panels = self._window.panels
+        # Out of sight, too: they may be used before another snapshot comes.
+        always = panels.fine_tune, panels.trials
         for panel in panels.all():
-            # A trial may be recorded, by its key, while its panel is out of sight.
-            if panel is panels.trials or not panel.visibleRegion().isEmpty():
+            if panel in always or not panel.visibleRegion().isEmpty():
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
@@ -219,7 +220,7 @@ class Live(QObject):
         self.polled.emit(snapshot)
 
     def _catch_up(self, panel: Panel, is_seen: bool) -> None:
-        """Let a panel that comes into sight show how things stand, before it is used."""
+        """Let a panel that comes into sight show at once how things stand."""
         if is_seen and self._snapshot is not None:
             panel.show_snapshot(self._snapshot)
 
@@ -248,7 +249,8 @@ class Live(QObject):
     def _take_answer(self, name: str, _answer: object) -> None:
         if name == Action.FINISH and self._snapshot is not None:
             self._wizard_panel.wizard.move(Action.FINISH, self._snapshot)
-        if name == self._complained_of:
+        # One thing that the wizard offers done makes up for another that could not be.
+        if name == self._complained_of or {name, self._complained_of} <= set(Action):
             self._window.banner.clear()
 
     def _take_failure(self, name: str, why: str) -> None:
@@ -258,3 +260,9 @@ class Live(QObject):
     def _take_end(self, why: str) -> None:
         self._timer.stop()
         self.ended.emit(why)
+
+
+def _confirm(calibration: Calibration) -> None:
+    """Confirm for the wearer, who may have been quicker."""
+    if calibration.state is State.ALIGN:
+        calibration.confirm()
