@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QDoubleSpinBox, QLabel, QPlainTextEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
@@ -316,6 +316,19 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     np.testing.assert_allclose(trial.adjusted_shift_m - trial.calibrated_shift_m, [step_m, 0, 0])
     assert trial.eye == "left"
     assert trial.error_px.min() > 0.0
+
+
+def test_fine_tuning_that_comes_into_sight_begins_with_what_the_headset_has(
+    live: Technician, studio: Any
+) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    applied_mm = 1e3 * live.snapshot.procedure.applied_shift_m["left"]
+    live.program.window.go_to("fine_tune")
+    editor = live.child(QWidget, "leftEditor")  # at once: no snapshot has come since
+    shown_mm = [field.value() for field in editor.findChildren(QDoubleSpinBox)]
+    np.testing.assert_allclose(shown_mm, applied_mm, atol=0.006)
+    assert np.abs(applied_mm).max() > 0.1
 
 
 def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio: Any) -> None:
