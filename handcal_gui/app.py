@@ -23,7 +23,7 @@ from handcal.errors import HandcalError
 from handcal.files import make_folder
 from handcal.resources import resource_path
 from handcal.station_settings import StationSettings
-from handcal_gui.demonstration import Demonstration
+from handcal_gui.demonstration.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 

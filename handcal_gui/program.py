@@ -16,10 +16,8 @@ from handcal.export.export import ExportSettings
 from handcal.session import SessionRecord
 from handcal.station import Station
 from handcal.station_settings import StationSettings
-from handcal_gui.compare import Comparison
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
-from handcal_gui.live import Live
 from handcal_gui.panels.camera import CameraPanel
 from handcal_gui.panels.cloud import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel
@@ -30,9 +28,11 @@ from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel
 from handcal_gui.panels.wearer_view import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
-from handcal_gui.review import Review
-from handcal_gui.review_page import ReviewPage
-from handcal_gui.start_page import StartPage
+from handcal_gui.review.compare import Comparison
+from handcal_gui.review.review import Review
+from handcal_gui.review.review_page import ReviewPage
+from handcal_gui.running.live import Live
+from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.wizard.wizard import WizardPanel

@@ -24,7 +24,6 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.snapshot import Snapshot
-from handcal_gui.banner import Banner
 from handcal_gui.panels.camera import CameraPanel
 from handcal_gui.panels.cloud import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel
@@ -34,8 +33,9 @@ from handcal_gui.panels.rotation import RotationPanel
 from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel
 from handcal_gui.panels.wearer_view import WearerViewPanel
-from handcal_gui.start_page import StartPage
+from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.banner import Banner
 from handcal_gui.wizard.wizard import WizardPanel
 
 Page = Literal["start", "live", "review"]

@@ -13,9 +13,9 @@ from handcal.export.export import ExportSettings, export_session
 from handcal.session import SessionRecord
 from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
-from handcal_gui.fields import button
-from handcal_gui.jobs import Job
+from handcal_gui.running.jobs import Job
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import button
 
 Export = Callable[..., tuple[Path, ...]]
 

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QVBox
 
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, Format
-from handcal_gui.fields import named, number
-from handcal_gui.path_field import PathField
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import named, number
+from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
     "report": "Verdict, eye shifts, figures and settings, to read and to file",

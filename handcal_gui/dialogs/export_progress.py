@@ -10,9 +10,9 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QLabel, QListWidget, QProgressBar, QVBoxLayout, QWidget
 
 from handcal.doctor import Finding, Health
-from handcal_gui.fields import named
-from handcal_gui.finding_line import FindingLine
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import named
+from handcal_gui.widgets.finding_line import FindingLine
 
 _WHOLE = 1000
 _UNCHANGED = "the session and earlier exports are as they were"

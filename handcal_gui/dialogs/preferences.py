@@ -7,11 +7,11 @@ from dataclasses import replace
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
 
-from handcal_gui.calibration_fields import CalibrationFields
-from handcal_gui.fields import choice
-from handcal_gui.path_field import PathField
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.calibration_fields import CalibrationFields
+from handcal_gui.widgets.fields import choice
+from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {"system": "As the system", "light": "Light", "dark": "Dark"}
 

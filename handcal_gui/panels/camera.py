@@ -28,11 +28,11 @@ from handcal.hand.overlay import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.snapshot import Snapshot
 from handcal.types import Frame
-from handcal_gui.depth_scale import DepthColors, DepthLegend
-from handcal_gui.hand_overlay import HandOverlay
-from handcal_gui.image_view import ImageView
-from handcal_gui.number_label import UNKNOWN, NumberLabel
+from handcal_gui.camera.depth_scale import DepthColors, DepthLegend
+from handcal_gui.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
 _EMPTY = "The camera's picture will appear here. Choose a camera on the start page."
 _NO_COLOR = "This camera gives no colour picture."

@@ -14,13 +14,13 @@ from handcal.geometry import invert, transform
 from handcal.register.pairs import matched_pairs
 from handcal.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
-from handcal_gui.cloud_view import CloudView
-from handcal_gui.legend import LegendEntry
-from handcal_gui.number_label import UNKNOWN
-from handcal_gui.orbit import Direction
-from handcal_gui.residual_scale import ResidualScale, residual_colors
-from handcal_gui.splat import rgb
+from handcal_gui.cloud.cloud_view import CloudView
+from handcal_gui.cloud.orbit import Direction
+from handcal_gui.cloud.splat import rgb
+from handcal_gui.results.residual_scale import ResidualScale, residual_colors
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.number_label import UNKNOWN
 
 _EMPTY = "The hand's cloud will appear here. Hold a hand up before the depth camera."
 _FROM_CAMERA = "mm from the depth camera"

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, Q
 from handcal.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig
-from handcal_gui.number_table import NumberTable, rows_as_text
 from handcal_gui.results.compare_tab import CompareTab
 from handcal_gui.results.convergence_plot import ConvergencePlot
 from handcal_gui.results.residuals_tab import ResidualsTab
@@ -25,6 +24,7 @@ from handcal_gui.results.rows import (
 )
 from handcal_gui.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 
 _EMPTY = (
     "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve: then each eye's "

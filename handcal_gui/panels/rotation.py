@@ -12,10 +12,10 @@ from handcal.calibrate import Observation, PlacedHand, State
 from handcal.register.guard import turn_advice
 from handcal.snapshot import Procedure, Snapshot
 from handcal.types import Float64
-from handcal_gui.dial import RotationDial
-from handcal_gui.plots import Plot
+from handcal_gui.rotation.dial import RotationDial
+from handcal_gui.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.turning_hand import TurningHand
+from handcal_gui.widgets.plots import Plot
 
 _HISTORY_S = 10.0
 _HISTORY_LIMITS = 2.0

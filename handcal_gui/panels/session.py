@@ -16,11 +16,10 @@ from PySide6.QtWidgets import (
 from handcal.results import Results
 from handcal.session import SessionRecord
 from handcal.snapshot import Snapshot
-from handcal_gui.elided_label import ElidedLabel
-from handcal_gui.notes_editor import NotesEditor
-from handcal_gui.record_table import RecordTable
-from handcal_gui.record_tabs import RecordTabs
-from handcal_gui.session_rows import (
+from handcal_gui.records.notes_editor import NotesEditor
+from handcal_gui.records.record_table import RecordTable
+from handcal_gui.records.record_tabs import RecordTabs
+from handcal_gui.records.session_rows import (
     ALIGNMENT_COLUMNS,
     TRIAL_COLUMNS,
     Deletion,
@@ -30,8 +29,9 @@ from handcal_gui.session_rows import (
     trial_rows,
     trials_id,
 )
+from handcal_gui.records.undo_strip import UndoStrip
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.undo_strip import UndoStrip
+from handcal_gui.widgets.elided_label import ElidedLabel
 
 
 class SessionPanel(QWidget):

@@ -19,11 +19,9 @@ from handcal.session import SessionRecord
 from handcal.snapshot import Snapshot
 from handcal.trial import summarise
 from handcal.types import EYES, Eye
-from handcal_gui.number_table import NumberTable
-from handcal_gui.record_table import RecordTable
-from handcal_gui.record_tabs import RecordTabs
-from handcal_gui.results.rows import EYE_NAMES
-from handcal_gui.session_rows import (
+from handcal_gui.records.record_table import RecordTable
+from handcal_gui.records.record_tabs import RecordTabs
+from handcal_gui.records.session_rows import (
     STATISTICS_COLUMNS,
     TRIAL_COLUMNS,
     deletions,
@@ -32,9 +30,11 @@ from handcal_gui.session_rows import (
     trial_rows,
     trials_id,
 )
+from handcal_gui.records.trial_plot import TrialPlot
+from handcal_gui.records.undo_strip import UndoStrip
+from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.trial_plot import TrialPlot
-from handcal_gui.undo_strip import UndoStrip
+from handcal_gui.widgets.number_table import NumberTable
 
 _HOW = (
     "Fine-tune φ until the drawn target covers the real one, then record: a trial is by how much "

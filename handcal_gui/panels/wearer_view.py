@@ -7,10 +7,10 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidg
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal.wearer_view import EyeView, Overlay
-from handcal_gui.eye_canvas import LINES, EyeCanvas
-from handcal_gui.legend import LegendEntry
-from handcal_gui.number_label import UNKNOWN, NumberLabel
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.wearer_view.eye_canvas import LINES, EyeCanvas
+from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
 _TITLES: dict[Eye, str] = {"left": "Left eye", "right": "Right eye"}
 _EMPTY = "What this eye sees will appear here. Hold a hand up before the depth camera."

@@ -6,8 +6,8 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.results import Results
-from handcal_gui.plots import Plot
 from handcal_gui.results.rows import EYE_NAMES
+from handcal_gui.widgets.plots import Plot
 
 _SYMBOLS = {"left": "o", "right": "s"}
 _MAX_SYMBOLS = 60

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from handcal.register.verdict import expected_error_arcmin
 from handcal.results import Results
 from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
-from handcal_gui.number_table import Row
-from handcal_gui.numbers import signed
+from handcal_gui.widgets.number_table import Row
+from handcal_gui.widgets.numbers import signed
 
 EYE_NAMES: Mapping[Eye, str] = {"left": "Left eye", "right": "Right eye"}
 VERDICT_WORDS: Mapping[VerdictName, str] = {

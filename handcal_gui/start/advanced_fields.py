@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
 from handcal.station_settings import StationSettings
-from handcal_gui.calibration_fields import CalibrationFields
-from handcal_gui.fields import named, number, whole_number
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.calibration_fields import CalibrationFields
+from handcal_gui.widgets.fields import named, number, whole_number
 
 
 class AdvancedFields(QWidget):

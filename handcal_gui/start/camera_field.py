@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
 from handcal.preflight import RECORDING_SUFFIXES
 from handcal.station_settings import Source, StationSettings
-from handcal_gui.fields import beside, choice, named
-from handcal_gui.path_field import PathField
+from handcal_gui.widgets.fields import beside, choice, named
+from handcal_gui.widgets.path_field import PathField
 
 _SOURCES: dict[Source, str] = {
     "simulator": "Simulator",

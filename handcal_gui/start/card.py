@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal_gui.fields import paragraph
 from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.widgets.fields import paragraph
 
 
 class Card(QFrame):

@@ -9,8 +9,8 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from handcal.station_settings import HeadsetKind, StationSettings
-from handcal_gui.fields import beside, button, choice, named, whole_number
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import beside, button, choice, named, whole_number
 
 _HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
 

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.fields import button, named, paragraph
 from handcal_gui.start.session_entries import Entry
 from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.widgets.fields import button, named, paragraph
 
 
 class SessionList(QWidget):

@@ -13,12 +13,12 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
 from handcal.doctor import Finding, Health
 from handcal.preflight import PARTS, Part
 from handcal.station_settings import StationSettings
-from handcal_gui.finding_line import FindingLine
-from handcal_gui.path_field import PathField
 from handcal_gui.start.advanced_fields import AdvancedFields
 from handcal_gui.start.camera_field import CameraField
 from handcal_gui.start.headset_field import HeadsetField
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.path_field import PathField
 
 
 class StationForm(QWidget):

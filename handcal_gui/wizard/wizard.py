@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.snapshot import Snapshot
-from handcal_gui.fields import button, main_button
 from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.widgets.fields import button, main_button
 from handcal_gui.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard
 
 _MOST_CHECKS = 3

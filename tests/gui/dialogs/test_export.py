@@ -24,7 +24,7 @@ from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings
 from handcal.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
-from handcal_gui.path_field import PathField
+from handcal_gui.widgets.path_field import PathField
 
 
 class Exporter:

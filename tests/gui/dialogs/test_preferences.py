@@ -10,8 +10,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.station_settings import StationSettings
 from handcal_gui.dialogs.preferences import PreferencesDialog
-from handcal_gui.path_field import PathField
 from handcal_gui.preferences import Preferences
+from handcal_gui.widgets.path_field import PathField
 
 BEFORE = Preferences(
     station=StationSettings(source="realsense", port=50_000, sessions="/a"),

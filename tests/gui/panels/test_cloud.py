@@ -12,12 +12,12 @@ from handcal.calibrate import State
 from handcal.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import Alignment
-from handcal_gui.cloud_view import CloudView
-from handcal_gui.legend import LegendEntry
+from handcal_gui.cloud.cloud_view import CloudView
+from handcal_gui.cloud.splat import rgb
 from handcal_gui.panels.cloud import CloudPanel
-from handcal_gui.residual_scale import ResidualScale, residual_colors
-from handcal_gui.splat import rgb
+from handcal_gui.results.residual_scale import ResidualScale, residual_colors
 from handcal_gui.theme import colors
+from handcal_gui.widgets.legend import LegendEntry
 
 MakeSnapshot = Callable[..., Snapshot]
 

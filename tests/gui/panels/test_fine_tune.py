@@ -26,8 +26,8 @@ from handcal.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
 from handcal_gui.panels.fine_tune import FineTunePanel
-from handcal_gui.shift_history import Shifts, same_shifts
-from handcal_gui.shift_stream import PERIOD_MS, SETTLE_MS
+from handcal_gui.tuning.shift_history import Shifts, same_shifts
+from handcal_gui.tuning.shift_stream import PERIOD_MS, SETTLE_MS
 
 OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 Show = Callable[..., None]

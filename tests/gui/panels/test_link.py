@@ -11,10 +11,10 @@ from pytestqt.qtbot import QtBot
 
 from handcal.link.wire import Rejection
 from handcal.snapshot import Snapshot
-from handcal_gui.link_table import REJECTIONS
-from handcal_gui.number_label import NumberLabel
+from handcal_gui.link.link_table import REJECTIONS
 from handcal_gui.panels.link import LinkPanel
-from handcal_gui.plots import Plot
+from handcal_gui.widgets.number_label import NumberLabel
+from handcal_gui.widgets.plots import Plot
 
 from ..conftest import NOW_NS
 

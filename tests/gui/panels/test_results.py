@@ -17,12 +17,12 @@ from handcal.geometry import transform
 from handcal.results import Results, SolveSettings, solve_session
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig, Verdict
-from handcal_gui.number_table import NumberTable
 from handcal_gui.panels.results import ResultsPanel
 from handcal_gui.results.compare_tab import CompareTab
 from handcal_gui.results.convergence_plot import ConvergencePlot
 from handcal_gui.results.residual_map import ResidualMap
 from handcal_gui.results.verdict_card import VerdictCard
+from handcal_gui.widgets.number_table import NumberTable
 
 Make = Callable[..., Snapshot]
 Child = TypeVar("Child", bound=QObject)

@@ -12,9 +12,9 @@ from pytestqt.qtbot import QtBot
 from handcal.calibrate import State
 from handcal.register.guard import turn_advice
 from handcal.snapshot import Snapshot
-from handcal_gui.dial import RotationDial
 from handcal_gui.panels.rotation import RotationPanel
-from handcal_gui.plots import Plot
+from handcal_gui.rotation.dial import RotationDial
+from handcal_gui.widgets.plots import Plot
 
 Make = Callable[..., Snapshot]
 Child = TypeVar("Child", bound=QObject)

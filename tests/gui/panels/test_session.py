@@ -17,7 +17,7 @@ from handcal.snapshot import Snapshot
 from handcal.trial import make_trial
 from handcal.types import Rig
 from handcal_gui.panels.session import SessionPanel
-from handcal_gui.record_table import RecordTable
+from handcal_gui.records.record_table import RecordTable
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ from handcal.session import Session, SessionRecord
 from handcal.snapshot import Snapshot
 from handcal.trial import make_trial
 from handcal.types import Eye, Rig
-from handcal_gui.number_table import NumberTable
 from handcal_gui.panels.trials import TrialsPanel
-from handcal_gui.record_table import RecordTable
-from handcal_gui.trial_plot import TrialPlot
+from handcal_gui.records.record_table import RecordTable
+from handcal_gui.records.trial_plot import TrialPlot
+from handcal_gui.widgets.number_table import NumberTable
 
 
 @pytest.fixture

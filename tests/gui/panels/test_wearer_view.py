@@ -10,9 +10,9 @@ from handcal.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal.wearer_view import EyeView
-from handcal_gui.eye_canvas import EyeCanvas
-from handcal_gui.legend import LegendEntry
 from handcal_gui.panels.wearer_view import WearerViewPanel
+from handcal_gui.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.widgets.legend import LegendEntry
 
 MakeSnapshot = Callable[..., Snapshot]
 UNKNOWN = ["–"] * 4

@@ -9,7 +9,6 @@ import pytest
 from handcal.register.verdict import expected_error_arcmin
 from handcal.results import Results, SolveSettings, solve_session
 from handcal.types import EYES, Alignment, EyeShift, Rig
-from handcal_gui.number_table import Row
 from handcal_gui.results.rows import (
     NOTHING,
     PHI,
@@ -19,6 +18,7 @@ from handcal_gui.results.rows import (
     result_rows,
     verdict_rows,
 )
+from handcal_gui.widgets.number_table import Row
 
 
 def cells(rows: Sequence[Row], label: str) -> tuple[str, ...]:

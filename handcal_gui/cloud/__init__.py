@@ -1,0 +1,1 @@
+"""Parts of the hand cloud panel: points in space, drawn without OpenGL."""

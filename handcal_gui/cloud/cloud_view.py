@@ -1,0 +1,221 @@
+"""Points in space, to be turned, zoomed and moved with the mouse or keys.
+
+Drawn by `handcal_gui.cloud.splat`: no OpenGL, which software rendering, remote desktops and virtual
+machines lack or emulate slowly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from handcal.types import Float64, UInt8
+from handcal_gui.cloud.box_axes import Box, draw_box, draw_scale
+from handcal_gui.cloud.orbit import Direction, Orbit
+from handcal_gui.cloud.splat import rgb, splat
+from handcal_gui.theme import SPACING_PX, colors, number_font
+
+_RAD_PER_PX = 0.01
+_ZOOM_PER_NOTCH = 1.2
+_KEY_TURN_RAD = math.radians(10.0)
+_POINT_MM = 1.5
+"""So large are points, about as far as they lie apart on a hand, within limits."""
+_LEAST_POINT_PX, _MOST_POINT_PX = 2.0, 6.0
+_LABELS_EMS = (7.0, 4.5)
+"""Room beside, and above and below, for the box' labels."""
+_NONE = np.empty((0, 3))
+
+
+class CloudView(QWidget):
+    """Shows coloured points within a box of millimetres, seen from any side."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("cloud-view")
+        self.setAccessibleName("Hand cloud in space")
+        self.setToolTip(
+            "Drag to turn, drag with the right or middle button to move, wheel to zoom, "
+            "double-click to see all again. Keys: arrows, +, −, 1, 2, 3 and R."
+        )
+        self.setMinimumSize(160, 120)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._points_mm, self._colors = _NONE, np.empty((0, 3), np.uint8)
+        self._from_mm = self._to_mm = _NONE
+        self._text = ""
+        self._box: Box | None = None
+        self._orbit = Orbit()
+        self._is_fitted = True
+        self._dragged_from = QPointF()
+        self._backdrop_key: object = None
+        self._backdrop = QPixmap()
+
+    @property
+    def orbit(self) -> Orbit:
+        """How the points are looked at."""
+        return self._orbit
+
+    def show_points(self, points_mm: Float64, point_colors: UInt8, text: str) -> None:
+        """Show points with a caption, or a message where there are none.
+
+        Parameters
+        ----------
+        points_mm : (N, 3) float64
+            Right, down and away.
+        point_colors : (N, 3) uint8
+            RGB.
+        text : str
+        """
+        self._points_mm, self._colors, self._text = points_mm, point_colors, text
+        if len(points_mm):
+            smallest = Box.around(points_mm)
+            if self._box is None or not self._box.still_fits(smallest):
+                self._box = smallest
+        self.setAccessibleDescription(text)
+        self.update()
+
+    def show_lines(self, from_mm: Float64, to_mm: Float64) -> None:
+        """Show lines over the points, from (M, 3) to (M, 3)."""
+        self._from_mm, self._to_mm = from_mm, to_mm
+        self.update()
+
+    def look(self, direction: Direction) -> None:
+        """Look at all of it from one of the given directions."""
+        self._orbit = self._orbit.looking(direction)
+        self._is_fitted = True
+        self.update()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw box, points, lines, scale and caption; or the message."""
+        painter = QPainter(self)
+        painter.setPen(self.palette().windowText().color())
+        if not len(self._points_mm) or self._box is None:
+            painter.fillRect(self.rect(), QColor(colors().canvas))
+            margin = 2 * SPACING_PX
+            within = self.rect().adjusted(margin, margin, -margin, -margin)
+            flags = Qt.AlignmentFlag.AlignCenter.value | Qt.TextFlag.TextWordWrap.value
+            painter.drawText(within, flags, self._text)
+            return
+        if self._is_fitted:
+            em = self.fontMetrics().height()
+            self._orbit = self._orbit.fitted(
+                self._box.corners_mm,
+                self.width() - _LABELS_EMS[0] * em,
+                self.height() - _LABELS_EMS[1] * em,
+            )
+        painter.drawPixmap(0, 0, self._draw_backdrop(self._box))
+        self._paint_points(painter)
+        self._paint_lines(painter)
+        painter.drawText(QPointF(SPACING_PX, self.height() - SPACING_PX), self._text)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Begin to drag."""
+        self._dragged_from = event.position()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Turn with the left button, move with another."""
+        moved = event.position() - self._dragged_from
+        self._dragged_from = event.position()
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._turn(-_RAD_PER_PX * moved.x(), _RAD_PER_PX * moved.y())
+        else:
+            self._change(self._orbit.panned(moved.x(), moved.y()))
+
+    def mouseDoubleClickEvent(self, _: QMouseEvent) -> None:
+        """See all of it again."""
+        self.look(Direction.ASLANT)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom."""
+        self._change(self._orbit.zoomed(_ZOOM_PER_NOTCH ** (event.angleDelta().y() / 120)))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Turn with the arrows, zoom with + and −."""
+        key, turn = Qt.Key, _KEY_TURN_RAD
+        turns = {
+            key.Key_Left: (turn, 0.0),
+            key.Key_Right: (-turn, 0.0),
+            key.Key_Up: (0.0, -turn),
+            key.Key_Down: (0.0, turn),
+        }
+        directions = {
+            key.Key_1: Direction.FRONT,
+            key.Key_2: Direction.SIDE,
+            key.Key_3: Direction.TOP,
+            key.Key_R: Direction.ASLANT,
+        }
+        if event.key() in turns:
+            self._turn(*turns[Qt.Key(event.key())])
+        elif event.key() in directions:
+            self.look(directions[Qt.Key(event.key())])
+        elif event.key() in (key.Key_Plus, key.Key_Equal):
+            self._change(self._orbit.zoomed(_ZOOM_PER_NOTCH))
+        elif event.key() == key.Key_Minus:
+            self._change(self._orbit.zoomed(1.0 / _ZOOM_PER_NOTCH))
+        else:
+            super().keyPressEvent(event)
+
+    def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
+        self._orbit = self._orbit.turned(yaw_rad, pitch_rad)
+        self.update()
+
+    def _change(self, orbit: Orbit) -> None:
+        """Take over a size or place that the person chose: from now on it stays."""
+        self._orbit = orbit
+        self._is_fitted = False
+        self.update()
+
+    def _paint_points(self, painter: QPainter) -> None:
+        ratio, size = self.devicePixelRatio(), self._device_size()
+        points_px = ratio * self._orbit.project(self._points_mm)
+        points_px[:, :2] += np.divide(size, 2.0)
+        background = rgb(colors().canvas)
+        point_px = np.clip(_POINT_MM * self._orbit.px_per_mm, _LEAST_POINT_PX, _MOST_POINT_PX)
+        image = splat(points_px, self._colors, background, size, round(ratio * point_px))
+        painter.drawImage(QRectF(self.rect()), image)
+
+    def _paint_lines(self, painter: QPainter) -> None:
+        if not len(self._from_mm):
+            return
+        painter.save()
+        painter.translate(self.width() / 2, self.height() / 2)
+        painter.setPen(QPen(QColor(colors().good), 1))
+        ends = np.hstack([self._orbit.project(p)[:, :2] for p in (self._from_mm, self._to_mm)])
+        painter.drawLines([QLineF(*end) for end in ends.tolist()])
+        painter.restore()
+
+    def _draw_backdrop(self, box: Box) -> QPixmap:
+        """Return the canvas with box and scale, drawn anew only if one of them has changed."""
+        ratio = self.devicePixelRatio()
+        key = box, self._orbit, self.size(), ratio, colors(), self.palette().cacheKey()
+        if key != self._backdrop_key:
+            self._backdrop_key = key
+            self._backdrop = QPixmap(*self._device_size())
+            self._backdrop.setDevicePixelRatio(ratio)
+            self._backdrop.fill(QColor(colors().canvas))
+            painter = QPainter(self._backdrop)
+            painter.setPen(self.palette().windowText().color())
+            corner = QPointF(self.width() - SPACING_PX, self.height() - SPACING_PX)
+            draw_scale(painter, self._orbit, corner)
+            painter.setFont(number_font(0.85))
+            painter.translate(self.width() / 2, self.height() / 2)
+            draw_box(painter, box, self._orbit)
+            painter.end()
+        return self._backdrop
+
+    def _device_size(self) -> tuple[int, int]:
+        ratio = self.devicePixelRatio()
+        return round(ratio * self.width()), round(ratio * self.height())

@@ -1,0 +1,97 @@
+"""The technician's part, played by the program: for demonstrations, tests and screenshots."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal
+
+from handcal.snapshot import Snapshot
+from handcal_gui.running.live import Live
+from handcal_gui.wizard.steps import Action, View
+from handcal_gui.wizard.wizard import WizardPanel
+
+_LOOK_S = 0.7
+_PATIENCE_S = 60.0
+
+
+class Autopilot(QObject):
+    """Presses the wizard's main button whenever it can be pressed, until the session is finished.
+
+    The alignment itself is confirmed by the wearer, in the headset.
+
+    Parameters
+    ----------
+    live : Live
+    wizard_panel : WizardPanel
+    look : callable, optional
+        Called with every view before its button is pressed; may take its time, or pause.
+
+    Attributes
+    ----------
+    finished : Signal()
+        The session is finished.
+    stuck : Signal(str)
+        It does not go on, and where.
+    """
+
+    finished = Signal()
+    stuck = Signal(str)
+
+    def __init__(
+        self,
+        live: Live,
+        wizard_panel: WizardPanel,
+        look: Callable[[View], None] = lambda _view: None,
+    ) -> None:
+        super().__init__(live)
+        self._wizard_panel = wizard_panel
+        self._look = look
+        self._view: View | None = None
+        self._since_s = self._moved_s = time.monotonic()
+        self._is_paused = self._is_done = False
+        live.polled.connect(self._watch)
+
+    def pause(self) -> None:
+        """Press nothing until `go_on`."""
+        self._is_paused = True
+
+    def go_on(self) -> None:
+        """Go on after a pause."""
+        self._is_paused = False
+        self._since_s = self._moved_s = time.monotonic()
+
+    def _watch(self, _snapshot: Snapshot) -> None:
+        view = self._wizard_panel.shown
+        if view is None or self._is_paused or self._is_done:
+            return
+        now_s = time.monotonic()
+        if self._view is None or (view.step, view.main) != (self._view.step, self._view.main):
+            if self._view is None or view.step is not self._view.step:
+                self._moved_s = now_s
+            self._view, self._since_s = view, now_s
+        if now_s - self._moved_s > _PATIENCE_S:
+            self._end(lambda: self.stuck.emit(self._complaint(view)))
+        elif now_s - self._since_s > _LOOK_S and view.main.is_enabled:
+            self._act(view)
+
+    def _act(self, view: View) -> None:
+        self._since_s = time.monotonic()
+        self._look(view)
+        if self._is_paused:
+            return
+        if view.main.action is Action.NEXT_WEARER:
+            self._end(self.finished.emit)
+        elif view.main.action is not Action.CONFIRM:
+            self._wizard_panel.press_main()
+
+    def _end(self, tell: Callable[[], None]) -> None:
+        self._is_done = True
+        tell()
+
+    @staticmethod
+    def _complaint(view: View) -> str:
+        missing = [check.text for check in view.checks if not check.holds]
+        why = f": {'; '.join(missing)}" if missing else ""
+        return f"no progress at “{view.step.value}” for {_PATIENCE_S:.0f} s{why}"

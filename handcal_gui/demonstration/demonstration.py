@@ -1,0 +1,96 @@
+"""A calibration of a simulated wearer that operates itself, from the start page to the export."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QApplication
+
+from handcal.station_settings import StationSettings
+from handcal_gui.demonstration.autopilot import Autopilot
+from handcal_gui.demonstration.screenshots import Screenshots
+from handcal_gui.demonstration.tour import Tour
+from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.program import Program
+from handcal_gui.wizard.steps import Step, View
+
+
+class Demonstration(QObject):
+    """Calibrates, exports, and ends the program.
+
+    Parameters
+    ----------
+    program : Program
+    output : Path
+        Where the session, and beside it the export, go.
+    screenshots : Path or None
+        Where a picture of every step, panel and dialog goes.
+
+    Attributes
+    ----------
+    complaint : str or None
+        Why it did not succeed; None once it has.
+    """
+
+    def __init__(self, program: Program, output: Path, screenshots: Path | None) -> None:
+        super().__init__(program)
+        self.complaint: str | None = "ended before the calibration was complete"
+        self._program = program
+        self._output = output.absolute()
+        self._screenshots = Screenshots(program.window, screenshots) if screenshots else None
+        self._tour = Tour(program, self._screenshots) if self._screenshots else None
+        self._has_toured = False
+        self._autopilot = Autopilot(program.live, program.wizard_panel, self._look)
+        self._autopilot.finished.connect(self._export)
+        self._autopilot.stuck.connect(self._give_up)
+        program.live.ended.connect(self._give_up)
+
+    def start(self, settings: StationSettings) -> None:
+        """Begin."""
+        station = replace(settings, sessions=str(self._output))
+
+        def calibrate() -> None:
+            self._program.start_calibration(station, "Demonstration")
+
+        if self._tour:
+            self._tour.begin(self._tour.start_page(), calibrate)
+        else:
+            calibrate()
+
+    def _look(self, view: View) -> None:
+        if self._screenshots is None or self._tour is None:
+            return
+        self._screenshots.save_step(view)
+        if view.step is Step.SAVE and not self._has_toured:
+            self._has_toured = True
+            self._autopilot.pause()
+            self._tour.begin(self._tour.panels(), self._autopilot.go_on)
+
+    def _export(self) -> None:
+        self._program.live.ended.disconnect(self._give_up)  # from now on it may
+        dialog = self._program.export(self._output)
+        if dialog is None:
+            self._give_up("there was nothing to export")
+            return
+        dialog.succeeded.connect(lambda _files: self._look_back(dialog))
+        dialog.failed.connect(self._give_up)
+        if self._tour:
+            self._tour.begin(self._tour.export(dialog), lambda: None)
+        else:
+            dialog.start()
+
+    def _look_back(self, dialog: ExportDialog) -> None:
+        if self._tour:
+            self._tour.begin(self._tour.afterwards(dialog), self._finish)
+        else:
+            self._finish()
+
+    def _finish(self) -> None:
+        self.complaint = None
+        QApplication.quit()
+
+    def _give_up(self, why: str) -> None:
+        self.complaint = why or self.complaint
+        QApplication.exit(1)

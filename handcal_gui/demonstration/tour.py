@@ -1,0 +1,142 @@
+"""A walk through what the wizard does not show, one picture after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication, QTabWidget, QWidget
+
+from handcal_gui.demonstration.screenshots import Screenshots
+from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.panels.camera import Mode
+from handcal_gui.program import Program
+
+_LOOK_MS = 600
+"""Until what was done is seen, also on a busy computer."""
+_TURN_MS = 50
+_PATIENCE_MS = 20_000
+_STEPS = 6
+_TRIALS = 2
+
+Walk = Iterator[int]
+"""What to do in pieces; each gives the milliseconds to wait before the next."""
+
+
+class Tour(QObject):
+    """Walks, and saves pictures on the way.
+
+    Parameters
+    ----------
+    program : Program
+    screenshots : Screenshots
+    """
+
+    def __init__(self, program: Program, screenshots: Screenshots) -> None:
+        super().__init__(program)
+        self._program = program
+        self._save = screenshots.save
+
+    def begin(self, walk: Walk, then: Callable[[], object]) -> None:
+        """Walk, and then do something else."""
+        try:
+            wait_ms = next(walk)
+        except StopIteration:
+            then()
+        else:
+            QTimer.singleShot(wait_ms, self, lambda: self.begin(walk, then))
+
+    def start_page(self) -> Walk:
+        """Show the start page once it has looked at the station."""
+        yield 2 * _LOOK_MS
+        self._save("start")
+
+    def panels(self) -> Walk:
+        """Fine-tune φ, record trials, and show every panel and tab."""
+        window = self._program.window
+        yield from self._fine_tune()
+        for name, dock in window.docks.items():
+            dock.raise_()
+            yield _LOOK_MS
+            picture = f"panel-{name.replace('_', '-')}"
+            self._save(picture, dock.widget())
+            for tabs in dock.findChildren(QTabWidget):
+                for i in range(tabs.count()):
+                    tabs.setCurrentIndex(i)
+                    yield _LOOK_MS
+                    title = tabs.tabText(i).split(" (")[0].lower()
+                    self._save(f"{picture}-{title}", dock.widget())
+                tabs.setCurrentIndex(0)
+        window.panels.camera.set_mode(Mode.BOTH)
+        yield _LOOK_MS
+        self._save("panel-camera-both", window.panels.camera)
+        window.panels.camera.set_mode(Mode.COLOR)
+
+    def export(self, dialog: ExportDialog) -> Walk:
+        """Export, and show how that goes; the dialog says how it ended."""
+        yield _LOOK_MS
+        self._save("export", dialog)
+        dialog.start()
+        yield _LOOK_MS // 2
+        self._save("export-runs", dialog)
+
+    def afterwards(self, dialog: ExportDialog) -> Walk:
+        """Show the export done, the session as it is found again, and the preferences."""
+        program = self._program
+        self._save("export-done", dialog)
+        dialog.stop()
+        assert program.live.snapshot is not None
+        program.open_session(program.live.snapshot.session_path)
+        yield from _until(lambda: program.window.page == "review")
+        yield _LOOK_MS
+        self._save("review")
+        preferences = PreferencesDialog(program.preferences, program.window)
+        preferences.show()
+        yield _LOOK_MS
+        self._save("preferences", preferences)
+        preferences.close()
+        program.show_start()
+        yield 2 * _LOOK_MS
+        self._save("start-next-wearer")
+
+    def _fine_tune(self) -> Walk:
+        """Move φ, record trials of that, and put it back."""
+        window, panel = self._program.window, self._program.window.panels.fine_tune
+        window.docks["fine_tune"].raise_()
+        yield _LOOK_MS
+        for _ in range(_STEPS):
+            _press(panel, Qt.Key.Key_Right)
+            yield _TURN_MS
+        self._save("fine-tune-moving", panel)
+        yield 2 * _LOOK_MS
+        self._save("fine-tune-moved", panel)
+        self._save("window-fine-tune")
+        for _ in range(_TRIALS):
+            yield from self._record_trial()
+        panel.reset_action.trigger()
+        yield 2 * _LOOK_MS
+        self._save("fine-tune-back", panel)
+
+    def _record_trial(self) -> Walk:
+        wanted = self._trials() + 1
+        self._program.window.panels.trials.record_action.trigger()
+        yield from _until(lambda: self._trials() == wanted)
+
+    def _trials(self) -> int:
+        snapshot = self._program.live.snapshot
+        return len(snapshot.record.trials) if snapshot else 0
+
+
+def _until(holds: Callable[[], bool]) -> Walk:
+    """Wait for something, but not forever: a picture will show that it is missing."""
+    for _ in range(_PATIENCE_MS // _TURN_MS):
+        if holds():
+            return
+        yield _TURN_MS
+
+
+def _press(widget: QWidget, key: Qt.Key) -> None:
+    for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+        QApplication.sendEvent(widget, QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier))

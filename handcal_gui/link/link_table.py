@@ -1,0 +1,141 @@
+"""The numbers of the link: a column each way, and a row for each reason of a rejection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+
+from handcal.link.rates import LinkRates
+from handcal.link.server import LinkStatistics
+from handcal.link.wire import Rejection
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
+from handcal_gui.widgets.numbers import signed
+
+RATES_S = 2.0
+"""Over so long are rates and losses taken."""
+
+_OUT, _IN, _BOTH = 1, 2, 3
+"""Columns of the table; the last means both."""
+_WIDEST = {_OUT: "9999.9 kB/s", _IN: "9999.9 kB/s", _BOTH: "−999999.999 s ± 9.9 ms"}
+_ROWS = {
+    "Latency": {_IN: "Half the median time of a round trip to the headset, in milliseconds"},
+    "Clock": {
+        _BOTH: "By how much the headset's clock is ahead of this computer's, in seconds, and how "
+        "well that is known, in milliseconds"
+    },
+    "Clock drift": {_IN: "How much faster the headset's clock runs, in parts per million"},
+    "Poses": {_IN: "The headset's poses in one second"},
+    "Data": {
+        _OUT: f"Kilobytes per second to the headset, over {RATES_S:g} s",
+        _IN: f"Kilobytes per second from the headset, over {RATES_S:g} s",
+    },
+    "Lost": {
+        _OUT: f"Share of the datagrams to the headset that did not arrive, over {RATES_S:g} s",
+        _IN: f"Share of the headset's datagrams that did not arrive, over {RATES_S:g} s",
+    },
+    "Resent": {_OUT: "Parts of messages sent again, as they were not acknowledged in time"},
+    "Unacknowledged": {_OUT: "Messages that the headset has not acknowledged yet"},
+    "Given up": {_OUT: "Messages that the headset did not acknowledge for too long"},
+    "Rejected": {_IN: "Datagrams that were not accepted, for the reasons below"},
+}
+"""Captions, and what the numbers mean by column."""
+REJECTIONS = {
+    Rejection.UNPAIRED: "Signed with another pairing key: give the headset the key below",
+    Rejection.CORRUPT: "Damaged on the way, or not meant for handcal",
+    Rejection.REPLAYED: "Came twice or much too late; a few are normal in a wireless network",
+    Rejection.OVERSIZED: "Longer than the protocol allows: check the headset's program",
+    Rejection.WRONG_VERSION: "The headset's program speaks another version: update it",
+    Rejection.WRONG_SESSION: "Sent before the headset connected anew; a few are normal",
+}
+"""What each reason means, and what to do."""
+
+
+class LinkTable(QWidget):
+    """Shows the numbers of a link; a reason of rejections only once there are some."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("link-table")
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(2 * SPACING_PX)
+        self._grid.setVerticalSpacing(SPACING_PX // 4)
+        self._grid.setColumnStretch(0, 1)
+        for column, heading in ((_OUT, "To headset"), (_IN, "From headset")):
+            self._grid.addWidget(QLabel(heading), 0, column, Qt.AlignmentFlag.AlignRight)
+        self._numbers = {
+            (caption, column): number
+            for caption, meanings in _ROWS.items()
+            for column, number in self._add_row(caption, meanings)[1].items()
+        }
+        self._rejections: dict[str, tuple[QLabel, NumberLabel]] = {}
+        for reason, meaning in REJECTIONS.items():
+            caption, numbers = self._add_row(f"    {reason.replace('_', ' ')}", {_IN: meaning})
+            self._rejections[reason] = caption, numbers[_IN]
+        self._show_rejections({})
+
+    def show_link(self, link: LinkStatistics, rates: LinkRates | None) -> None:
+        """Show counters, and rates where they are known."""
+        for cell, text in _texts(link, rates).items():
+            self._numbers[cell].setText(text)
+        self._show_rejections(link.rejected)
+
+    def _show_rejections(self, rejected: Mapping[str, int]) -> None:
+        for reason, (caption, number) in self._rejections.items():
+            count = rejected.get(reason, 0)
+            number.setText(str(count))
+            caption.setVisible(count > 0)
+            number.setVisible(count > 0)
+
+    def _add_row(
+        self, text: str, meanings: Mapping[int, str]
+    ) -> tuple[QLabel, dict[int, NumberLabel]]:
+        """Add a row at the end; return its caption, and its numbers by column."""
+        row = self._grid.rowCount()
+        caption = QLabel(text)
+        self._grid.addWidget(caption, row, 0)
+        numbers = {}
+        for column, meaning in meanings.items():
+            caption.setToolTip(meaning)
+            name = f"link-{text.strip().lower().replace(' ', '-')}-{column}"
+            numbers[column] = NumberLabel(name, _WIDEST[column], meaning)
+            place = (_OUT, 1, 2) if column == _BOTH else (column, 1, 1)
+            self._grid.addWidget(numbers[column], row, *place)
+        return caption, numbers
+
+
+def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int], str]:
+    """Return the texts of the rows above, by caption and column."""
+    drift_ppm = link.clock_drift_ppm
+    texts = {
+        ("Latency", _IN): _text(link.latency_ms, "ms"),
+        ("Clock", _BOTH): _clock(link),
+        ("Clock drift", _IN): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
+        ("Poses", _IN): _text(link.pose_rate_hz, "Hz"),
+        ("Resent", _OUT): str(link.resent),
+        ("Unacknowledged", _OUT): str(link.unacked),
+        ("Given up", _OUT): str(link.failed),
+        ("Rejected", _IN): str(sum(link.rejected.values())),
+    }
+    if rates is not None:
+        texts |= {
+            ("Data", _OUT): _text(rates.sent_bytes_s / 1e3, "kB/s"),
+            ("Data", _IN): _text(rates.received_bytes_s / 1e3, "kB/s"),
+            ("Lost", _OUT): _text(rates.lost, "%", 100.0),
+            ("Lost", _IN): _text(rates.lost_inbound, "%", 100.0),
+        }
+    return texts
+
+
+def _clock(link: LinkStatistics) -> str:
+    offset_ms, uncertainty_ms = link.clock_offset_ms, link.clock_uncertainty_ms
+    if offset_ms is None or uncertainty_ms is None:
+        return UNKNOWN
+    return f"{signed(offset_ms / 1e3, 3)} s ± {uncertainty_ms:.1f} ms"
+
+
+def _text(value: float | None, unit: str, units_per_value: float = 1.0) -> str:
+    return UNKNOWN if value is None else f"{units_per_value * value:.1f} {unit}"

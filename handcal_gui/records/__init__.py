@@ -1,0 +1,1 @@
+"""Tables of alignments and trials, for the session and trials panels."""

@@ -1,0 +1,23 @@
+"""Tabs with tables of things, and one button that deletes what is chosen in the visible one."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QTabWidget, QToolButton, QWidget
+
+from handcal_gui.records.record_table import RecordTable
+
+
+class RecordTabs(QTabWidget):
+    """Tabs whose corner holds the button while a `RecordTable` is shown."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._delete = QToolButton()
+        self.setCornerWidget(self._delete)
+        self.currentChanged.connect(self._refresh)
+
+    def _refresh(self) -> None:
+        page = self.currentWidget()
+        if isinstance(page, RecordTable):
+            self._delete.setDefaultAction(page.delete_action)
+        self._delete.setVisible(isinstance(page, RecordTable))

@@ -1,0 +1,66 @@
+"""One line that says what was deleted last, and takes it back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+
+from handcal_gui.records.session_rows import Deletion
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.elided_label import ElidedLabel
+
+
+class UndoStrip(QWidget):
+    """Keeps its room while there is nothing to undo, so that nothing jumps.
+
+    Parameters
+    ----------
+    parent : QWidget
+        Within it, Ctrl+Z undoes.
+
+    Attributes
+    ----------
+    restore_requested : Signal(Deletion)
+    """
+
+    restore_requested = Signal(object)
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setObjectName("undoStrip")
+        self._deletions: list[Deletion] = []
+        self._text = ElidedLabel()
+        self._text.setObjectName("undoText")
+        self._undo = QAction("Undo", self)
+        self._undo.setToolTip("Restore what was deleted (Ctrl+Z)")
+        self._undo.setShortcut(QKeySequence.StandardKey.Undo)
+        self._undo.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        self._undo.triggered.connect(self._restore)
+        parent.addAction(self._undo)
+        self._button = QToolButton()
+        self._button.setDefaultAction(self._undo)
+        policy = self._button.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self._button.setSizePolicy(policy)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._text)
+        layout.addWidget(self._button)
+        self.show_deletions([])
+
+    def show_deletions(self, deletions: Sequence[Deletion]) -> None:
+        """Offer to restore the last of them."""
+        self._deletions = list(deletions)
+        self._undo.setEnabled(bool(deletions))
+        self._button.setVisible(bool(deletions))
+        if deletions:
+            self._text.setText(f"{deletions[-1].kind.capitalize()} {deletions[-1].number} deleted.")
+        else:
+            self._text.clear()
+
+    def _restore(self) -> None:
+        self.restore_requested.emit(self._deletions[-1])

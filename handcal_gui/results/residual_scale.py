@@ -1,0 +1,69 @@
+"""Residuals as colours, and the scale that says which is which."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from handcal.register.verdict import VerdictSettings
+from handcal.types import Float64, UInt8
+from handcal_gui.cloud.splat import rgb
+from handcal_gui.theme import SPACING_PX, colors, is_dark
+
+LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
+"""The colours end where the verdict would refuse such an rms, so that pictures compare."""
+_VIRIDIS = ("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b")
+"""Matplotlib's map without its ends, which are too faint on a dark or a light canvas."""
+_BAR_PX = 12
+
+
+def residual_ramp() -> UInt8:
+    """Return (8, 3) RGB from none to `LARGEST_MM`, from faint to strong before the canvas."""
+    ramp = np.array([rgb(stop) for stop in _VIRIDIS], np.uint8)
+    return ramp if is_dark() else ramp[::-1]
+
+
+def residual_colors(residuals_m: Float64) -> UInt8:
+    """Return (N, 3) RGB of distances; those of no partner, NaN, are red."""
+    ramp = residual_ramp()
+    place = np.clip(1e3 * residuals_m / LARGEST_MM, 0.0, 1.0) * (len(ramp) - 1)
+    shades = np.stack([np.interp(place, np.arange(len(ramp)), c) for c in ramp.T], axis=1)
+    shades[np.isnan(residuals_m)] = rgb(colors().red)
+    return shades.astype(np.uint8)
+
+
+class ResidualScale(QWidget):
+    """The scale from zero to `LARGEST_MM`, and the colour of points without a partner."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("residual-scale")
+        self.setAccessibleName("Scale of residuals")
+        self.setToolTip(
+            "How far each point of the hand lies from its partner on the cursor after "
+            "registration, in millimetres; outliers have no partner"
+        )
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setFixedHeight(max(_BAR_PX, self.fontMetrics().height()))
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw the bar between its ends' numbers, and the outliers' colour behind it."""
+        painter = QPainter(self)
+        width_of = painter.fontMetrics().horizontalAdvance
+        low, high, outlier = "Residual 0", f"{LARGEST_MM:.0f} mm", "Outlier"
+        gap, top = SPACING_PX / 2, (self.height() - _BAR_PX) / 2
+        swatch = QRectF(self.width() - width_of(outlier) - gap - _BAR_PX, top, _BAR_PX, _BAR_PX)
+        left = width_of(low) + gap
+        bar = QRectF(left, top, swatch.x() - width_of(high) - 5 * gap - left, _BAR_PX)
+        gradient = QLinearGradient(bar.topLeft(), bar.topRight())
+        ramp = residual_ramp().tolist()
+        for i, color in enumerate(ramp):
+            gradient.setColorAt(i / (len(ramp) - 1), QColor(*color))
+        painter.fillRect(bar, gradient)
+        painter.fillRect(swatch, QColor(colors().red))
+        painter.setPen(self.palette().windowText().color())
+        for x, text in ((0.0, low), (bar.right() + gap, high), (swatch.right() + gap, outlier)):
+            where = QRectF(x, 0, self.width(), self.height())
+            painter.drawText(where, Qt.AlignmentFlag.AlignVCenter, text)

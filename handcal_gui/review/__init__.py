@@ -1,0 +1,1 @@
+"""A stored session: read, solved again, compared, shown."""

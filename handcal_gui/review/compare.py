@@ -1,0 +1,63 @@
+"""Alignments solved with another method, beside the panel that shows both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from PySide6.QtCore import QObject
+
+from handcal.results import SolveSettings, solve_session
+from handcal.types import Alignment, Method, Rig
+from handcal_gui.panels.results import ResultsPanel
+from handcal_gui.running.jobs import IsCancelled, Job, Report
+
+
+class Comparison(QObject):
+    """Solves with another method whenever a results panel asks for it.
+
+    Parameters
+    ----------
+    panel : ResultsPanel
+    """
+
+    def __init__(self, panel: ResultsPanel) -> None:
+        super().__init__(panel)
+        self._panel = panel
+        self._alignments: Sequence[Alignment] = ()
+        self._rig: Rig | None = None
+        self._settings = SolveSettings()
+        self._job: Job | None = None
+        panel.compare_requested.connect(self._start)
+        panel.compare_cancelled.connect(self._give_up)
+
+    def use(self, alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> None:
+        """Compare these from now on."""
+        self._alignments, self._rig, self._settings = alignments, rig, settings
+
+    def cancel(self) -> None:
+        """Stop, and wait for it; nothing is shown any more."""
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+
+    def _give_up(self) -> None:
+        """Stop without waiting: a method may take seconds for what it has begun."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job.succeeded.disconnect()
+            self._job.failed.disconnect()
+
+    def _start(self, method: Method) -> None:
+        self.cancel()
+        alignments, rig = self._alignments, self._rig
+        settings = replace(self._settings, method=method)
+
+        def work(report: Report, is_cancelled: IsCancelled) -> object:
+            assert rig is not None
+            return solve_session(alignments, rig, settings, report, is_cancelled)
+
+        self._job = Job(work, self)
+        self._job.succeeded.connect(self._panel.show_comparison)
+        self._job.failed.connect(self._panel.comparison_failed)
+        self._job.start()

@@ -1,0 +1,130 @@
+"""A stored session: read, solved again, and shown in the panels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QProgressDialog
+
+from handcal.calibrate import CalibrationSettings
+from handcal.config import read_settings
+from handcal.errors import FileError
+from handcal.results import Results, SolveSettings, solve_session
+from handcal.session import Session, SessionRecord
+from handcal_gui.review.compare import Comparison
+from handcal_gui.review.review_page import ReviewPage
+from handcal_gui.running.jobs import IsCancelled, Job, Report
+from handcal_gui.window import MainWindow
+
+_PATIENCE_MS = 500
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stored:
+    record: SessionRecord
+    settings: SolveSettings
+    results: Results | None
+
+
+class Review(QObject):
+    """Opens one stored session after the other, read-only.
+
+    Parameters
+    ----------
+    window : MainWindow
+    page : ReviewPage
+    comparison : Comparison
+
+    Attributes
+    ----------
+    opened : Signal(Path)
+    failed : Signal(str)
+        A session could not be opened, and why.
+    record : SessionRecord or None
+        What is shown.
+    """
+
+    opened = Signal(object)
+    failed = Signal(str)
+
+    def __init__(self, window: MainWindow, page: ReviewPage, comparison: Comparison) -> None:
+        super().__init__(window)
+        self._window = window
+        self._page = page
+        self._comparison = comparison
+        self._job: Job | None = None
+        self._progress: QProgressDialog | None = None
+        self.record: SessionRecord | None = None
+
+    def open(self, path: Path) -> None:
+        """Read and solve a session, then show it."""
+        self.close()
+
+        def work(report: Report, is_cancelled: IsCancelled) -> _Stored:
+            record = Session.open(path)
+            calibration = read_settings(CalibrationSettings, record.settings.get("calibration", {}))
+            settings = calibration.solve
+            if not record.alignments:
+                return _Stored(record, settings, None)
+            try:
+                results = solve_session(
+                    record.alignments, record.rig, settings, report, is_cancelled
+                )
+            except ValueError as error:
+                raise FileError(f"{path} cannot be solved: {error}") from error
+            return _Stored(record, settings, results)
+
+        self._job = Job(work, self)
+        self._job.succeeded.connect(self._show)
+        self._job.failed.connect(self._fail)
+        self._job.cancelled.connect(lambda: self._fail(f"{path} was not opened: cancelled"))
+        self._show_progress(self._job)
+        self._job.start()
+
+    def close(self) -> None:
+        """Stop what goes on; safe to call twice."""
+        self._comparison.cancel()
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+        self._end_progress()
+        self.record = None
+
+    def _show_progress(self, job: Job) -> None:
+        """Say what takes so long, if it does, and let it be cancelled."""
+        progress = QProgressDialog("Reading the session…", "Cancel", 0, 0, self._window)
+        progress.setObjectName("opening")
+        progress.setMinimumDuration(_PATIENCE_MS)
+        progress.canceled.connect(job.cancel)
+        job.progressed.connect(lambda doing, _share: progress.setLabelText(f"{doing}…"))
+        self._progress = progress
+
+    def _end_progress(self) -> None:
+        if self._progress is not None:
+            self._progress.deleteLater()
+            self._progress = None
+
+    def _fail(self, why: str) -> None:
+        self._end_progress()
+        self.failed.emit(why)
+
+    def _show(self, stored: _Stored) -> None:
+        self._end_progress()
+        self.record = record = stored.record
+        panels = self._window.panels
+        note = "" if stored.results else "It holds no alignment yet."
+        self._page.show_session(record, stored.results, note)
+        panels.results.show_results(stored.results, record.alignments, record.rig)
+        panels.session.set_read_only(True)
+        panels.session.show_record(record, stored.results)
+        panels.trials.set_read_only(True)
+        panels.trials.show_record(record)
+        if stored.results is not None:
+            last = record.alignments[-1]
+            residuals_m = stored.results.alignments[-1][last.eyes[0]].residuals_m
+            panels.cloud.show_alignment(last, residuals_m)
+            self._comparison.use(record.alignments, record.rig, stored.settings)
+        self._window.show_page("review")
+        self.opened.emit(record.path)

@@ -1,0 +1,101 @@
+"""The page of a finished session: what it is, and what may be done with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from handcal.results import Results
+from handcal.session import SessionRecord
+from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import button, main_button, paragraph
+
+
+class ReviewPage(QWidget):
+    """Says what a session holds; the panels show it.
+
+    Attributes
+    ----------
+    export_requested, resume_requested, close_requested : Signal()
+    """
+
+    export_requested = Signal()
+    resume_requested = Signal()
+    close_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("reviewPage")
+        self._title = QLabel()
+        font = self._title.font()
+        font.setPointSizeF(1.6 * font.pointSizeF())
+        font.setBold(True)
+        self._title.setFont(font)
+        self._facts = QFormLayout()
+        self._facts.setHorizontalSpacing(2 * SPACING_PX)
+        self._facts.setVerticalSpacing(SPACING_PX)
+        self._export = main_button("reviewExport", "&Export…")
+        self._resume = button("reviewResume", "&Go on with this session")
+        self._resume.setToolTip("Open camera and headset, and add alignments, φ or trials to it")
+        close = button("reviewClose", "&Close session")
+        self._export.clicked.connect(self.export_requested)
+        self._resume.clicked.connect(self.resume_requested)
+        close.clicked.connect(self.close_requested)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self._export)
+        buttons.addWidget(self._resume)
+        buttons.addStretch()
+        buttons.addWidget(close)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(2 * SPACING_PX)
+        layout.addWidget(self._title)
+        layout.addLayout(self._facts)
+        layout.addLayout(buttons)
+        layout.addStretch()
+
+    def show_session(self, record: SessionRecord, results: Results | None, note: str = "") -> None:
+        """Show a session, solved again if it can be.
+
+        Parameters
+        ----------
+        record : SessionRecord
+        results : Results or None
+            None while it is being solved, or if it cannot be.
+        note : str
+            What goes on, or why there are no results.
+        """
+        self._title.setText(record.wearer or "Session without a name")
+        self._export.setEnabled(bool(record.alignments))
+        while self._facts.rowCount():
+            self._facts.removeRow(0)
+        for name, fact in _facts(record, results, note):
+            text = paragraph(f"review{name.replace(' ', '')}", fact)
+            text.setTextFormat(Qt.TextFormat.PlainText)
+            text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            self._facts.addRow(name, text)
+
+
+def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
+    """Give what is to be known of a session, by name."""
+    started = datetime.fromisoformat(record.events[0].time).astimezone()
+    yield "Started", f"{started:%d %B %Y, %H:%M}"
+    yield "Rig", record.rig.name
+    state = "finished" if record.is_finished else "not finished"
+    counts = _count(len(record.alignments), "alignment"), _count(len(record.trials), "trial")
+    yield "Holds", f"{', '.join(counts)}; {state}"
+    yield "Folder", str(record.path)
+    for eye, verdict in results.verdicts.items() if results else ():
+        yield EYE_NAMES[eye], f"{VERDICT_WORDS[verdict.name]}: {verdict.reason}"
+    if note:
+        yield "Note", note
+    if record.torn_bytes:
+        yield "Journal", "The last line is unfinished, as after a crash."
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,1 @@
+"""The engine at work for the window: the only threads of the desktop."""

@@ -1,0 +1,74 @@
+"""Work that takes longer than a frame: in a thread of its own, with progress and cancel."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal
+
+from handcal.errors import CancelledError, HandcalError
+from handcal_gui.running.worker import Worker
+
+_LOG = logging.getLogger(__name__)
+
+Report = Callable[[str, float], None]
+IsCancelled = Callable[[], bool]
+Work = Callable[[Report, IsCancelled], object]
+
+
+class Job(Worker):
+    """Calls `work` once, in a thread.
+
+    Parameters
+    ----------
+    work : callable
+        Given `report`, to be told what is going on and which share is done, and `is_cancelled`, to
+        be asked often; raises CancelledError when it stops early.
+
+    Attributes
+    ----------
+    progressed : Signal(str, float)
+    succeeded : Signal(object)
+        What `work` returned.
+    failed : Signal(str)
+        Why, for a person to read.
+    cancelled : Signal()
+    """
+
+    progressed = Signal(str, float)
+    succeeded = Signal(object)
+    failed = Signal(str)
+    cancelled = Signal()
+
+    def __init__(self, work: Work, parent: QObject | None = None) -> None:
+        super().__init__("handcal job", parent)
+        self._work = work
+        self._cancelled = threading.Event()
+
+    def cancel(self) -> None:
+        """Ask the work to stop; it says so by `cancelled`, unless it comes to its end first."""
+        self._cancelled.set()
+
+    def abandon(self) -> None:
+        """Have the work stop, and wait for it; nothing more is heard of it."""
+        self.cancel()
+        self.wait()
+        self._forget_all()
+
+    def _run(self) -> None:
+        try:
+            done = self._work(self._report, self._cancelled.is_set)
+        except CancelledError:
+            self._say(self.cancelled.emit)
+        except HandcalError as error:
+            self._say(self.failed.emit, str(error))
+        except Exception as error:
+            _LOG.exception("a job broke down")
+            self._say(self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})")
+        else:
+            self._say(self.succeeded.emit, done)
+
+    def _report(self, doing: str, share: float) -> None:
+        self._say(self.progressed.emit, doing, share)

@@ -1,0 +1,268 @@
+"""A running calibration: from the engine's newest snapshot to the panels, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from handcal.calibrate import Calibration, State
+from handcal.errors import FileError
+from handcal.snapshot import Snapshot
+from handcal.station import Station
+from handcal_gui.review.compare import Comparison
+from handcal_gui.running.stream import Command, Stream
+from handcal_gui.window import MainWindow, Panel
+from handcal_gui.wizard.steps import Action, EyePlan, Step, Wizard
+from handcal_gui.wizard.wizard import WizardPanel
+
+_POLL_MS = 33
+_PANELS_OF_STEPS = {
+    Step.CONNECT: "link",
+    Step.SOLVE: "results",
+    Step.VERIFY: "results",
+    Step.SAVE: "session",
+}
+"""What to look at when a step begins."""
+
+
+class Live(QObject):
+    """Connects a stream with the window while a wearer is calibrated; one after the other.
+
+    Parameters
+    ----------
+    window : MainWindow
+    wizard_panel : WizardPanel
+    comparison : Comparison
+
+    Attributes
+    ----------
+    opened : Signal(Path)
+        A station runs; its session's folder.
+    ended : Signal(str)
+        The engine ended, and why; empty if it was closed.
+    polled : Signal(Snapshot)
+        A new snapshot is shown.
+    export_requested, next_wearer_requested : Signal()
+    """
+
+    opened = Signal(object)
+    ended = Signal(str)
+    polled = Signal(object)
+    export_requested = Signal()
+    next_wearer_requested = Signal()
+
+    def __init__(
+        self, window: MainWindow, wizard_panel: WizardPanel, comparison: Comparison
+    ) -> None:
+        super().__init__(window)
+        self._window = window
+        self._wizard_panel = wizard_panel
+        self._comparison = comparison
+        self._stream: Stream | None = None
+        self._snapshot: Snapshot | None = None
+        self._is_watching = False
+        self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
+        self._complained_of = ""
+        self._timer = QTimer(self)
+        self._timer.setInterval(_POLL_MS)
+        self._timer.timeout.connect(self._poll)
+        self._connect()
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The newest snapshot shown; None unless a calibration runs."""
+        return self._snapshot
+
+    def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
+        """Run a station, after ending the present one."""
+        self.stop()
+        self._is_watching = False
+        self._doing = self._shown = 0
+        self._wizard_panel.start(Wizard(plan))
+        self._stream = Stream(open_station, self)
+        self._stream.opened.connect(self._take_station)
+        self._stream.obeyed.connect(self._take_answer)
+        self._stream.failed.connect(self._take_failure)
+        self._stream.ended.connect(self._take_end)
+        self._stream.start()
+
+    def stop(self) -> None:
+        """End the calibration and wait for it; safe to call twice."""
+        self._comparison.cancel()
+        stream = self._stream
+        if stream is not None:
+            self._window.panels.fine_tune.settle()
+            self._window.panels.session.flush()
+            stream.close()
+            stream.deleteLater()
+        self._stream = None
+        self._timer.stop()
+        self._snapshot = None
+        self._window.banner.show_condition("")
+
+    def do(self, action: Action) -> None:
+        """Do what the wizard offers, unless something that it offered is still being done."""
+        snapshot = self._snapshot
+        if snapshot is None or self._shown < self._doing:
+            return
+        eyes = self._wizard_panel.wizard.eyes(snapshot)
+        commands: dict[Action, Callable[[Calibration], object]] = {
+            Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
+            Action.CONFIRM: _confirm,
+            Action.SOLVE: Calibration.solve,
+            Action.APPLY: Calibration.apply,
+            Action.REDO: Calibration.redo,
+        }
+        if action in commands:
+            self._doing = self._calibrate(action.value, commands[action])
+        elif action is Action.FINISH:
+            self._doing = self._ask(action.value, Station.finish)
+        elif action is Action.EXPORT:
+            self.export_requested.emit()
+        elif action is Action.NEXT_WEARER:
+            self.next_wearer_requested.emit()
+        else:
+            self._wizard_panel.wizard.move(action, snapshot)
+            self._wizard_panel.show_snapshot(snapshot)
+
+    def _connect(self) -> None:
+        panels = self._window.panels
+        self._wizard_panel.asked.connect(self.do)
+        self._wizard_panel.step_changed.connect(
+            lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
+        )
+        self._window.space_pressed.connect(self._wizard_panel.press_main)
+        for name, dock in self._window.docks.items():
+            dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
+        self._connect_fine_tuning()
+        self._connect_session()
+        panels.link.restart_headset_requested.connect(
+            lambda: self._ask("restart the headset", Station.restart_headset)
+        )
+
+    def _connect_fine_tuning(self) -> None:
+        fine_tune, trials = self._window.panels.fine_tune, self._window.panels.trials
+        fine_tune.shift_changed.connect(
+            lambda shifts_m: self._calibrate("set φ", lambda c: c.set_shift(shifts_m))
+        )
+        fine_tune.shift_settled.connect(
+            lambda: self._calibrate("record φ", Calibration.record_shift)
+        )
+        # What is shown for a comparison only is not the φ that a trial is about.
+        trials.trial_requested.connect(fine_tune.settle)
+        trials.trial_requested.connect(
+            lambda eye, depth_m: self._ask("record the trial", lambda s: s.save_trial(eye, depth_m))
+        )
+
+    def _connect_session(self) -> None:
+        session, trials = self._window.panels.session, self._window.panels.trials
+        session.delete_alignment_requested.connect(
+            lambda number: self._calibrate(
+                "delete the alignment", lambda c: c.delete_alignment(number)
+            )
+        )
+        session.restore_alignment_requested.connect(
+            lambda number: self._calibrate(
+                "restore the alignment", lambda c: c.restore_alignment(number)
+            )
+        )
+        for panel in (session, trials):
+            panel.delete_trial_requested.connect(
+                lambda number: self._ask(
+                    "delete the trial", lambda s: s.session.delete_trial(number)
+                )
+            )
+            panel.restore_trial_requested.connect(
+                lambda number: self._ask(
+                    "restore the trial", lambda s: s.session.restore_trial(number)
+                )
+            )
+        session.notes_changed.connect(
+            lambda text: self._ask("save the notes", lambda s: s.session.save_notes(text))
+        )
+
+    def _ask(self, name: str, command: Command) -> int:
+        return self._stream.ask(name, command) if self._stream is not None else 0
+
+    def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> int:
+        """Ask the procedure; what it cannot write, it keeps, and the station tells of that."""
+
+        def obey(station: Station) -> None:
+            with suppress(FileError):
+                command(station.calibration)
+
+        return self._ask(name, obey)
+
+    def _poll(self) -> None:
+        snapshot, shown = self._stream.newest() if self._stream is not None else (None, 0)
+        if snapshot is None or snapshot is self._snapshot:
+            return
+        self._shown = shown
+        if self._snapshot is None or snapshot.record is not self._snapshot.record:
+            self._comparison.use(
+                snapshot.record.alignments, snapshot.record.rig, self._solve_settings
+            )
+        self._snapshot = snapshot
+        panels = self._window.panels
+        # Out of sight, too: they may be used before another snapshot comes.
+        always = panels.fine_tune, panels.trials
+        for panel in panels.all():
+            if panel in always or not panel.visibleRegion().isEmpty():
+                panel.show_snapshot(snapshot)
+        self._wizard_panel.show_snapshot(snapshot)
+        self._window.banner.show_condition(
+            snapshot.problem or snapshot.camera.problem or snapshot.link_problem
+        )
+        self._watch_views(not panels.wearer_view.visibleRegion().isEmpty())
+        self.polled.emit(snapshot)
+
+    def _catch_up(self, panel: Panel, is_seen: bool) -> None:
+        """Let a panel that comes into sight show at once how things stand."""
+        if is_seen and self._snapshot is not None:
+            panel.show_snapshot(self._snapshot)
+
+    def _watch_views(self, wanted: bool) -> None:
+        """Have the wearer's views rendered only while they are seen."""
+        if wanted != self._is_watching:
+            self._is_watching = wanted
+            self._ask("watch", lambda station: setattr(station, "watch_views", wanted))
+
+    def _take_station(self, station: Station) -> None:
+        panels = self._window.panels
+        self._solve_settings = station.settings.calibration.solve
+        host, port = station.address
+        panels.camera.begin(station.settings.calibration.segment)
+        panels.fine_tune.set_rig(station.rig)
+        panels.results.show_results(None, (), station.rig)
+        panels.session.set_read_only(False)
+        panels.trials.set_read_only(False)
+        panels.link.show_pairing(
+            f"{host}:{port}", station.pairing_key, is_virtual=station.settings.headset == "virtual"
+        )
+        self._window.show_page("live")
+        self._timer.start()
+        self.opened.emit(station.session.path)
+
+    def _take_answer(self, name: str, _answer: object) -> None:
+        if name == Action.FINISH and self._snapshot is not None:
+            self._wizard_panel.wizard.move(Action.FINISH, self._snapshot)
+        # One thing that the wizard offers done makes up for another that could not be.
+        if name == self._complained_of or {name, self._complained_of} <= set(Action):
+            self._window.banner.clear()
+
+    def _take_failure(self, name: str, why: str) -> None:
+        self._complained_of = name
+        self._window.banner.show_message(f"Could not {name}: {why}")
+
+    def _take_end(self, why: str) -> None:
+        self._timer.stop()
+        self.ended.emit(why)
+
+
+def _confirm(calibration: Calibration) -> None:
+    """Confirm for the wearer, who may have been quicker."""
+    if calibration.state is State.ALIGN:
+        calibration.confirm()

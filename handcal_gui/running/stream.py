@@ -1,0 +1,110 @@
+"""The engine's thread: it owns the station, runs it frame after frame, and obeys in between."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal
+
+from handcal.errors import HandcalError
+from handcal.snapshot import Snapshot
+from handcal.station import Station
+from handcal_gui.running.worker import Worker
+
+_LOG = logging.getLogger(__name__)
+
+Command = Callable[[Station], object]
+
+
+class Stream(Worker):
+    """Runs a station in a thread until closed.
+
+    Snapshots wait in a place for one: whoever polls gets the newest and never an old one, however
+    slow the window is.
+
+    Parameters
+    ----------
+    open_station : callable
+        Opens the station, in the engine's thread.
+
+    Attributes
+    ----------
+    opened : Signal(Station)
+        The station runs. Only its constants may be read in other threads.
+    obeyed : Signal(str, object)
+        A command is done: its name and what it returned.
+    failed : Signal(str, str)
+        A command failed: its name and why, for a person to read.
+    ended : Signal(str)
+        The station could not be opened or broke down, and why; empty if it was closed.
+    """
+
+    opened = Signal(object)
+    obeyed = Signal(str, object)
+    failed = Signal(str, str)
+    ended = Signal(str)
+
+    def __init__(self, open_station: Callable[[], Station], parent: QObject | None = None) -> None:
+        super().__init__("handcal engine", parent)
+        self._open_station = open_station
+        self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
+        self._asked = self._done = 0
+        self._newest: tuple[Snapshot | None, int] = None, 0
+        self._closing = threading.Event()
+
+    def newest(self) -> tuple[Snapshot | None, int]:
+        """Return the newest snapshot, None before the first, and how many commands it shows."""
+        return self._newest
+
+    def ask(self, name: str, command: Command) -> int:
+        """Have the engine's thread call `command` with the station, before its next frame.
+
+        Returns
+        -------
+        int
+            How many commands have been asked for, this one included.
+        """
+        self._commands.put((name, command))
+        self._asked += 1
+        return self._asked
+
+    def close(self) -> None:
+        """End the thread and close the station, and hear the last of it; safe to call twice."""
+        self._closing.set()
+        self.wait()
+        self._hear_all()
+
+    def _run(self) -> None:
+        why = ""
+        try:
+            with self._open_station() as station:
+                self._say(self.opened.emit, station)
+                while not self._closing.is_set():
+                    self._newest = station.step(), self._done
+                    self._obey(station)
+                self._obey(station)  # what was asked for just before the end, such as notes
+        except HandcalError as error:
+            why = str(error)
+        except Exception as error:
+            _LOG.exception("the engine broke down")
+            why = f"handcal broke down ({_told(error)}); the session is kept"
+        self._say(self.ended.emit, why)
+
+    def _obey(self, station: Station) -> None:
+        while not self._commands.empty():
+            name, command = self._commands.get()
+            try:
+                self._say(self.obeyed.emit, name, command(station))
+            except (HandcalError, ValueError) as error:
+                self._say(self.failed.emit, name, str(error))
+            except Exception as error:
+                _LOG.exception("a command broke down: %s", name)
+                self._say(self.failed.emit, name, _told(error))
+            self._done += 1
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

@@ -1,0 +1,146 @@
+"""The first thing a technician sees: start a calibration, resume one, or open a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QVBoxLayout, QWidget
+
+from handcal.preflight import check_station
+from handcal_gui.preferences import Preferences
+from handcal_gui.start.card import Card
+from handcal_gui.start.latest_job import LatestJob
+from handcal_gui.start.new_calibration import Check, NewCalibration
+from handcal_gui.start.session_entries import Offers, find_offers
+from handcal_gui.start.session_list import SessionList
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import button
+
+FindOffers = Callable[[Path, Sequence[Path]], Offers]
+
+
+class StartPage(QWidget):
+    """Offers the three ways to begin.
+
+    Parameters
+    ----------
+    preferences : Preferences
+    pairing_key : str
+        For network headsets.
+    check, find_offers : callable
+        What looks at a station, and for sessions; called in jobs.
+
+    Attributes
+    ----------
+    start_requested : Signal(StationSettings, str)
+        A station that has just been found ready, and the wearer.
+    open_requested, resume_requested : Signal(Path)
+        A session's folder.
+    """
+
+    start_requested = Signal(object, str)
+    open_requested = Signal(object)
+    resume_requested = Signal(object)
+
+    def __init__(
+        self,
+        preferences: Preferences,
+        pairing_key: str,
+        check: Check = check_station,
+        find_offers: FindOffers = find_offers,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("startPage")
+        self._recent: tuple[Path, ...] = ()
+        self._folder = Path()
+        self.new = NewCalibration(preferences, pairing_key, check)
+        self._resume = Card(
+            "Resume", "These calibrations were broken off; they can be gone on with.", "resume"
+        )
+        self._resume.setObjectName("resume")
+        self._resume.hide()
+        self._unfinished = SessionList("Unfinished sessions", "Resume")
+        self._resume.body.addWidget(self._unfinished)
+        self._open = Card("Open a session", "Look at it, solve it again, export it.", "folder")
+        self._open.setObjectName("open")
+        self._opened = SessionList(
+            "Recent sessions", "Open", "The sessions worked on last will be listed here."
+        )
+        browse = button("browse", "Choose folder…")
+        self._opened.add_button(browse)
+        self._open.body.addWidget(self._opened, 1)
+        self._lay_out()
+        self._find = LatestJob(lambda question: find_offers(*question), self)
+        self._find.answered.connect(self._take_offers)
+        self.new.start_requested.connect(self.start_requested)
+        self.new.changed.connect(self._look_in_another_folder)
+        self._unfinished.chosen.connect(self.resume_requested)
+        self._opened.chosen.connect(self.open_requested)
+        browse.clicked.connect(self.browse)
+        self.show_preferences(preferences)
+
+    def show_preferences(self, preferences: Preferences) -> None:
+        """Show what is remembered, for the next wearer."""
+        self._recent = tuple(map(Path, preferences.sessions))
+        self.new.show_preferences(preferences)
+        self._look_for_sessions()
+
+    def set_pairing_key(self, pairing_key: str) -> None:
+        """Take another key for network headsets."""
+        self.new.set_pairing_key(pairing_key)
+
+    def browse(self) -> None:
+        """Ask for a session's folder, to be opened."""
+        folder = QFileDialog.getExistingDirectory(self, "Session folder", str(self._folder))
+        if folder:
+            self.open_requested.emit(Path(folder))
+
+    def stop(self) -> None:
+        """Wait for the end of what runs in the background; before the program ends."""
+        self.new.stop()
+        self._find.stop()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look for sessions anew."""
+        super().showEvent(event)
+        self._look_for_sessions()
+
+    def _look_in_another_folder(self) -> None:
+        if Path(self.new.settings.sessions) != self._folder:
+            self._look_for_sessions()
+
+    def _look_for_sessions(self) -> None:
+        self._folder = Path(self.new.settings.sessions)
+        self._find.ask((self._folder, self._recent))
+
+    def _take_offers(self, _question: object, offers: Offers) -> None:
+        self._unfinished.show_entries(offers.unfinished)
+        self._resume.setVisible(bool(offers.unfinished))
+        self._opened.show_entries(offers.recent)
+
+    def _lay_out(self) -> None:
+        title = QLabel("handcal")
+        font = title.font()
+        font.setPointSizeF(2.0 * font.pointSizeF())
+        font.setBold(True)
+        title.setFont(font)
+        right = QVBoxLayout()
+        right.setSpacing(2 * SPACING_PX)
+        right.addWidget(self._resume, 1)
+        right.addWidget(self._open, 1)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(*4 * (3 * SPACING_PX,))
+        grid.setSpacing(2 * SPACING_PX)
+        grid.setColumnStretch(1, 3)
+        grid.setColumnStretch(2, 2)
+        grid.addWidget(title, 0, 1)
+        grid.addWidget(
+            QLabel("Calibrate a see-through headset with the wearer's bare hand."), 1, 1, 1, 2
+        )
+        grid.addWidget(self.new, 2, 1)
+        grid.addLayout(right, 2, 2)
+        grid.setRowStretch(2, 1)

@@ -1,0 +1,1 @@
+"""Parts of the fine-tune panel: φ edited, undone, streamed."""

@@ -1,0 +1,172 @@
+"""One eye's shift in fields and sliders, and what it does to what is drawn."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QDoubleSpinBox,
+    QGridLayout,
+    QLabel,
+    QRadioButton,
+    QSlider,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.display import DrawnMove
+from handcal.types import Float64
+from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.widgets.numbers import signed
+
+_SLIDER_MAX_MM = 15.0
+_SLIDER_STEPS_PER_MM = 100
+_DIRECTIONS = (
+    "to the right of the rig's viewpoint (φ1); negative is to the left",
+    "below the rig's viewpoint (φ2); negative is above",
+    "in front of the rig's viewpoint, towards the display (φ3); negative is behind",
+)
+_EFFECTS = {
+    "Right": "How far the target is drawn further to the right",
+    "Up": "How far the target is drawn further up",
+    "Size": "How much larger the target is drawn",
+}
+
+
+class EyeShiftEditor(QWidget):
+    """Shows φ of one eye in millimetres and asks for changes.
+
+    Parameters
+    ----------
+    title : str
+    limit_m : float
+        Largest value of a component, either way.
+
+    Attributes
+    ----------
+    edited : Signal(int, float)
+        Component 0 to 2, and its new value in metres.
+    chosen : QRadioButton
+        The title, checked if the arrow keys move this eye.
+    """
+
+    edited = Signal(int, float)
+
+    def __init__(self, title: str, limit_m: float, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.chosen = QRadioButton(title)
+        self.chosen.setToolTip("The arrow keys move this eye (E changes)")
+        self._fields = [self._make_field(title, axis, 1e3 * limit_m) for axis in range(3)]
+        self._sliders = [self._make_slider(title, axis) for axis in range(3)]
+        self._effects = {name: _number_label(tooltip) for name, tooltip in _EFFECTS.items()}
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(self.chosen)
+        layout.addLayout(self._lay_out_components())
+        layout.addLayout(self._lay_out_effects())
+        layout.addStretch(1)
+
+    def show_shift(self, shift_m: Float64) -> None:
+        """Show φ, (3,), metres; nothing is emitted."""
+        for value_m, field, slider in zip(shift_m, self._fields, self._sliders, strict=True):
+            value_mm = 1e3 * float(value_m)
+            with QSignalBlocker(field), QSignalBlocker(slider):
+                field.setValue(value_mm)
+                slider.setValue(round(_SLIDER_STEPS_PER_MM * value_mm))
+
+    def show_effect(self, effect: DrawnMove | None) -> None:
+        """Show how the target moves on the display; None if that is not known."""
+        if effect is None:
+            texts = ("–", "–", "–")
+        else:
+            texts = (
+                f"{signed(effect.right_px, 1)} px {signed(effect.right_arcmin, 1):>6}′",
+                f"{signed(effect.up_px, 1)} px {signed(effect.up_arcmin, 1):>6}′",
+                f"{signed(100 * (effect.size_ratio - 1), 2)} %",
+            )
+        for label, text in zip(self._effects.values(), texts, strict=True):
+            label.setText(text)
+
+    def set_step_mm(self, step_mm: float) -> None:
+        """Set by how much the fields' arrows and clicks beside a slider's handle change φ."""
+        for field, slider in zip(self._fields, self._sliders, strict=True):
+            field.setSingleStep(step_mm)
+            slider.setPageStep(round(_SLIDER_STEPS_PER_MM * step_mm))
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Leave undo and redo to the panel, and the wheel, unless a field has the focus."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            undoes = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo)
+            return any(event.matches(key) for key in undoes)
+        if event.type() == QEvent.Type.Wheel and not cast(QWidget, watched).hasFocus():
+            event.ignore()  # scrolling the panel must not change φ
+            return True
+        return super().eventFilter(watched, event)
+
+    def _make_field(self, title: str, axis: int, limit_mm: float) -> QDoubleSpinBox:
+        field = QDoubleSpinBox()
+        field.setObjectName(f"phi{axis + 1}")
+        field.setAccessibleName(f"{title} φ{axis + 1} in millimetres")
+        field.setToolTip(_tooltip(axis))
+        field.setRange(-limit_mm, limit_mm)
+        field.setDecimals(2)
+        field.setSuffix(" mm")
+        field.setFont(number_font())
+        field.setAlignment(Qt.AlignmentFlag.AlignRight)
+        field.setKeyboardTracking(False)
+        field.valueChanged.connect(lambda mm: self.edited.emit(axis, 1e-3 * mm))
+        field.installEventFilter(self)
+        field.lineEdit().installEventFilter(self)
+        return field
+
+    def _make_slider(self, title: str, axis: int) -> QSlider:
+        slider = QSlider(Qt.Orientation.Horizontal)
+        slider.setObjectName(f"slider{axis + 1}")
+        slider.setAccessibleName(f"{title} φ{axis + 1}")
+        slider.setToolTip(f"{_tooltip(axis)}\nThe slider goes to ±{_SLIDER_MAX_MM:g} mm")
+        slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        slider.installEventFilter(self)
+        reach = round(_SLIDER_STEPS_PER_MM * _SLIDER_MAX_MM)
+        slider.setRange(-reach, reach)
+        slider.valueChanged.connect(
+            lambda steps: self.edited.emit(axis, 1e-3 * steps / _SLIDER_STEPS_PER_MM)
+        )
+        return slider
+
+    def _lay_out_components(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setVerticalSpacing(SPACING_PX // 4)
+        for axis in range(3):
+            name = QLabel(f"φ{axis + 1}")
+            name.setToolTip(_tooltip(axis))
+            grid.addWidget(name, 2 * axis, 0)
+            grid.addWidget(self._fields[axis], 2 * axis, 1)
+            grid.addWidget(self._sliders[axis], 2 * axis + 1, 0, 1, 2)
+        grid.setColumnStretch(1, 1)
+        return grid
+
+    def _lay_out_effects(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setVerticalSpacing(0)
+        for row, (name, value) in enumerate(self._effects.items()):
+            label = QLabel(name)
+            label.setToolTip(value.toolTip())
+            grid.addWidget(label, row, 0)
+            grid.addWidget(value, row, 1)
+        grid.setColumnStretch(1, 1)
+        return grid
+
+
+def _tooltip(axis: int) -> str:
+    return f"How far the eye lies {_DIRECTIONS[axis]}, in millimetres"
+
+
+def _number_label(tooltip: str) -> QLabel:
+    label = QLabel("–")
+    label.setToolTip(f"{tooltip} than with the φ it is compared with")
+    label.setFont(number_font())
+    label.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return label

@@ -1,0 +1,99 @@
+"""Hand-set eye shifts on their way to the headset: not too many, and whether they have arrived."""
+
+from __future__ import annotations
+
+import time
+from enum import Enum
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from handcal.snapshot import Snapshot
+from handcal_gui.tuning.shift_history import Shifts, same_shifts
+
+PERIOD_MS = 33
+SETTLE_MS = 700
+_LATE_NS = 2_000_000_000
+
+
+class Arrival(Enum):
+    """Where what the headset renders with stands."""
+
+    SENDING = "sending"
+    ARRIVED = "arrived"
+    LATE = "late"
+
+
+class ShiftStream(QObject):
+    """Sends the newest shifts, and tells its own from those that the headset gets otherwise.
+
+    Attributes
+    ----------
+    sent : Signal(object)
+        Shifts to render with, at most 30 times a second.
+    settled : Signal()
+        The last shifts sent are to be kept: nothing changed for 0.7 s.
+    arrival : Arrival
+        As of the last snapshot seen.
+    """
+
+    sent = Signal(object)
+    settled = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.arrival = Arrival.SENDING
+        self._newest: Shifts = {}
+        self._sent_ns = 0
+        self._seen_since = 0
+        self._pace = _timer(self, PERIOD_MS)
+        self._pace.timeout.connect(self._send)
+        self._calm = _timer(self, SETTLE_MS)
+        self._calm.timeout.connect(self.settled)
+
+    def put(self, shifts_m: Shifts) -> None:
+        """Send shifts that are to be kept, unless others follow soon."""
+        self.preview(shifts_m)
+        self._calm.start()
+
+    def preview(self, shifts_m: Shifts) -> None:
+        """Send shifts that are only to be looked at."""
+        self._newest = shifts_m
+        if not self._pace.isActive():
+            self._pace.start()
+
+    def flush(self) -> None:
+        """Do now what is waiting: send, and settle."""
+        if self._pace.isActive():
+            self._pace.stop()
+            self._send()
+        if self._calm.isActive():
+            self._calm.stop()
+            self.settled.emit()
+
+    def see(self, snapshot: Snapshot) -> bool:
+        """Take note of what the headset renders with; return whether that was not sent here."""
+        procedure = snapshot.procedure
+        self._seen_since += snapshot.t_host_ns > self._sent_ns
+        # The engine may have been amid the first of them when it was asked.
+        is_answered = not self._pace.isActive() and self._seen_since > 1
+        if is_answered and procedure.is_applied:
+            self.arrival = Arrival.ARRIVED
+        else:
+            is_late = snapshot.t_host_ns - self._sent_ns > _LATE_NS
+            self.arrival = Arrival.LATE if is_late else Arrival.SENDING
+        if not is_answered or same_shifts(self._newest, procedure.applied_shift_m):
+            return False
+        self._newest = procedure.applied_shift_m
+        self._calm.stop()
+        return True
+
+    def _send(self) -> None:
+        self._sent_ns, self._seen_since = time.monotonic_ns(), 0
+        self.sent.emit(self._newest)
+
+
+def _timer(parent: QObject, interval_ms: int) -> QTimer:
+    timer = QTimer(parent)
+    timer.setSingleShot(True)
+    timer.setInterval(interval_ms)
+    return timer

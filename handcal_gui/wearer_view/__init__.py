@@ -1,0 +1,1 @@
+"""Parts of the wearer's view panel."""

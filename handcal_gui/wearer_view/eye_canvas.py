@@ -1,0 +1,177 @@
+"""What one eye sees through its display, drawn: the world, the hand, and what is drawn over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from handcal.types import Float64
+from handcal.wearer_view import EyeView
+from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.legend import role_color
+
+LINES = {
+    "hand": ("text", (1.5, Qt.PenStyle.SolidLine)),
+    "drawn": ("live", (1.5, Qt.PenStyle.DashLine)),
+    "cursor": ("cursor", (2.5, Qt.PenStyle.SolidLine)),
+    "offline": ("muted", (1.5, Qt.PenStyle.DotLine)),
+}
+"""Colour of each outline, and width in pixels and style of its line."""
+_HALO_PX = 4.5
+_MOST_POINTS = 250
+"""Of each outline, since Qt takes a microsecond and more for each."""
+_MARGIN = 0.12
+_WIDEST_CROP = 1.8
+"""A crop is kept while the hand stays in it and it is at most so many times as wide or high."""
+
+
+class EyeCanvas(QWidget):
+    """Shows one eye's view, by default the part of the display that holds the hand.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers and, in lower case with dashes, as object name.
+    parent : QWidget or None
+    """
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(name.lower().replace(" ", "-"))
+        self.setAccessibleName(name)
+        self.setMinimumSize(120, 80)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._view: EyeView | None = None
+        self._image = QImage()
+        self._message = ""
+        self._crop = QRectF()
+        self._is_whole = self._is_offline_shown = False
+
+    @property
+    def crop_px(self) -> QRectF:
+        """The part of the display that is shown, in its pixels; more where there is room."""
+        return self._crop
+
+    def show_view(self, view: EyeView | None, message: str = "") -> None:
+        """Show a view, or, over its dimmed image if it has one, why there is none."""
+        if view is self._view and message == self._message:
+            return
+        if view is not self._view:
+            self._image = QImage() if view is None else _qimage(view)
+        self._view, self._message = view, message
+        self.setAccessibleDescription(message)
+        self._choose_crop()
+        self.update()
+
+    def show_whole(self, is_whole: bool) -> None:
+        """Show the whole display, or crop it to the hand."""
+        self._is_whole = is_whole
+        self._crop = QRectF()
+        self._choose_crop()
+        self.update()
+
+    def show_offline(self, is_shown: bool) -> None:
+        """Show or hide what the offline projection would draw."""
+        self._is_offline_shown = is_shown
+        self.update()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw the world and the outlines, or the message."""
+        painter = QPainter(self)
+        ground = self.palette().window().color()
+        painter.fillRect(self.rect(), ground)
+        if self._view is not None:
+            self._paint_world(painter, self._view)
+        if self._message:
+            ground.setAlphaF(0.75)
+            painter.fillRect(self.rect(), ground)
+            painter.setPen(self.palette().windowText().color())
+            within = self.rect().adjusted(SPACING_PX, SPACING_PX, -SPACING_PX, -SPACING_PX)
+            flags = Qt.AlignmentFlag.AlignCenter.value | Qt.TextFlag.TextWordWrap.value
+            painter.drawText(within, flags, self._message)
+        elif self._view is not None:
+            self._paint_outlines(painter, self._view)
+
+    def _paint_world(self, painter: QPainter, view: EyeView) -> None:
+        painter.save()
+        painter.setTransform(self._to_widget(), combine=True)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.drawImage(_display(view), self._image)
+        painter.setPen(_pen(colors().muted, 1.0))
+        painter.drawRect(_display(view))
+        painter.restore()
+
+    def _paint_outlines(self, painter: QPainter, view: EyeView) -> None:
+        """Draw the outlines, with halos that keep them visible over any world."""
+        outlines = {"offline": view.offline.outline_px} if self._is_offline_shown else {}
+        outlines |= {"hand": view.hand_px, "cursor": view.cursor_px}
+        outlines["drawn"] = view.drawn.outline_px
+        to_widget = self._to_widget()
+        painter.setClipRect(to_widget.mapRect(_display(view)))
+        lines = {what: to_widget.map(_closed(px)) for what, px in outlines.items() if len(px)}
+        painter.setPen(_pen(colors().canvas, _HALO_PX))
+        for line in lines.values():
+            painter.drawPolyline(line)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for what, line in lines.items():
+            role, width_and_style = LINES[what]
+            painter.setPen(_pen(role_color(role, self), *width_and_style))
+            painter.drawPolyline(line)
+
+    def _to_widget(self) -> QTransform:
+        """Return the transform that fits the crop into the widget."""
+        crop = self._crop
+        scale = min(self.width() / crop.width(), self.height() / crop.height())
+        to_widget = QTransform.fromTranslate(self.width() / 2, self.height() / 2)
+        to_widget.scale(scale, scale)
+        return to_widget.translate(-crop.center().x(), -crop.center().y())
+
+    def _choose_crop(self) -> None:
+        """Crop to the hand, but leave the picture where it is while that still fits."""
+        if self._view is None:
+            return
+        display = _display(self._view)
+        outlines_px = np.vstack([self._view.hand_px, self._view.drawn.outline_px])
+        hand = _bounds(outlines_px).intersected(display) if len(outlines_px) else QRectF()
+        if self._is_whole or hand.isEmpty():
+            self._crop = display
+        elif not self._crop.contains(hand) or not _is_close(self._crop, hand):
+            margin = _MARGIN * max(hand.width(), hand.height())
+            self._crop = hand.adjusted(-margin, -margin, margin, margin)
+
+
+def _display(view: EyeView) -> QRectF:
+    return QRectF(-0.5, -0.5, view.width_px, view.height_px)
+
+
+def _bounds(points_px: Float64) -> QRectF:
+    (x0, y0), (x1, y1) = points_px.min(axis=0).tolist(), points_px.max(axis=0).tolist()
+    return QRectF(x0, y0, x1 - x0, y1 - y0)
+
+
+def _is_close(crop: QRectF, hand: QRectF) -> bool:
+    wider, higher = crop.width() / hand.width(), crop.height() / hand.height()
+    return min(wider, higher) < _WIDEST_CROP
+
+
+def _closed(outline_px: Float64) -> QPolygonF:
+    """Return an outline as a closed line, thinned."""
+    thinned = outline_px[:: max(1, len(outline_px) // _MOST_POINTS)].tolist()
+    return QPolygonF([QPointF(x, y) for x, y in [*thinned, thinned[0]]])
+
+
+def _pen(color: QColor | str, width_px: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    pen = QPen(QColor(color), width_px, style, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.BevelJoin)
+    pen.setCosmetic(True)
+    return pen
+
+
+def _qimage(view: EyeView) -> QImage:
+    """Return the view's image in the format that Qt scales fastest; a null one without image."""
+    if view.image is None:
+        return QImage()
+    height, width = view.image.shape[:2]
+    rgb = QImage(view.image.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+    return rgb.convertToFormat(QImage.Format.Format_RGB32)

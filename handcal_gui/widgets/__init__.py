@@ -1,0 +1,1 @@
+"""Widgets that any panel or page may be made of."""

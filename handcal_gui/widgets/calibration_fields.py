@@ -1,0 +1,99 @@
+"""What a technician may want to change of how a calibration runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFormLayout, QWidget
+
+from handcal.calibrate import CalibrationSettings
+from handcal.types import Method
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import choice, number
+
+_METHODS: dict[Method, str] = {
+    "consistent": "Consistent (recommended)",
+    "linear": "Linear",
+    "paper": "As in the paper",
+    "icp": "Rigid ICP",
+}
+_METHOD_HELP = (
+    "How the eye shift φ is solved from an alignment.\n"
+    "Consistent: exact model; copes with cut edges and a turned hand.\n"
+    "Linear: takes the hand's scale for 1, which shortens φ3.\n"
+    "As in the paper: Hu et al. 2021; slow.\n"
+    "Rigid ICP: the paper's baseline."
+)
+_GATE_M = 0.05
+
+
+class CalibrationFields(QWidget):
+    """Rotation guard, depth gate and solver.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._guard = number(
+            "guard",
+            1.0,
+            45.0,
+            0.5,
+            " °",
+            "An alignment is refused while the hand is turned by more, against the cursor.",
+        )
+        self._near = number(
+            "gateNear", 0.10, 1.95, 0.05, " m", "What is nearer to the camera is not seen."
+        )
+        self._far = number(
+            "gateFar", 0.15, 2.00, 0.05, " m", "What is farther from the camera is not seen."
+        )
+        self._method = choice("method", "Solver", _METHODS, _METHOD_HELP)
+        self._form = QFormLayout(self)
+        self._form.setContentsMargins(0, 0, 0, 0)
+        self._form.setSpacing(SPACING_PX)
+        self.add_row("Rotation guard", self._guard)
+        self.add_row("Depth gate from", self._near)
+        self.add_row("Depth gate to", self._far)
+        self.add_row("Solver", self._method)
+        self._near.valueChanged.connect(self._push_far)
+        self._far.valueChanged.connect(self._push_near)
+        for field in (self._guard, self._near, self._far):
+            field.valueChanged.connect(self.changed)
+        self._method.currentIndexChanged.connect(self.changed)
+
+    def show_settings(self, settings: CalibrationSettings) -> None:
+        """Show settings."""
+        self._guard.setValue(float(np.degrees(settings.guard.limit_rad)))
+        self._far.setValue(settings.segment.depth_max_m)
+        self._near.setValue(settings.segment.depth_min_m)
+        self._method.setCurrentIndex(self._method.findData(settings.solve.method))
+
+    def take(self, settings: CalibrationSettings) -> CalibrationSettings:
+        """Return settings with what is shown."""
+        return replace(
+            settings,
+            guard=replace(settings.guard, limit_rad=float(np.radians(self._guard.value()))),
+            segment=replace(
+                settings.segment, depth_min_m=self._near.value(), depth_max_m=self._far.value()
+            ),
+            solve=replace(settings.solve, method=self._method.currentData()),
+        )
+
+    def add_row(self, label: str, field: QWidget) -> None:
+        """Add a field below."""
+        self._form.addRow(label, field)
+
+    def _push_far(self, near_m: float) -> None:
+        """Keep the gate open."""
+        self._far.setValue(max(self._far.value(), near_m + _GATE_M))
+
+    def _push_near(self, far_m: float) -> None:
+        self._near.setValue(min(self._near.value(), far_m - _GATE_M))

@@ -1,0 +1,75 @@
+"""One line that says how it stands with something, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+
+from handcal.doctor import Finding, Health
+from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.widgets.fields import button, named, paragraph
+
+_ICONS = {Health.GOOD: "check", Health.LIMITED: "warning", Health.BROKEN: "cross"}
+_WORDS = {Health.GOOD: "Good", Health.LIMITED: "Note", Health.BROKEN: "Problem"}
+
+
+class FindingLine(QWidget):
+    """Shows a finding by icon and text, with a button that mends it where one click can."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(f"{name}Finding")
+        self._finding: Finding | None = None
+        self._mend: Callable[[], object] | None = None
+        self._icon = named(QLabel(), f"{name}Health")
+        self._icon.setFixedSize(2 * SPACING_PX, 2 * SPACING_PX)
+        self._text = paragraph(f"{name}Found")
+        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._button = button(f"{name}Fix")
+        self._button.hide()
+        self._button.clicked.connect(self._click)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(self._button, 0, Qt.AlignmentFlag.AlignTop)
+
+    def show_finding(
+        self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
+    ) -> None:
+        """Show a finding; `fix` labels the button that calls `mend`."""
+        self._finding, self._mend = finding, mend
+        self._text.setText(" ".join(map(_sentence, filter(None, (finding.found, finding.advice)))))
+        self._button.setText(fix)
+        self._button.setVisible(bool(fix))
+        self._refresh()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._refresh()
+
+    def _refresh(self) -> None:
+        if self._finding is None:
+            return
+        health = self._finding.health
+        shades = {
+            Health.GOOD: colors().good,
+            Health.LIMITED: colors().warning,
+            Health.BROKEN: colors().red,
+        }
+        self._icon.setPixmap(icon(_ICONS[health], shades[health]).pixmap(2 * SPACING_PX))
+        self._icon.setAccessibleName(_WORDS[health])
+        self._icon.setToolTip(_WORDS[health])
+
+    def _click(self) -> None:
+        if self._mend is not None:
+            self._mend()
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"

@@ -1,0 +1,100 @@
+"""What the things in a picture are: a sample of each, its name, and a number."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QLineF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+
+from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.number_label import NumberLabel
+
+_SAMPLE_PX = (22, 14)
+
+
+def role_color(role: str, widget: QWidget) -> QColor:
+    """Return a colour by its meaning: a field of `Colors`, or ``"text"``, the widget's own."""
+    text = widget.palette().windowText().color()
+    return text if role == "text" else QColor(getattr(colors(), role))
+
+
+class LegendEntry(QWidget):
+    """A sample of one thing, its name, and maybe a number that does not jump.
+
+    Parameters
+    ----------
+    name : str
+        Of the thing.
+    role : str
+        As `role_color` takes it.
+    tooltip : str
+    line : (float, Qt.PenStyle) or None
+        Width in pixels and style that it is drawn with; None for points.
+    widest : str
+        The number's widest text; empty if it has none.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        role: str,
+        tooltip: str,
+        line: tuple[float, Qt.PenStyle] | None = None,
+        widest: str = "",
+    ) -> None:
+        super().__init__()
+        self.setObjectName(f"legend-{name.lower().replace(' ', '-')}")
+        self.setToolTip(tooltip)
+        self._sample = _Sample(role, line)
+        self._name = QLabel(name)
+        self._name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._number = NumberLabel(f"{self.objectName()}-number", widest, tooltip)
+        self._number.setVisible(bool(widest))
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        layout.addWidget(self._sample)
+        layout.addWidget(self._name)
+        layout.addWidget(self._number)
+
+    @property
+    def text(self) -> str:
+        """Name and number."""
+        return f"{self._name.text()} {self._number.text()}"
+
+    def show_name(self, name: str, role: str | None) -> None:
+        """Change what the thing is called and its colour; None hides the sample."""
+        self._name.setText(name)
+        self._sample.show_role(role)
+
+    def show_number(self, number: str) -> None:
+        """Show a number with its unit."""
+        self._number.setText(number)
+
+
+class _Sample(QWidget):
+    """A piece of line, or of a surface of points."""
+
+    def __init__(self, role: str, line: tuple[float, Qt.PenStyle] | None) -> None:
+        super().__init__()
+        self._role: str | None = role
+        self._line = line
+        self.setFixedSize(*_SAMPLE_PX)
+
+    def show_role(self, role: str | None) -> None:
+        if role != self._role:
+            self._role = role
+            self.update()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        if self._role is None:
+            return
+        painter = QPainter(self)
+        color = role_color(self._role, self)
+        width, height = _SAMPLE_PX
+        if self._line is None:
+            painter.fillRect((width - height) // 2, 0, height, height, color)
+            return
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(color, *self._line, Qt.PenCapStyle.FlatCap))
+        painter.drawLine(QLineF(0, height / 2, width, height / 2))

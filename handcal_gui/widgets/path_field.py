@@ -1,0 +1,70 @@
+"""A path to type, or to choose in a dialog."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
+
+from handcal_gui.widgets.fields import beside, button
+
+
+class PathField(QWidget):
+    """A line with a button beside it.
+
+    Parameters
+    ----------
+    name : str
+        What is chosen, as the dialog's title says: "Rig file".
+    kind : {"file", "folder"}
+    pattern : str
+        Of the files offered, as `QFileDialog` takes it: ``"Recordings (*.db3 *.bag)"``.
+    empty : str
+        What no path means; shown in place of it.
+
+    Attributes
+    ----------
+    name : str
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        name: str,
+        kind: Literal["file", "folder"],
+        pattern: str = "",
+        empty: str = "",
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.name = name
+        self._kind, self._pattern = kind, pattern
+        self._line = QLineEdit(placeholderText=empty, clearButtonEnabled=bool(empty))
+        self._line.setAccessibleName(name)
+        self._line.textChanged.connect(self.changed)
+        choose = button("choose", "Choose…", f"Choose {name.lower()}")
+        choose.clicked.connect(self.choose)
+        beside(self, self._line, choose, grows=self._line)
+        self.setFocusProxy(self._line)
+
+    @property
+    def path(self) -> str:
+        """What the line says, without blanks around it."""
+        return str(self._line.text()).strip()
+
+    def set_path(self, path: str) -> None:
+        """Show a path, with its end in view."""
+        if path != self.path:
+            self._line.setText(path)
+
+    def choose(self) -> None:
+        """Ask for a path in the system's dialog."""
+        if self._kind == "folder":
+            chosen = QFileDialog.getExistingDirectory(self, self.name, self.path)
+        else:
+            chosen, _ = QFileDialog.getOpenFileName(self, self.name, self.path, self._pattern)
+        if chosen:
+            self.set_path(chosen)

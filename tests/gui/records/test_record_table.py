@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.records.record_table import Column, RecordTable
+
+COLUMNS = (Column("No.", "Number"), Column("What", "Anything", is_number=False))
+
+
+def rows_of(*numbers: int) -> dict[int, tuple[str, ...]]:
+    return {number: (str(number), f"thing {number}") for number in numbers}
+
+
+@pytest.fixture
+def table(qtbot: QtBot) -> RecordTable:
+    table = RecordTable("Things", COLUMNS, "Things appear here")
+    qtbot.addWidget(table)
+    table.show()
+    return table
+
+
+def test_numbers_stand_on_the_right(table: RecordTable) -> None:
+    table.show_rows(rows_of(1))
+    number, what = (table.model().index(0, column) for column in range(2))
+    role = Qt.ItemDataRole.TextAlignmentRole
+    assert number.data(role) & Qt.AlignmentFlag.AlignRight
+    assert what.data(role) & Qt.AlignmentFlag.AlignLeft
+    assert number.data(Qt.ItemDataRole.ToolTipRole) == "Number"
+
+
+def test_del_asks_for_the_chosen_thing_by_its_number(qtbot: QtBot, table: RecordTable) -> None:
+    table.show_rows(rows_of(3, 7))
+    table.setFocus()
+    with qtbot.assertNotEmitted(table.delete_requested):
+        QTest.keyClick(table, Qt.Key.Key_Delete)
+    table.selectRow(1)
+    with qtbot.waitSignal(table.delete_requested) as asked:
+        QTest.keyClick(table, Qt.Key.Key_Delete)
+    assert asked.args == [7]
+
+
+def test_the_next_row_is_chosen_after_a_deletion(table: RecordTable) -> None:
+    table.show_rows(rows_of(1, 2, 3))
+    table.selectRow(1)
+    table.show_rows(rows_of(1, 3))
+    assert table.chosen_number() == 3
+    table.show_rows(rows_of(1))
+    assert table.chosen_number() == 1
+    table.show_rows({})
+    assert table.chosen_number() is None
+    assert not table.delete_action.isEnabled()
+
+
+def test_the_choice_stays_with_its_thing(table: RecordTable) -> None:
+    table.show_rows(rows_of(1, 3))
+    table.selectRow(1)
+    table.show_rows(rows_of(1, 2, 3))
+    assert table.chosen_number() == 3
+
+
+def test_a_new_last_row_is_brought_into_view(table: RecordTable) -> None:
+    table.resize(200, 120)
+    table.show_rows(rows_of(*range(1, 50)))
+    table.scrollToTop()
+    table.show_rows(rows_of(*range(2, 50)))
+    assert table.rowAt(0) == 0, "a deletion does not scroll"
+    table.show_rows(rows_of(*range(2, 51)))
+    assert table.rowAt(table.viewport().height() - 2) == 48
+
+
+def test_nothing_is_deleted_from_what_is_only_read(table: RecordTable) -> None:
+    table.show_rows(rows_of(1))
+    table.selectRow(0)
+    table.set_read_only(True)
+    assert not table.delete_action.isEnabled()
+    table.set_read_only(False)
+    assert table.delete_action.isEnabled()

@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.results import Results
+from handcal.rig.example import example_rig
+from handcal.session import Session, SessionRecord
+from handcal.trial import Trial, make_trial, summarise
+from handcal.types import Alignment, Eye
+from handcal_gui.records.session_rows import (
+    ALIGNMENT_COLUMNS,
+    STATISTICS_COLUMNS,
+    TRIAL_COLUMNS,
+    Deletion,
+    alignment_rows,
+    deletions,
+    local_time,
+    statistics_rows,
+    statistics_text,
+    trial_rows,
+)
+
+
+def trial(eye: Eye, depth_m: float, off_m: float) -> Trial:
+    return make_trial(example_rig().eyes[eye], eye, depth_m, np.zeros(3), [off_m, 0.0, 0.0])
+
+
+def column(columns: Sequence[object], title: str) -> int:
+    return [getattr(column, "title", column) for column in columns].index(title)
+
+
+def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
+    rows = alignment_rows(record, results)
+    assert list(rows) == [1, 2]
+    for (number, cells), alignment, shifts in zip(
+        rows.items(), record.alignments, results.alignments, strict=True
+    ):
+        assert len(cells) == len(ALIGNMENT_COLUMNS)
+        assert cells[:2] == (str(number), "Both eyes")
+        angle_deg = np.degrees(np.linalg.norm(alignment.rotation_rad))
+        assert float(cells[column(ALIGNMENT_COLUMNS, "Turned °")]) == pytest.approx(
+            angle_deg, abs=0.05
+        )
+        shown_mm = cells[column(ALIGNMENT_COLUMNS, "Left φ mm")].replace("−", "-").split()
+        np.testing.assert_allclose(
+            [float(value) for value in shown_mm], 1e3 * shifts["left"].shift_m, atol=0.005
+        )
+        assert cells[column(ALIGNMENT_COLUMNS, "RMS mm")] == " / ".join(
+            f"{1e3 * shift.rms_m:.2f}" for shift in shifts.values()
+        )
+
+
+def test_results_of_other_alignments_are_left_out(record: SessionRecord, results: Results) -> None:
+    shorter = replace(record, alignments=record.alignments[:1], alignment_numbers=(1,))
+    assert alignment_rows(shorter, results)[1][3:7] == ("–",) * 4
+    assert alignment_rows(record, None)[2][3:7] == ("–",) * 4
+
+
+def test_one_eye_alone(
+    record: SessionRecord, results: Results, alignments: Sequence[Alignment]
+) -> None:
+    one = replace(alignments[0], eyes=("right",))
+    alone = replace(
+        results, alignments=({"right": results.alignments[0]["right"]}, results.alignments[1])
+    )
+    cells = alignment_rows(replace(record, alignments=(one, alignments[1])), alone)[1]
+    assert cells[1] == "Right eye"
+    assert cells[column(ALIGNMENT_COLUMNS, "Left φ mm")] == "–"
+    assert "/" not in cells[column(ALIGNMENT_COLUMNS, "RMS mm")]
+
+
+def test_trials_as_text(record: SessionRecord) -> None:
+    with Session(record.path) as session:
+        session.save_trial(trial("right", 0.4, 0.001))
+    after = Session.open(record.path)
+    cells = trial_rows(after)[1]
+    assert len(cells) == len(TRIAL_COLUMNS)
+    assert cells[:3] == ("1", "Right eye", "0.4")
+    assert float(cells[3]) == pytest.approx(after.trials[0].error_px.mean(), abs=0.05)
+    assert float(cells[4]) == pytest.approx(after.trials[0].error_arcmin.mean(), abs=0.05)
+
+
+def test_statistics_as_text() -> None:
+    trials = [trial("left", 0.4, 0.001), trial("right", 0.6, 0.002)]
+    statistics = summarise(trials)
+    rows = {row.label: row.cells for row in statistics_rows(statistics)}
+    assert list(rows) == ["All", "Left eye", "Right eye", "0.4 m", "0.6 m"]
+    assert {len(cells) for cells in rows.values()} == {len(STATISTICS_COLUMNS)}
+    assert rows["All"][0] == "2"
+    mean = np.concatenate([one.error_arcmin for one in trials]).mean()
+    assert rows["All"][1].startswith(f"{mean:.1f} ±")
+    assert statistics_text(statistics).startswith(f"2 trials: {mean:.1f} ±")
+
+
+def test_statistics_of_nothing() -> None:
+    assert statistics_rows(summarise([])) == []
+    assert statistics_text(summarise([])) == "No trials yet"
+
+
+def test_deletions_in_their_order(record: SessionRecord) -> None:
+    with Session(record.path) as session:
+        for _ in range(2):
+            session.save_trial(trial("left", 0.5, 0.001))
+        session.delete_alignment(2)
+        session.delete_trial(1)
+        session.delete_alignment(1)
+        session.restore_alignment(2)
+    assert deletions(Session.open(record.path)) == [Deletion("trial", 1), Deletion("alignment", 1)]
+
+
+def test_an_old_session_has_nothing_to_take_back() -> None:
+    old = Session.open(Path(__file__).parents[1] / "data" / "session-v1")
+    assert deletions(old) == []
+    assert list(alignment_rows(old, None)) == list(old.alignment_numbers)
+
+
+def test_time_is_local() -> None:
+    assert local_time("2026-11-21T12:34:56+00:00", "%M:%S") == "34:56"
+    assert local_time("before noon") == "before noon"

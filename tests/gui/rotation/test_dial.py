@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QColor
+from pytestqt.qtbot import QtBot
+
+from handcal_gui import theme
+from handcal_gui.rotation.dial import RotationDial
+
+LIMIT_RAD = float(np.radians(9.0))
+
+
+@pytest.fixture
+def dial(qtbot: QtBot) -> RotationDial:
+    dial = RotationDial()
+    qtbot.addWidget(dial)
+    dial.resize(220, 200)
+    return dial
+
+
+def painted(dial: RotationDial, role: str) -> int:
+    """Count pixels of a role's colour."""
+    image, color = dial.grab().toImage(), QColor(getattr(theme.colors(), role))
+    return sum(
+        image.pixelColor(x, y) == color for x in range(image.width()) for y in range(image.height())
+    )
+
+
+@pytest.mark.parametrize(("angle_deg", "role", "other"), [(4, "live", "red"), (11, "red", "live")])
+def test_colour_tells_the_side_of_the_limit(
+    dial: RotationDial, angle_deg: float, role: str, other: str
+) -> None:
+    dial.show_angle(float(np.radians(angle_deg)), LIMIT_RAD, "a word")
+    assert dial.is_over == (role == "red")
+    assert painted(dial, role) > 500
+    assert painted(dial, other) == 0
+
+
+def test_the_arc_grows_with_the_angle_to_the_end_of_the_scale(dial: RotationDial) -> None:
+    def arc(angle_deg: float) -> int:
+        dial.show_angle(float(np.radians(angle_deg)), LIMIT_RAD, "")
+        return painted(dial, "red")
+
+    assert arc(10.0) + 200 < arc(17.0)
+    assert arc(18.0) == pytest.approx(arc(88.0), rel=0.1)
+
+
+def test_without_an_angle_there_is_no_verdict_in_colour(dial: RotationDial) -> None:
+    dial.show_angle(None, LIMIT_RAD, "? No hand")
+    assert not dial.is_over
+    assert painted(dial, "red") == painted(dial, "live") == 0
+    assert dial.accessibleDescription() == "? No hand"

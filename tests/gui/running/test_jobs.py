@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from handcal.errors import CancelledError, FileError
+from handcal_gui.running.jobs import IsCancelled, Job, Report
+
+
+def test_progress_and_result_reach_the_window_s_thread(qtbot: QtBot) -> None:
+    def work(report: Report, _is_cancelled: IsCancelled) -> str:
+        report("half", 0.5)
+        return f"done in {threading.current_thread().name}"
+
+    job = Job(work)
+    heard: list[tuple[Any, ...]] = []
+    job.progressed.connect(lambda *what: heard.append((*what, threading.current_thread())))
+    with qtbot.waitSignal(job.succeeded, timeout=5000) as succeeded:
+        job.start()
+    job.wait()
+    assert succeeded.args == ["done in handcal job"]
+    assert heard == [("half", 0.5, threading.main_thread())]
+
+
+def test_cancel_stops_the_work(qtbot: QtBot) -> None:
+    started = threading.Event()
+
+    def work(_report: Report, is_cancelled: IsCancelled) -> None:
+        started.set()
+        while not is_cancelled():
+            pass
+        raise CancelledError("as asked")
+
+    job = Job(work)
+    job.start()
+    assert started.wait(5.0)
+    with qtbot.waitSignal(job.cancelled, timeout=5000):
+        job.cancel()
+    job.wait()
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (FileError("the disk is full; free some space"), "the disk is full; free some space"),
+        (KeyError("x"), "handcal broke down (KeyError: 'x')"),
+    ],
+)
+def test_failure_is_told_in_words(qtbot: QtBot, error: Exception, text: str) -> None:
+    def work(_report: Report, _is_cancelled: IsCancelled) -> None:
+        raise error
+
+    job = Job(work)
+    with qtbot.waitSignal(job.failed, timeout=5000) as failed:
+        job.start()
+    job.wait()
+    assert failed.args == [text]
+
+
+def test_nothing_is_heard_of_a_job_that_was_abandoned(qtbot: QtBot) -> None:
+    job = Job(lambda report, _is_cancelled: report("half", 0.5))
+    heard: list[object] = []
+    job.progressed.connect(lambda *what: heard.append(what))
+    job.succeeded.connect(heard.append)
+    job.start()
+    job.abandon()
+    qtbot.wait(50)
+    assert heard == []

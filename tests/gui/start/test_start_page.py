@@ -1,0 +1,337 @@
+"""The start page: what a technician chooses, finds, and sets off."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QPushButton,
+    QSpinBox,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from handcal.camera.settings import RealSenseSettings
+from handcal.doctor import Finding, Health
+from handcal.preflight import PARTS, Part
+from handcal.station_settings import StationSettings
+from handcal_gui.preferences import Preferences
+from handcal_gui.start.session_entries import Entry, Offers
+from handcal_gui.start.start_page import StartPage
+from handcal_gui.widgets.path_field import PathField
+
+KEY = "0123456789abcdef0123456789abcdef"
+
+
+class Inspector:
+    """Stands in for the checks: says of each part what a test wants."""
+
+    def __init__(self) -> None:
+        self.healths: dict[Part, Health] = dict.fromkeys(PARTS, Health.GOOD)
+        self.asked: list[tuple[StationSettings, str]] = []
+        self.threads: set[threading.Thread] = set()
+        self.offers = Offers((), ())
+        self.folders: list[Path] = []
+
+    def check(self, settings: StationSettings, pairing_key: str) -> Mapping[Part, Finding]:
+        self.asked.append((settings, pairing_key))
+        self.threads.add(threading.current_thread())
+        return {
+            part: Finding(PARTS[part], health, f"found {settings.source}", "do this")
+            for part, health in self.healths.items()
+        }
+
+    def find(self, folder: Path, recent: Sequence[Path]) -> Offers:
+        self.folders.append(folder)
+        return self.offers
+
+
+@pytest.fixture
+def inspector() -> Inspector:
+    return Inspector()
+
+
+@pytest.fixture
+def open_page(
+    qtbot: QtBot, inspector: Inspector, tmp_path: Path
+) -> Iterator[Callable[..., StartPage]]:
+    pages: list[StartPage] = []
+
+    def open_page(preferences: Preferences | None = None, **station: object) -> StartPage:
+        settings = replace(StationSettings(sessions=str(tmp_path)), **station)  # type: ignore[arg-type]
+        preferences = replace(preferences or Preferences(), station=settings)
+        page = StartPage(preferences, KEY, inspector.check, inspector.find)
+        pages.append(page)
+        qtbot.addWidget(page)
+        page.show()
+        qtbot.waitUntil(lambda: bool(inspector.asked and text(page, "cameraFound")))
+        return page
+
+    yield open_page
+    for page in pages:
+        page.stop()
+
+
+Kind = TypeVar("Kind", bound=QWidget)
+
+
+def find(page: QWidget, kind: type[Kind], name: str = "") -> Kind:
+    found = page.findChild(kind, name) if name else page.findChild(kind)
+    assert isinstance(found, kind)
+    return found
+
+
+def button(page: QWidget, name: str) -> QPushButton:
+    return find(page, QPushButton, name)
+
+
+def text(page: QWidget, name: str) -> str:
+    return find(page, QLabel, name).text()
+
+
+def choose(page: QWidget, name: str, option: str) -> None:
+    field = find(page, QComboBox, name)
+    field.setCurrentIndex(field.findData(option))
+
+
+def wearer(page: QWidget) -> QComboBox:
+    return find(page, QComboBox, "wearer")
+
+
+def test_typing_a_name_and_enter_starts(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    assert wearer(page).hasFocus() or page.focusWidget() is wearer(page).lineEdit()
+    QTest.keyClicks(wearer(page), " Ada ")
+    with qtbot.waitSignal(page.start_requested) as started:
+        QTest.keyClick(wearer(page), Qt.Key.Key_Return)
+    settings, name = started.args
+    assert name == "Ada"
+    assert settings == page.new.settings == inspector.asked[-1][0]
+    assert threading.main_thread() not in inspector.threads
+
+
+def test_the_next_wearer_finds_everything_as_it_was(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page(source="realsense", headset="network", port=50_001)
+    QTest.keyClicks(wearer(page), "Ada")
+    before = page.new.settings
+    preferences = Preferences(station=before, wearers=("Ada", "Bea"))
+    page.show_preferences(preferences)
+    assert page.new.settings == before
+    assert before.port == 50_001
+    assert wearer(page).currentText() == ""
+    assert [wearer(page).itemText(i) for i in range(2)] == ["Ada", "Bea"]
+
+
+def test_a_part_that_is_broken_prevents_the_start_until_it_is_mended(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    inspector.healths["camera"] = Health.BROKEN
+    page = open_page(source="realsense", headset="network")
+    assert not button(page, "start").isEnabled()
+    assert text(page, "startProblem") == "To be mended first: Camera."
+    assert text(page, "cameraFound") == "Found realsense. Do this."
+    inspector.healths["camera"] = Health.GOOD
+    button(page, "cameraFix").click()
+    assert (page.new.settings.source, page.new.settings.headset) == ("simulator", "virtual")
+    qtbot.waitUntil(button(page, "start").isEnabled)
+    assert text(page, "cameraFound") == "Found simulator. Do this."
+    assert text(page, "startProblem") == ""
+    assert not button(page, "cameraFix").isVisible()
+
+
+def test_what_breaks_after_the_last_look_is_found_by_the_start(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    inspector.healths["sessions"] = Health.BROKEN
+    with qtbot.assertNotEmitted(page.start_requested):
+        button(page, "start").click()
+        qtbot.waitUntil(lambda: "Session folder" in text(page, "startProblem"))
+    inspector.healths["sessions"] = Health.GOOD
+    with qtbot.assertNotEmitted(page.start_requested, wait=50):
+        page.new.check()
+        qtbot.waitUntil(button(page, "start").isEnabled)
+
+
+@pytest.mark.parametrize(
+    ("part", "health", "station", "fix", "mended"),
+    [
+        (
+            "headset",
+            Health.BROKEN,
+            {"headset": "network"},
+            "virtual headset",
+            {"headset": "virtual"},
+        ),
+        (
+            "headset",
+            Health.LIMITED,
+            {"source": "realsense"},
+            "network headset",
+            {"headset": "network"},
+        ),
+        ("rig", Health.BROKEN, {"rig": "/nowhere.yaml"}, "example", {"rig": ""}),
+    ],
+)
+def test_one_click_mends(
+    open_page: Callable[..., StartPage],
+    inspector: Inspector,
+    part: Part,
+    health: Health,
+    station: dict[str, str],
+    fix: str,
+    mended: dict[str, str],
+) -> None:
+    inspector.healths[part] = health
+    page = open_page(**station)
+    before = page.new.settings
+    assert fix in button(page, f"{part}Fix").text()
+    button(page, f"{part}Fix").click()
+    assert page.new.settings == replace(before, **mended)  # type: ignore[arg-type]
+
+
+def test_every_choice_reaches_the_settings(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
+) -> None:
+    page = open_page()
+    choose(page, "source", "recording")
+    for field in page.findChildren(PathField):
+        field.set_path(f"/{field.name}")
+    find(page, QLineEdit, "serial").setText(" 42 ")
+    choose(page, "headset", "network")
+    find(page, QLineEdit, "host").setText("192.168.1.2")
+    find(page, QSpinBox, "port").setValue(50_002)
+    find(page, QSpinBox, "seed").setValue(7)
+    for name, value in (("guard", 12.0), ("gateFar", 0.3), ("gateNear", 0.2), ("loss", 5.0)):
+        find(page, QDoubleSpinBox, name).setValue(value)
+    choose(page, "method", "paper")
+    settings = page.new.settings
+    calibration = settings.calibration
+    assert settings == StationSettings(
+        source="recording",
+        recording="/Recording",
+        realsense=RealSenseSettings(serial="42"),
+        headset="network",
+        host="192.168.1.2",
+        port=50_002,
+        rig="/Rig file",
+        seed=7,
+        loss=0.05,
+        sessions="/Session folder",
+        calibration=calibration,
+    )
+    assert calibration.guard.limit_rad == pytest.approx(0.2094395)
+    assert (calibration.segment.depth_min_m, calibration.segment.depth_max_m) == (0.2, 0.3)
+    assert calibration.solve.method == "paper"
+    qtbot.waitUntil(lambda: inspector.asked[-1] == (settings, KEY))
+    assert inspector.folders[-1] == Path("/Session folder")
+    page.show_preferences(Preferences(station=StationSettings()))
+    assert page.new.settings == StationSettings()
+
+
+def test_the_gate_stays_open(open_page: Callable[..., StartPage]) -> None:
+    page = open_page()
+    find(page, QDoubleSpinBox, "gateNear").setValue(1.95)
+    segment = page.new.settings.calibration.segment
+    assert segment.depth_max_m == pytest.approx(2.0)
+    find(page, QDoubleSpinBox, "gateFar").setValue(0.0)
+    segment = page.new.settings.calibration.segment
+    assert (segment.depth_min_m, segment.depth_max_m) == pytest.approx((0.1, 0.15))
+
+
+def test_the_pairing_key_is_hidden_until_asked_for(open_page: Callable[..., StartPage]) -> None:
+    page = open_page(source="realsense", headset="network")
+    shown = find(page, QLineEdit, "pairingKey")
+    assert KEY not in shown.displayText()
+    button(page, "showKey").click()
+    assert shown.displayText() == KEY
+    button(page, "copyKey").click()
+    assert QGuiApplication.clipboard().text() == KEY
+    page.set_pairing_key("another key of the same headset")
+    assert shown.text() == "another key of the same headset"
+    choose(page, "headset", "virtual")
+    assert not shown.isVisible()
+
+
+def test_unfinished_and_recent_sessions_are_offered(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
+) -> None:
+    page = open_page()
+    resume, opened = (find(page, QWidget, name) for name in ("resume", "open"))
+    assert not resume.isVisible()
+    assert not button(opened, "choose").isEnabled()
+    inspector.offers = Offers(
+        (Entry(tmp_path / "bad", "damaged", is_enabled=False), Entry(tmp_path / "a", "Ada")),
+        (Entry(tmp_path / "b", "Bea"),),
+    )
+    page.show_preferences(Preferences(station=page.new.settings))
+    qtbot.waitUntil(resume.isVisible)
+    unfinished = find(resume, QListWidget)
+    assert [unfinished.item(i).text() for i in range(2)] == ["damaged", "Ada"]
+    with qtbot.waitSignal(page.resume_requested) as resumed:
+        button(resume, "choose").click()
+    assert resumed.args == [tmp_path / "a"]
+    unfinished.setCurrentRow(0)
+    with qtbot.assertNotEmitted(page.resume_requested):
+        unfinished.itemActivated.emit(unfinished.item(0))
+    with qtbot.waitSignal(page.open_requested) as chosen:
+        QTest.keyClick(find(opened, QListWidget), Qt.Key.Key_Return)
+    assert chosen.args == [tmp_path / "b"]
+
+
+def test_any_session_folder_can_be_opened(
+    qtbot: QtBot, open_page: Callable[..., StartPage], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = open_page()
+    answers = iter(["/some/session", ""])
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: next(answers))
+    with qtbot.waitSignal(page.open_requested) as opened:
+        button(page, "browse").click()
+    assert opened.args == [Path("/some/session")]
+    with qtbot.assertNotEmitted(page.open_requested):
+        page.browse()
+
+
+def test_a_hidden_page_leaves_the_station_alone(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    page.hide()
+    asked = len(inspector.asked)
+    choose(page, "source", "realsense")
+    qtbot.wait(400)
+    assert len(inspector.asked) == asked
+
+
+def test_a_check_that_breaks_down_is_told_and_starts_nothing(
+    qtbot: QtBot,
+    inspector: Inspector,
+    open_page: Callable[..., StartPage],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = open_page()
+    monkeypatch.setattr(inspector, "healths", None)
+    button(page, "start").click()
+    qtbot.waitUntil(lambda: "broke down" in text(page, "startProblem"))
+    monkeypatch.undo()
+    with qtbot.assertNotEmitted(page.start_requested, wait=50):
+        page.new.check()
+        qtbot.waitUntil(button(page, "start").isEnabled)

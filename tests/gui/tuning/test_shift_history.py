@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.types import EYES
+from handcal_gui.tuning.shift_history import ShiftHistory, Shifts, moved, same_shifts
+
+LIMIT_M = 0.03
+SHIFTS = st.builds(
+    lambda values: {eye: np.array(values[3 * i : 3 * i + 3]) for i, eye in enumerate(EYES)},
+    st.lists(st.floats(-LIMIT_M, LIMIT_M), min_size=6, max_size=6),
+)
+
+
+def shifts_of(value_m: float) -> Shifts:
+    return {eye: np.full(3, value_m) for eye in EYES}
+
+
+@given(st.lists(SHIFTS, min_size=2, max_size=8))
+def test_undo_goes_back_to_the_start_and_redo_to_the_end(states: list[Shifts]) -> None:
+    history = ShiftHistory(states[0])
+    seen = [history.present]
+    for shifts_m in states[1:]:
+        history.change(shifts_m)
+        if history.present is not seen[-1]:
+            seen.append(history.present)
+    for before in seen[-2::-1]:
+        history.undo()
+        assert history.present is before
+    assert not history.can_undo
+    history.undo()
+    assert history.present is seen[0]
+    for after in seen[1:]:
+        history.redo()
+        assert history.present is after
+    assert not history.can_redo
+    history.redo()
+    assert same_shifts(history.present, states[-1])
+
+
+def test_a_change_forgets_what_was_undone() -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    history.change(shifts_of(0.001))
+    history.undo()
+    history.change(shifts_of(0.002))
+    assert not history.can_redo
+    history.undo()
+    assert same_shifts(history.present, shifts_of(0.0))
+
+
+def test_a_change_that_goes_on_is_undone_with_the_one_before() -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    history.change(shifts_of(0.001), goes_on=True)  # the first change cannot go on with anything
+    history.change(shifts_of(0.002), goes_on=True)
+    history.change(shifts_of(0.003))
+    history.undo()
+    assert same_shifts(history.present, shifts_of(0.002))
+    history.undo()
+    assert same_shifts(history.present, shifts_of(0.0))
+
+
+def test_no_change_is_no_step() -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    history.change(shifts_of(0.0))
+    assert not history.can_undo
+
+
+def test_what_was_given_may_change_afterwards() -> None:
+    given_m = {eye: np.zeros(3) for eye in EYES}
+    history = ShiftHistory(given_m)
+    given_m["left"][0] = 1.0
+    assert history.present["left"][0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        history.present["left"][0] = 1.0
+
+
+@given(SHIFTS, st.sampled_from(range(3)), st.floats(-0.1, 0.1))
+def test_both_eyes_move_by_the_same_amount_within_the_limit(
+    shifts_m: Shifts, axis: int, by_m: float
+) -> None:
+    after_m = moved(shifts_m, EYES, axis, by_m, LIMIT_M)
+    step_m = [after_m[eye] - shifts_m[eye] for eye in EYES]
+    np.testing.assert_allclose(step_m[0], step_m[1], atol=1e-15)
+    assert np.delete(step_m[0], axis).tolist() == [0.0, 0.0]
+    assert abs(step_m[0][axis]) <= abs(by_m) + 1e-15
+    assert all(abs(after_m[eye][axis]) <= LIMIT_M for eye in EYES)
+
+
+@given(SHIFTS, st.sampled_from(range(3)))
+def test_one_eye_moves_alone(shifts_m: Shifts, axis: int) -> None:
+    after_m = moved(shifts_m, ("left",), axis, -shifts_m["left"][axis], LIMIT_M)
+    assert after_m["left"][axis] == 0.0
+    assert after_m["right"] is shifts_m["right"]
+
+
+def test_shifts_of_other_eyes_differ() -> None:
+    assert not same_shifts(shifts_of(0.0), {"left": np.zeros(3)})

@@ -1,0 +1,112 @@
+import numpy as np
+import pytest
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QImage
+from pytestqt.qtbot import QtBot
+
+from handcal.rig.example import example_rig
+from handcal.types import Float64, UInt8
+from handcal.wearer_view import EyeView, see
+from handcal_gui.cloud.splat import rgb
+from handcal_gui.theme import colors
+from handcal_gui.wearer_view.eye_canvas import EyeCanvas
+
+DISPLAY = example_rig().eyes["left"]
+ANGLE_RAD = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
+RING_M = np.column_stack([0.05 * np.cos(ANGLE_RAD), 0.05 * np.sin(ANGLE_RAD), np.full(100, 0.5)])
+SIZE = (300, 300)
+
+
+def _view(
+    outline_m: Float64 = RING_M, drawn_shift_m: Float64 | None = None, image: UInt8 | None = None
+) -> EyeView:
+    drawn_m = np.zeros(3) if drawn_shift_m is None else drawn_shift_m
+    return see(
+        "left", DISPLAY, np.zeros(3), drawn_m, outline_m, RING_M[:0], is_true=True, image=image
+    )
+
+
+@pytest.fixture
+def canvas(qtbot: QtBot) -> EyeCanvas:
+    canvas = EyeCanvas("Left eye")
+    qtbot.addWidget(canvas)
+    canvas.resize(*SIZE)
+    canvas.show()
+    return canvas
+
+
+def _pixels(canvas: EyeCanvas) -> UInt8:
+    """Return (h, w, 3) RGB of what is shown."""
+    image = canvas.grab().toImage().convertToFormat(QImage.Format.Format_RGBA8888)
+    pixels = np.frombuffer(image.constBits(), np.uint8).copy()
+    return pixels.reshape(image.height(), image.width(), 4)[..., :3]
+
+
+def _has(canvas: EyeCanvas, color: str) -> bool:
+    return bool((np.abs(_pixels(canvas).astype(int) - rgb(color)).max(axis=2) < 10).any())
+
+
+def test_message_stands_alone(canvas: EyeCanvas) -> None:
+    canvas.show_view(None, "Nothing yet")
+    assert canvas.accessibleDescription() == "Nothing yet"
+    assert not _has(canvas, colors().live)
+    canvas.show_view(_view())
+    assert _has(canvas, colors().live)
+    canvas.show_view(_view(), "No hand in view")
+    assert not _has(canvas, colors().live)
+
+
+def test_crop_holds_the_hand_and_stays_while_it_does(canvas: EyeCanvas) -> None:
+    canvas.show_view(_view())
+    crop = QRectF(canvas.crop_px)
+    ring_px = _view().hand_px
+    assert all(crop.contains(x, y) for x, y in ring_px.tolist())
+    assert crop.width() < 1.5 * np.ptp(ring_px[:, 0])
+    canvas.show_view(_view(RING_M + np.array([0.002, 0.0, 0.0])))
+    assert canvas.crop_px == crop
+    canvas.show_view(_view(RING_M + np.array([0.03, 0.0, 0.0])))
+    assert canvas.crop_px != crop
+    canvas.show_view(_view(0.3 * RING_M + [0.0, 0.0, 0.35]))
+    assert canvas.crop_px.width() < 0.5 * crop.width()
+
+
+def test_whole_display_is_shown_on_demand(canvas: EyeCanvas) -> None:
+    whole = QRectF(-0.5, -0.5, DISPLAY.width_px, DISPLAY.height_px)
+    canvas.show_view(_view())
+    canvas.show_whole(True)
+    assert canvas.crop_px == whole
+    canvas.show_whole(False)
+    assert canvas.crop_px != whole
+    canvas.show_view(_view(RING_M[:0]))
+    assert canvas.crop_px == whole
+
+
+def test_world_and_outline_lie_where_the_display_has_them(canvas: EyeCanvas) -> None:
+    ring_m = 0.2 * RING_M + np.array([0.03, -0.02, 0.4])
+    world = np.full((DISPLAY.height_px // 2, DISPLAY.width_px // 2, 3), 128, np.uint8)
+    ring_px = _view(ring_m).hand_px
+    column, row = (ring_px.mean(axis=0) / 2.0).astype(int)
+    world[row - 1 : row + 2, column - 1 : column + 2] = (255, 0, 0)
+    canvas.show_view(_view(ring_m, image=world))
+
+    pixels = _pixels(canvas).astype(int)
+    is_dot = (pixels[..., 0] > 190) & (pixels[..., 1] < 65)
+    is_line = np.abs(pixels - rgb(colors().live)).max(axis=2) < 40
+    crop = canvas.crop_px
+    scale = SIZE[0] / max(crop.width(), crop.height())
+    dot_px = 2.0 * np.array([column, row]) + 0.5  # each of the image's pixels covers two by two
+    ring_px = 0.5 * (ring_px.min(axis=0) + ring_px.max(axis=0))
+    for where, place_px in ((is_dot, dot_px), (is_line, ring_px)):
+        rows, columns = np.nonzero(where)
+        seen = np.array([columns.min() + columns.max(), rows.min() + rows.max()]) / 2.0
+        middle = [crop.center().x(), crop.center().y()]
+        np.testing.assert_allclose(seen, 149.5 + scale * (place_px - middle), atol=1.0)
+
+
+def test_offline_outline_is_shown_on_demand(canvas: EyeCanvas) -> None:
+    canvas.show_view(_view(drawn_shift_m=np.array([0.01, 0.0, 0.0])))
+    before = _pixels(canvas)
+    canvas.show_offline(True)
+    assert (_pixels(canvas) != before).any()
+    canvas.show_offline(False)
+    np.testing.assert_array_equal(_pixels(canvas), before)

@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+from PySide6.QtWidgets import QToolButton
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.widgets.banner import Banner
+
+
+def test_a_message_stays_until_it_is_closed_and_hides_the_condition(qtbot: QtBot) -> None:
+    banner = Banner()
+    qtbot.addWidget(banner)
+    close = banner.findChild(QToolButton, "bannerClose")
+    assert isinstance(close, QToolButton)
+    assert banner.isHidden()
+    banner.show_condition("no camera")
+    assert (banner.text, banner.isHidden(), close.isHidden()) == ("no camera", False, True)
+    banner.show_message("Could not solve")
+    banner.show_condition("no headset")
+    assert (banner.text, close.isHidden()) == ("Could not solve", False)
+    close.click()
+    assert (banner.text, close.isHidden()) == ("no headset", True)
+    banner.show_condition("")
+    assert (banner.text, banner.isHidden()) == ("", True)
+
+
+def test_the_newest_message_wins(qtbot: QtBot) -> None:
+    banner = Banner()
+    qtbot.addWidget(banner)
+    banner.show_message("first")
+    banner.show_message("second")
+    assert banner.text == "second"
+    banner.clear()
+    assert banner.isHidden()

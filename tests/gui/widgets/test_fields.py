@@ -1,0 +1,63 @@
+"""Fields keep their value when the wheel only scrolls the page."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.widgets.fields import choice, number, whole_number
+
+Field = QComboBox | QDoubleSpinBox | QSpinBox
+
+
+def turn_wheel(field: Field) -> None:
+    middle = QPointF(field.rect().center())
+    event = QWheelEvent(
+        middle,
+        field.mapToGlobal(middle),
+        QPoint(),
+        QPoint(0, -120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(field, event)
+
+
+def shown(field: Field) -> float:
+    return field.currentIndex() if isinstance(field, QComboBox) else field.value()
+
+
+@pytest.mark.parametrize("kind", ["choice", "number", "whole_number"])
+def test_the_wheel_changes_only_the_field_with_the_focus(qtbot: QtBot, kind: str) -> None:
+    fields: dict[str, Field] = {
+        "choice": choice("x", "X", {"a": "A", "b": "B", "c": "C"}),
+        "number": number("x", -10.0, 10.0, 0.5, " m", ""),
+        "whole_number": whole_number("x", -10, 10, ""),
+    }
+    field = fields[kind]
+    for one in fields.values():
+        qtbot.addWidget(one)
+    field.show()
+    field.clearFocus()
+    before = shown(field)
+    turn_wheel(field)
+    assert shown(field) == before
+    field.setFocus()
+    qtbot.waitUntil(field.hasFocus)
+    turn_wheel(field)
+    assert shown(field) != before
+
+
+def test_a_number_has_its_unit_on_the_right(qtbot: QtBot) -> None:
+    fine, coarse = number("x", 0.0, 2.0, 0.05, " m", ""), number("y", 0.0, 90.0, 0.5, " °", "")
+    for field in (fine, coarse):
+        qtbot.addWidget(field)
+        field.setValue(1.234)
+        assert field.alignment() & Qt.AlignmentFlag.AlignRight
+    assert fine.text() == f"{fine.locale().toString(1.23, 'f', 2)} m"
+    assert coarse.text() == f"{coarse.locale().toString(1.2, 'f', 1)} °"

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.widgets.number_table import NumberTable, Row
+
+ROWS = (
+    Row("φ1", ("+1.00 mm", "−2.00 mm"), "how far right"),
+    Row("Method", ("consistent",)),
+)
+
+
+def test_rows_are_shown_right_aligned_and_explained(qtbot: QtBot) -> None:
+    table = NumberTable("Some numbers")
+    qtbot.addWidget(table)
+    table.show_rows(("Left eye", "Right eye"), ROWS)
+    item, label = table.item(0, 1), table.verticalHeaderItem(0)
+    assert item is not None
+    assert label is not None
+    assert item.text() == "−2.00 mm"
+    assert item.textAlignment() & Qt.AlignmentFlag.AlignRight
+    assert item.toolTip() == label.toolTip() == "how far right"
+    assert (table.columnSpan(0, 0), table.columnSpan(1, 0)) == (1, 2)
+
+
+def test_other_rows_leave_nothing_of_the_first(qtbot: QtBot) -> None:
+    table = NumberTable("Some numbers")
+    qtbot.addWidget(table)
+    table.show_rows(("Left eye", "Right eye"), ROWS)
+    table.show_rows(("a", "b"), (Row("one", ("1", "2")), Row("two", ("3", "4"))))
+    assert table.columnSpan(1, 0) == 1
+    assert table.as_text() == "\ta\tb\none\t1\t2\ntwo\t3\t4"
+
+
+def test_columns_share_the_room_and_cut_no_number_short(qtbot: QtBot) -> None:
+    table = NumberTable("Some numbers")
+    qtbot.addWidget(table)
+    table.show_rows(("Left eye", "Right eye"), ROWS)
+    table.show()
+    for width_px in (60, 600):
+        table.resize(width_px, 120)
+        widths_px = [table.columnWidth(column) for column in range(2)]
+        for column, column_px in enumerate(widths_px):
+            assert column_px >= table.sizeHintForColumn(column)
+    assert sum(widths_px) == pytest.approx(table.viewport().width(), abs=1)

@@ -1,0 +1,48 @@
+"""A path is typed or chosen; giving up the dialog changes nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.widgets.path_field import PathField
+
+
+def test_a_file_or_a_folder_is_chosen_in_a_dialog(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Any, ...]] = []
+
+    def answer_file(*asked_for: Any) -> tuple[str, str]:
+        asked.append(asked_for[1:])
+        return "/a/rig.yaml", ""
+
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", answer_file)
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: "")
+    file = PathField("Rig file", "file", "Rig files (*.yaml)", "Example")
+    folder = PathField("Folder", "folder")
+    for field in (file, folder):
+        qtbot.addWidget(field)
+    button = file.findChild(QPushButton, "choose")
+    assert isinstance(button, QPushButton)
+    with qtbot.waitSignal(file.changed):
+        button.click()
+    assert file.path == "/a/rig.yaml"
+    assert asked == [("Rig file", "", "Rig files (*.yaml)")]
+    folder.set_path("/b")
+    with qtbot.assertNotEmitted(folder.changed):
+        folder.choose()
+    assert folder.path == "/b"
+
+
+def test_blanks_around_a_typed_path_do_not_count(qtbot: QtBot) -> None:
+    field = PathField("Rig file", "file")
+    qtbot.addWidget(field)
+    line = field.findChild(QLineEdit)
+    assert isinstance(line, QLineEdit)
+    with qtbot.waitSignal(field.changed):
+        line.setText("  /a b ")
+    assert field.path == "/a b"
