@@ -10,7 +10,7 @@ from handcal.hand.overlay import contour_px
 from handcal.types import UInt8
 from handcal_gui.camera.hand_overlay import HandOverlay, contour_runs
 
-from .conftest import Shots
+from ..conftest import Shots
 
 SQUARE_PX = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 
