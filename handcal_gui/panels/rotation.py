@@ -118,10 +118,9 @@ class RotationPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(*4 * (SPACING_PX,))
         layout.setSpacing(SPACING_PX // 2)
-        self._plot.setMinimumHeight(11 * SPACING_PX)
         layout.addLayout(top, 3)
         layout.addWidget(self._advice)
-        layout.addWidget(self._plot, 1)
+        layout.addWidget(self._plot, 2)
         layout.addWidget(self._refusals)
 
 

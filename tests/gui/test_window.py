@@ -12,6 +12,8 @@ from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.window import MainWindow
 
+TABBED = ("results", "fine_tune", "trials", "session", "link")
+
 
 @pytest.fixture
 def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
@@ -99,3 +101,52 @@ def test_no_key_is_taken_twice(window: MainWindow) -> None:
     ]
     assert {"Ctrl+N", "Ctrl+O", "Ctrl+E", "F1"} <= set(keys)
     assert len(keys) == len(set(keys))
+
+
+def has_title(window: MainWindow, name: str) -> bool:
+    return window.docks[name].titleBarWidget() is None
+
+
+def is_in_front(window: MainWindow, name: str) -> bool:
+    return not window.docks[name].visibleRegion().isEmpty()
+
+
+def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: MainWindow) -> None:
+    window.show_page("live")
+    assert [name for name in window.docks if not has_title(window, name)] == list(TABBED)
+    window.docks["link"].setFloating(True)
+    qtbot.waitUntil(lambda: has_title(window, "link"))
+    assert not has_title(window, "trials")
+    for name in ("fine_tune", "trials", "session"):
+        window.docks[name].hide()
+    qtbot.waitUntil(lambda: has_title(window, "results"))
+
+
+def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:
+    window.show_page("live")
+    wizard = window.centralWidget()
+    assert wizard is not None
+    assert wizard.height() > wizard.sizeHint().height()
+    assert window.docks["camera"].width() >= 350
+
+
+def test_a_step_brings_up_its_panel_but_not_over_work(qtbot: QtBot, window: MainWindow) -> None:
+    window.show_page("live")
+    window.bring_up("session")
+    qtbot.waitUntil(lambda: is_in_front(window, "session"))
+    window.go_to("fine_tune")
+    qtbot.waitUntil(lambda: is_in_front(window, "fine_tune"))
+    window.bring_up("results")
+    assert is_in_front(window, "fine_tune")
+
+
+def test_panels_are_reached_by_keys(qtbot: QtBot, window: MainWindow) -> None:
+    window.show_page("live")
+    window.activateWindow()
+    qtbot.waitActive(window)
+    QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
+    assert window.panels.trials.hasFocus()
+    window.show_page("start")
+    QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
+    assert not is_in_front(window, "trials")
