@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 
 from handcal.__main__ import main
 from handcal.demo import reprojection_arcmin
+from handcal.geometry import rigid
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session import Session
 from handcal.sim.wearer import WearerSettings, draw_eyes
@@ -145,3 +147,23 @@ def test_the_reprojection_error_is_that_of_the_true_eyes() -> None:
     expected = [np.arctan(0.004 * (1.0 / z - 1.0 / Z_E_S_M)) for z in (0.4, 0.5, 0.6)]
     expected_arcmin = 60.0 * np.degrees(np.mean(expected))
     assert reprojection_arcmin(rig, still_m, aside_m) == pytest.approx(expected_arcmin, rel=0.02)
+
+
+def test_a_wrong_rig_is_judged_by_the_true_eyes() -> None:
+    worn = example_rig()
+    # The rig takes C0 for 1 mm aside of where it is: eyes and target are told from there.
+    aside_m = np.array([0.001, 0.0, 0.0])
+    eyes = {
+        eye: replace(display, t_C0_V_m=display.t_C0_V_m + aside_m)
+        for eye, display in worn.eyes.items()
+    }
+    rig = replace(worn, eyes=eyes)
+    true_m: dict[Eye, np.ndarray] = {eye: np.array([0.002, -0.001, 0.003]) for eye in EYES}
+    same_m: dict[Eye, np.ndarray] = {eye: shift_m + aside_m for eye, shift_m in true_m.items()}
+    # The same eye, but the display is taken for 1 mm aside as well: 1 mm at 2 m, 1.7 arcmin.
+    assert reprojection_arcmin(rig, same_m, true_m, worn) == pytest.approx(1.72, rel=0.02)
+    # A target tracked 1 mm aside is drawn aside.
+    T_H_D = rigid(None, aside_m) @ worn.T_H_D
+    expected = 60.0 * np.degrees(np.mean([0.001 / z for z in (0.4, 0.5, 0.6)]))
+    moved = reprojection_arcmin(replace(worn, T_H_D=T_H_D), true_m, true_m, worn)
+    assert moved == pytest.approx(expected, rel=0.02)

@@ -7,6 +7,7 @@ displays' sizes and T_V_H. So can one part of a finished rig be calibrated again
 from __future__ import annotations
 
 from dataclasses import replace
+from textwrap import shorten
 
 import numpy as np
 
@@ -109,7 +110,7 @@ def _origin(
         views=views,
         rms_px=rms_px,
         verdict=verdict.name,
-        reason=verdict.reason[:MAX_TEXT],
+        reason=shorten(verdict.reason, MAX_TEXT, placeholder=" …"),
         parameters=parameters,
         covariance=0.5 * (covariance + np.transpose(covariance)),
     )

@@ -8,13 +8,13 @@ from handcal.geometry import is_rigid
 from handcal.types import EYES, RIG_PARTS, EyeDisplay, Float64, Intrinsics, Origin, Rig
 
 MAX_SIDE_PX = 16384
-MAX_TEXT = 200
+MAX_NAME, MAX_TEXT = 200, 500
 MAX_PARAMETERS = 12
 
 
 def check_rig(rig: Rig) -> None:
     """Raise ValueError, naming the field and what is expected, if `rig` is implausible."""
-    _check_line("name", rig.name)
+    _check_line("name", rig.name, MAX_NAME)
     for eye in EYES:
         _check_display(eye, rig.eyes[eye])
     _check_rigid("T_H_D", rig.T_H_D)
@@ -63,7 +63,7 @@ def _check_display(eye: str, display: EyeDisplay) -> None:
 
 def _check_origin(name: str, origin: Origin) -> None:
     for field in ("method", "made", "verdict", "reason"):
-        _check_line(f"{name}.{field}", getattr(origin, field))
+        _check_line(f"{name}.{field}", getattr(origin, field), MAX_TEXT)
     require(origin.views > 0, f"{name}.views must be above 0")
     require(0 <= origin.rms_px < np.inf, f"{name}.rms_px must be a number that is not negative")
     require(
@@ -71,7 +71,7 @@ def _check_origin(name: str, origin: Origin) -> None:
         f"{name}.parameters must hold 1 to {MAX_PARAMETERS} names",
     )
     for parameter in origin.parameters:
-        _check_line(f"{name}.parameters", parameter)
+        _check_line(f"{name}.parameters", parameter, MAX_NAME)
     covariance = origin.covariance
     require(
         bool(np.isfinite(covariance).all())
@@ -81,10 +81,10 @@ def _check_origin(name: str, origin: Origin) -> None:
     )
 
 
-def _check_line(name: str, text: str) -> None:
+def _check_line(name: str, text: str, longest: int) -> None:
     require(
-        0 < len(text) <= MAX_TEXT and text.isprintable(),
-        f"{name} must be one line of 1 to {MAX_TEXT} printable characters",
+        0 < len(text) <= longest and text.isprintable(),
+        f"{name} must be one line of 1 to {longest} printable characters",
     )
 
 

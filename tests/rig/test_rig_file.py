@@ -13,7 +13,7 @@ from handcal.geometry import rigid
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
-from handcal.types import EYES, EyeDisplay, Intrinsics, Rig
+from handcal.types import EYES, RIG_PARTS, EyeDisplay, Intrinsics, Origin, Rig
 
 FOCAL = st.floats(1.0, 1e5)
 OFFSET = st.floats(-0.05, 0.05)
@@ -29,6 +29,18 @@ DISPLAYS = st.builds(
     width_px=SIDE,
     height_px=SIDE,
     T_V_H=TRANSFORMS,
+)
+LINES = st.text(st.characters(categories=["L", "N", "P"]), min_size=1, max_size=40)
+ORIGINS = st.builds(
+    Origin,
+    method=LINES,
+    made=st.just("2026-11-21T16:00:00+00:00"),
+    views=st.integers(1, 500),
+    rms_px=st.floats(0, 10),
+    verdict=st.sampled_from(["good", "needs more views", "bad"]),
+    reason=LINES,
+    parameters=st.just(("x_m", "turn: rad")),
+    covariance=st.builds(lambda a, b: np.array([[a, b], [b, a]]), st.floats(0, 1), OFFSET),
 )
 CHARACTERS = st.characters(categories=["L", "N", "P", "S"], include_characters=" ")
 RIGS = st.builds(
@@ -49,6 +61,7 @@ RIGS = st.builds(
             lambda n: st.tuples(*[st.floats(-10, 10)] * n)
         ),
     ),
+    origins=st.dictionaries(st.sampled_from(RIG_PARTS), ORIGINS),
 )
 
 
@@ -56,6 +69,11 @@ def assert_equal(a: Rig, b: Rig) -> None:
     assert a.name == b.name
     assert a.depth_intrinsics == b.depth_intrinsics
     assert np.array_equal(a.T_H_D, b.T_H_D)
+    assert set(a.origins) == set(b.origins)
+    for part, origin in a.origins.items():
+        for field in dataclasses.fields(Origin):
+            ours, theirs = getattr(origin, field.name), getattr(b.origins[part], field.name)
+            assert np.array_equal(ours, theirs), f"{part}.{field.name}"
     for eye in EYES:
         for field in dataclasses.fields(EyeDisplay):
             ours, theirs = getattr(a.eyes[eye], field.name), getattr(b.eyes[eye], field.name)
@@ -153,6 +171,56 @@ def test_damaged_bytes_give_a_plausible_rig_or_a_file_error(
     path.write_bytes(content)
     with contextlib.suppress(FileError):
         check_rig(read_rig(path))
+
+
+def test_a_rig_of_version_1_is_read_and_written_as_version_2(path: Path, tmp_path: Path) -> None:
+    path.write_text(path.read_text().replace("handcal_rig: 2", "handcal_rig: 1"))
+    rig = read_rig(path)
+    assert_equal(rig, example_rig())
+    assert rig.origins == {}
+    write_rig(tmp_path / "new.yaml", rig)
+    assert "handcal_rig: 2\n" in (tmp_path / "new.yaml").read_text()
+    assert_equal(read_rig(tmp_path / "new.yaml"), rig)
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"views": 0}, r"origins\.left\.views must be above 0"),
+        ({"rms_px": np.nan}, r"origins\.left\.rms_px must be a number"),
+        ({"reason": "two\nlines"}, r"origins\.left\.reason must be one line"),
+        ({"parameters": (), "covariance": np.empty((0, 0))}, "parameters must hold 1 to"),
+        ({"covariance": [[-1.0]]}, "variances that are not negative"),
+        ({"covariance": [[np.inf]]}, r"origins\.left\.covariance must be finite"),
+    ],
+)
+def test_an_implausible_origin_is_named(
+    path: Path, changes: dict[str, object], problem: str
+) -> None:
+    origin = Origin("grid", "today", 3, 0.2, "good", "so it is", ("x_m",), np.eye(1))
+    changed = dataclasses.replace(origin, **changes)  # type: ignore[arg-type]
+    rig = dataclasses.replace(example_rig(), origins={"left": changed})
+    with pytest.raises(ValueError, match=problem):
+        write_rig(path, rig)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("views: 3", "views: 3.5", r"origins\.left\.views must be a whole number"),
+        ('parameters: [ "x_m" ]', "parameters: []", r"parameters must be a list of texts"),
+        ('parameters: [ "x_m" ]', "parameters: [ 1 ]", r"parameters must be a list of texts"),
+        ('[ "x_m" ]', '[ "x_m", "y_m" ]', r"origins\.left\.covariance must be a 2×2"),
+    ],
+)
+def test_a_bad_field_of_an_origin_is_named(path: Path, old: str, new: str, problem: str) -> None:
+    origin = Origin("grid", "today", 3, 0.2, "good", "so it is", ("x_m",), np.eye(1))
+    write_rig(path, dataclasses.replace(example_rig(), origins={"left": origin}))
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(FileError, match=problem):
+        read_rig(path)
 
 
 def test_an_implausible_rig_is_not_written(path: Path) -> None:
