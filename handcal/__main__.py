@@ -6,7 +6,6 @@ Commands import what they need when they run, so that ``handcal --help`` answers
 from __future__ import annotations
 
 import argparse
-import math
 import signal
 import sys
 import threading
@@ -14,23 +13,18 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, get_args
-
-from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.errors import FileError, HandcalError
 from handcal.export.formats import FORMATS
-from handcal.files import make_folder, write_json
+from handcal.files import make_folder
+from handcal.rig_commands import add_rig_commands
+from handcal.terminal import Parser, add_command, console, fail, number, progress, save, table
 from handcal.types import METHODS
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
     from handcal.replay import ReplayStep
-
-console = Console(soft_wrap=True, highlight=False)
 
 
 def demo(arguments: argparse.Namespace) -> None:
@@ -45,14 +39,14 @@ def demo(arguments: argparse.Namespace) -> None:
         reorder=arguments.reorder,
         worn_rig=str(arguments.worn_rig or ""),
     )
-    with _progress() as report:
+    with progress() as report:
         result = run_demo(settings, _rig_path(arguments.rig), make_folder(arguments.output), report)
-    _save(arguments.json, result)
-    table = _table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "off by", "verdict")
+    save(arguments.json, result)
+    shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "off by", "verdict")
     for eye, found in result["eyes"].items():
         triples = [_triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
-        table.add_row(eye, *triples, f"{found['error_mm']:.1f}", found["verdict"])
-    console.print(table)
+        shown_table.add_row(eye, *triples, f"{found['error_mm']:.1f}", found["verdict"])
+    console.print(shown_table)
     for eye, found in result["eyes"].items():
         console.print(f"{eye}: {found['verdict']}: {found['reason']}")
     error, guard = result["reprojection_arcmin"], result["guard"]
@@ -101,10 +95,10 @@ def solve(arguments: argparse.Namespace) -> None:
         results = solve_session(record.alignments, record.rig, settings)
     except ValueError as error:
         raise FileError(f"{arguments.session} cannot be solved: {error}") from error
-    _save(arguments.json, results_json(results))
-    table = _table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
+    save(arguments.json, results_json(results))
+    shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.shifts.items():
-        table.add_row(
+        shown_table.add_row(
             eye,
             _triple(1e3 * shift.shift_m),
             _triple(1e3 * np.sqrt(np.diag(shift.covariance_m2))),
@@ -112,7 +106,7 @@ def solve(arguments: argparse.Namespace) -> None:
             f"{100 * shift.inlier_ratio:.0f} %",
             results.verdicts[eye].name,
         )
-    console.print(table)
+    console.print(shown_table)
     for eye, verdict in results.verdicts.items():
         console.print(f"{eye}: {verdict.name}: {verdict.reason}")
     if results.eye_distance_m is not None:
@@ -132,7 +126,7 @@ def export(arguments: argparse.Namespace) -> None:
         raise HandcalError(str(error)) from error
     record = Session.open(arguments.session)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
-    with _progress() as report:
+    with progress() as report:
         files = export_session(record, folder, settings, report, lambda: False)
     for file in files:
         console.print(str(file))
@@ -145,16 +139,16 @@ def replay(arguments: argparse.Namespace) -> None:
     from handcal.hand.segment import SegmentSettings
     from handcal.replay import replay as play
 
-    table = _table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
+    shown_table = table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
     rows: list[dict[str, Any]] = []
     playback = PlaybackSettings(real_time=arguments.real_time)
     with open_recording(arguments.recording, playback) as camera:
         for step in play(camera, SegmentSettings()):
             rows.append(_replay_row(step))
             shown = list(rows[-1].values())[:-1]
-            table.add_row(*map(_cell, shown))
-    console.print(table)
-    _save(arguments.json, {"frames": rows})
+            shown_table.add_row(*map(_cell, shown))
+    console.print(shown_table)
+    save(arguments.json, {"frames": rows})
     for row in rows:
         if row["problem"]:
             console.print(f"Frame {row['frame']}: {row['problem']}")
@@ -171,11 +165,11 @@ def record(arguments: argparse.Namespace) -> None:
     with _open_source(arguments) as camera, _until_interrupted() as is_stopped:
         console.print(f"Recording {camera.name}; Ctrl+C ends it and keeps what there is.")
         try:
-            with _progress() as report:
+            with progress() as report:
                 recorded = record_camera(camera, arguments.output, settings, report, is_stopped)
         except ValueError as error:
             raise HandcalError(str(error)) from error
-    _save(arguments.json, asdict(recorded))
+    save(arguments.json, asdict(recorded))
     console.print(
         f"{recorded.frames} frames, {recorded.duration_s:.1f} s, {recorded.dropped} dropped; "
         f"ended: {recorded.stop_reason}. Recording: {arguments.output}"
@@ -212,13 +206,13 @@ def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, each beside its target and a baseline of the same run."""
     from handcal.bench import QUICK, BenchSettings, bench_table, run_bench
 
-    with _progress() as report:
+    with progress() as report:
         result = run_bench(QUICK if arguments.quick else BenchSettings(), report)
-    _save(arguments.json, result)
-    table = _table("what", "measured", "target", "met")
+    save(arguments.json, result)
+    shown_table = table("what", "measured", "target", "met")
     for row in bench_table(result):
-        table.add_row(*row)
-    console.print(table)
+        shown_table.add_row(*row)
+    console.print(shown_table)
 
 
 def doctor(_arguments: argparse.Namespace) -> None:
@@ -239,56 +233,28 @@ def main() -> None:
     try:
         arguments.command(arguments)
     except HandcalError as error:
-        _fail(str(error), 1)
+        fail(str(error), 1)
     except KeyboardInterrupt:
-        _fail("interrupted", 130)
+        fail("interrupted", 130)
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
     except OSError as error:
-        _fail(f"cannot write the output: {error.strerror or error}", 1)
-
-
-class _Help(argparse.ArgumentDefaultsHelpFormatter):
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        has_default = action.default is not None and action.default is not False
-        return super()._get_help_string(action) if has_default else action.help
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        _fail(f"{message}; see {self.prog} --help", 2)
-
-
-def _fail(message: str, code: int) -> NoReturn:
-    sys.stderr.write(f"handcal: {' '.join(message.split())}\n")
-    sys.exit(code)
+        fail(f"cannot write the output: {error.strerror or error}", 1)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog="handcal",
         description="Calibrate an optical see-through headset with the wearer's bare hand.",
     )
-    commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=_Parser)
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
 
-    def add(command: Callable[[argparse.Namespace], None], *, json: bool = True) -> _Parser:
-        text = command.__doc__
-        added: _Parser = commands.add_parser(
-            command.__name__,
-            help=text,
-            description=text,
-            formatter_class=_Help,
-        )
-        added.set_defaults(command=command)
-        if json:
-            added.add_argument(
-                "--json", type=Path, metavar="FILE", help="write the results here too"
-            )
-        return added
+    def add(command: Callable[[argparse.Namespace], None], *, json: bool = True) -> Parser:
+        return add_command(commands, command, json=json)
 
-    share, count, seed = _number(float, 0.0, 1.0), _number(int, 1, 20), _number(int, 0, 2**32 - 1)
-    milliseconds = _number(float, 0.0, 10_000.0)
+    share, count, seed = number(float, 0.0, 1.0), number(int, 1, 20), number(int, 0, 2**32 - 1)
+    milliseconds = number(float, 0.0, 10_000.0)
 
     one = add(demo)
     one.add_argument(
@@ -324,7 +290,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--method", choices=METHODS, help="solver; the session's own if absent")
 
     one = add(export, json=False)
-    metres = _number(float, 1e-3, 1e6)
+    metres = number(float, 1e-3, 1e6)
     one.add_argument("session", type=Path, help="a session's folder")
     one.add_argument(
         "--output", type=Path, help="folder for the files; results/export/NAME if absent"
@@ -347,16 +313,16 @@ def _parser() -> argparse.ArgumentParser:
         "--source", default="realsense", help="realsense, simulator, or a recording to convert"
     )
     one.add_argument(
-        "--seconds", type=_number(float, 0.01, 86_400.0), default=60.0, help="end after so long"
+        "--seconds", type=number(float, 0.01, 86_400.0), default=60.0, help="end after so long"
     )
     one.add_argument(
-        "--frames", type=_number(int, 1, 100_000), default=100_000, help="end after so many"
+        "--frames", type=number(int, 1, 100_000), default=100_000, help="end after so many"
     )
     one.add_argument("--seed", type=seed, default=1, help="of the simulated hand and room")
     _add_realsense_options(one)
 
     one = add(headset, json=False)
-    port = _number(int, 1, 65535)
+    port = number(int, 1, 65535)
     one.add_argument("--port", type=port, required=True, help="where the PC listens")
     one.add_argument(
         "--scene-port", type=port, required=True, help="where the simulated camera listens"
@@ -372,24 +338,28 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--delay-ms", type=milliseconds, default=0.0, help="of every datagram")
     one.add_argument(
         "--clock-offset-ms",
-        type=_number(float, -1e9, 1e9),
+        type=number(float, -1e9, 1e9),
         default=12345.0,
         help="headset's clock less the PC's",
     )
-    one.add_argument("--duration-s", type=_number(float, 0.0, 1e6), help="end after so long")
+    one.add_argument("--duration-s", type=number(float, 0.0, 1e6), help="end after so long")
 
     add(bench).add_argument("--quick", action="store_true", help="few repetitions: only a look")
     add(doctor, json=False)
+
+    text = "The offline calibration: boards, cameras, displays, and the rig file made of them."
+    rig = commands.add_parser("rig", help=text, description=text)
+    add_rig_commands(rig.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser))
     return parser
 
 
-def _add_realsense_options(command: _Parser) -> None:
+def _add_realsense_options(command: Parser) -> None:
     from handcal.camera.settings import Preset, Profile
 
     command.add_argument("--serial", default="", help="of the RealSense; the first if absent")
     command.add_argument("--profile", choices=get_args(Profile), default="auto", help="size")
     command.add_argument("--preset", choices=get_args(Preset), help="the SDK's visual preset")
-    positive = _number(float, 0.0, 1e6)
+    positive = number(float, 0.0, 1e6)
     command.add_argument("--exposure-us", type=positive, help="of the depth; automatic if absent")
     command.add_argument("--laser-power-mw", type=positive, help="of the projector")
     for name in ("spatial-filter", "temporal-filter", "hole-filling"):
@@ -435,45 +405,10 @@ def _until_interrupted() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[[str], float]:
-    """Return a converter for argparse that accepts numbers from `low` to `high`."""
-
-    def convert(text: str) -> float:
-        try:
-            value = kind(text)
-        except ValueError:
-            value = math.nan
-        if not low <= value <= high:
-            what = "whole number" if kind is int else "number"
-            raise argparse.ArgumentTypeError(f"{text!r} is no {what} from {low} to {high}")
-        return value
-
-    return convert
-
-
 def _rig_path(rig: Path | None) -> Path:
     from handcal.resources import resource_path
 
     return rig or resource_path("example_rig.yaml")
-
-
-def _save(path: Path | None, result: dict[str, Any]) -> None:
-    if path is not None:
-        make_folder(path.parent)
-        write_json(path, result)
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for number, column in enumerate(columns):
-        # The first column gives way where the terminal is narrow.
-        table.add_column(
-            column,
-            justify="right" if number else "left",
-            no_wrap=number > 0,
-            overflow="ellipsis" if number else "fold",
-        )
-    return table
 
 
 def _triple(values: Iterable[float]) -> str:
@@ -499,26 +434,6 @@ def _replay_row(step: ReplayStep) -> dict[str, Any]:
         "segment_ms": 1e3 * step.segment_s,
         "problem": step.problem,
     }
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, float], None]]:
-    """Yield a function that shows what is going on: a bar on a terminal, else plain lines."""
-    if not console.is_terminal:
-        last = ("", 0)
-
-        def say(what: str, share: float) -> None:
-            nonlocal last
-            if last != (what, int(10 * share)):
-                last = what, int(10 * share)
-                console.print(f"{100 * share:3.0f} % {what}")
-
-        yield say
-        return
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda what, share: bar.update(task, description=what, completed=share)
 
 
 if __name__ == "__main__":

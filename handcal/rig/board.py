@@ -221,12 +221,9 @@ def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
 
 def _fits(points_m: Float64, pixels: Float64) -> NDArray[np.bool_]:
     """Tell which corners lie where a plane's image has them, lens distortion allowed."""
-    H, _ = cv2.findHomography(points_m[:, :2], pixels, cv2.LMEDS)
-    if H is None:
-        return np.zeros(len(pixels), np.bool_)
-    expected = cv2.perspectiveTransform(points_m[None, :, :2], H)[0]
-    off_px = np.linalg.norm(expected - pixels, axis=1)
-    return np.asarray(off_px < _STRAY_SQUARES * np.median(_spacings_px(pixels)))
+    off_px = _STRAY_SQUARES * float(np.median(_spacings_px(pixels)))
+    H, inliers = cv2.findHomography(points_m[:, :2], pixels, cv2.RANSAC, off_px)
+    return np.zeros(len(pixels), np.bool_) if H is None else np.asarray(inliers).ravel() > 0
 
 
 def _goes_on(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> bool:

@@ -149,14 +149,16 @@ def calibrate_stereo(
     solved = (free if depth is None else [], free if headset is None else [])
     depth = depth or _solved([first for first, _ in pairs], "depth", settings.camera)
     headset = headset or _solved([second for _, second in pairs], "headset", settings.camera)
-    # Both cameras' own solutions are improved by what they see together.
-    T_H_D, T_D_B, depth, headset = _solve(both, depth, headset, lens if all(solved) else None)
-    off_px, by = _fit(both, depth, headset, T_H_D, T_D_B)
-    everything_px = np.vstack([off for pair in off_px.values() for off in pair])
-    rms_px = rms(everything_px)
+    rms_px = _rms_px(both, depth, headset)
     _check_not_swapped(both, depth, headset, rms_px)
     if rms_px > settings.max_rms_px:
         _check_not_mirrored(both, depth, headset, rms_px)
+    # Both cameras' own solutions are improved by what they see together, if that is at all one.
+    joint = lens if all(solved) and rms_px < settings.max_rms_px else None
+    T_H_D, T_D_B, depth, headset = _solve(both, depth, headset, joint)
+    off_px, by = _fit(both, depth, headset, T_H_D, T_D_B)
+    everything_px = np.vstack([off for pair in off_px.values() for off in pair])
+    rms_px = rms(everything_px)
     covariance = _covariance(by, T_H_D, T_D_B, solved, everything_px)
     alone = np.stack([_alone(pair, depth, headset) for pair in both.values()])
     apart = _differences(T_H_D, alone)
