@@ -1,0 +1,118 @@
+"""The commands on displays and rig files, as a person calls them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.display import view_of_eye
+from handcal.errors import FileError, HandcalError
+from handcal.geometry import invert, rigid
+from handcal.rig.board import Board
+from handcal.rig.example import FOCAL_PX, example_rig
+from handcal.rig.formats import write_intrinsics
+from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig.tracked_file import write_tracked
+from handcal.rig_commands import add_rig_commands
+from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
+from handcal.sim.viewpoint import photograph_display
+from handcal.terminal import Parser
+from handcal.types import Intrinsics
+
+RIG = example_rig()
+CAMERA = Intrinsics(960, 540, 1350.0, 1348.0, 482.0, 267.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
+PICTURES = PictureSettings(samples=1)
+
+
+def run(*words: object) -> None:
+    parser = Parser(prog="handcal rig")
+    add_rig_commands(parser.add_subparsers(required=True, parser_class=Parser))
+    arguments = parser.parse_args([str(word) for word in words])
+    arguments.command(arguments)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Photographs of a grid and a tracked board by a camera at the left C0."""
+    folder = tmp_path_factory.mktemp("display")
+    run("grid", "--png", folder / "grid.png")
+    shown = cv2.imread(str(folder / "grid.png"), cv2.IMREAD_GRAYSCALE)
+    rng = np.random.default_rng(1)
+    T_E_C = rigid([0.03, -0.02, 0.05])
+    display = RIG.eyes["left"]
+    (folder / "grids").mkdir()
+    image = photograph_display(
+        np.asarray(shown, np.uint8), display, T_E_C[:3, :3], CAMERA, rng, settings=PICTURES
+    )
+    cv2.imwrite(str(folder / "grids" / "1.png"), image)
+    (folder / "boards").mkdir()
+    T_H_C = invert(view_of_eye(display, np.eye(4))) @ T_E_C
+    painter, poses = BoardPainter(Board(), CAMERA, PICTURES), {}
+    for number, T_C_B in enumerate(board_poses(Board(), CAMERA, 4, rng)):
+        cv2.imwrite(str(folder / "boards" / f"{number}.png"), painter.paint(T_C_B, rng))
+        poses[f"{number}.png"] = T_H_C @ T_C_B
+    write_tracked(folder / "poses.json", poses)
+    write_intrinsics(folder / "camera.json", CAMERA, "json")
+    return folder
+
+
+def calibrate(folder: Path, output: Path, *more: object) -> None:
+    run(
+        *("display", folder / "grids", "--eye", "left", "--output", output),
+        *("--camera-intrinsics", folder / "camera.json", "--tracked", folder / "poses.json"),
+        *("--board-images", folder / "boards", *more),
+    )
+
+
+def test_a_display_is_calibrated_from_photographs(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "new" / "rig.yaml"
+    square_arcmin = 60.0 * np.degrees(2.0 * np.arctan(40.0 / FOCAL_PX))
+    calibrate(folder, output, "--square-arcmin", square_arcmin)
+    found, true = read_rig(output).eyes["left"], RIG.eyes["left"]
+    assert found.z_C0_S_m == pytest.approx(true.z_C0_S_m, rel=0.002)
+    np.testing.assert_allclose(found.t_C0_V_m, true.t_C0_V_m, atol=0.0003)
+    assert read_rig(output).origins["left"].verdict in capsys.readouterr().out
+    run("compare", output, output, "--json", tmp_path / "c.json")
+    differences = json.loads((tmp_path / "c.json").read_text())["differences"]
+    assert all(one["value"] < 1e-6 for one in differences)
+
+
+def test_a_missing_pose_is_named(folder: Path, tmp_path: Path) -> None:
+    poses = tmp_path / "poses.json"
+    write_tracked(poses, {"0.png": np.eye(4)})
+    with pytest.raises(FileError, match=r"no pose for 1\.png, 2\.png, 3\.png"):
+        calibrate(folder, tmp_path / "rig.yaml", "--distance-m", 2, "--tracked", poses)
+
+
+def test_a_rig_in_doubt_fails_the_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rig.yaml"
+    write_rig(path, RIG)
+    run("check", path, "--json", tmp_path / "found.json")
+    assert "check" not in capsys.readouterr().out.split()
+    assert all(
+        one["is_fine"] for one in json.loads((tmp_path / "found.json").read_text())["findings"]
+    )
+    write_rig(path, replace(RIG, eyes={"left": RIG.eyes["right"], "right": RIG.eyes["left"]}))
+    with pytest.raises(HandcalError, match="1 of 14 findings"):
+        run("check", path)
+    assert "left and right are exchanged" in capsys.readouterr().out
+
+
+def test_an_old_rig_file_is_migrated(tmp_path: Path) -> None:
+    old = Path(__file__).parent / "data" / "session-v1" / "rig.yaml"
+    assert "handcal_rig: 1\n" in old.read_text()
+    run("migrate", old, "--output", tmp_path / "new.yaml")
+    assert "handcal_rig: 2\n" in (tmp_path / "new.yaml").read_text()
+    assert read_rig(tmp_path / "new.yaml").name == read_rig(old).name
+
+
+def test_a_display_too_small_for_the_squares_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(HandcalError, match="no room"):
+        run("grid", "--display", 200, 200, "--png", tmp_path / "grid.png")
