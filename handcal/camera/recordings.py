@@ -7,7 +7,8 @@ from pathlib import Path
 
 from handcal.camera.folder import FolderCamera, record_folder
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.camera.recording import RecordingCamera, record_db3
+from handcal.camera.recording import RecordingCamera
+from handcal.camera.sdk_recorder import record_db3
 from handcal.types import Frame
 
 

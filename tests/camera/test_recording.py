@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from handcal.camera.recording import RecordingCamera, record_db3
+from handcal.camera.recording import RecordingCamera
+from handcal.camera.sdk_recorder import record_db3
 from handcal.errors import CameraEndError, CameraError
 from handcal.types import Frame, Intrinsics
 
@@ -70,20 +70,6 @@ def test_missing_and_damaged_recordings_are_refused(tmp_path: Path) -> None:
     damaged.write_bytes(b"not a data base" * 100)
     with pytest.raises(CameraError, match="cannot be played"):
         RecordingCamera(damaged)
-
-
-def test_what_cannot_be_recorded_leaves_nothing_behind(
-    tmp_path: Path, make_frames: MakeFrames
-) -> None:
-    with pytest.raises(ValueError, match=r"only \.db3"):
-        record_db3(tmp_path / "hand.bag", make_frames(1))
-    (frame,) = make_frames(1, with_color=False)
-    rational = replace(frame.depth_intrinsics, distortion=(0.1,) * 8)
-    with pytest.raises(ValueError, match="5 distortion coefficients, not 8; record into a folder"):
-        record_db3(tmp_path / "hand.db3", [replace(frame, depth_intrinsics=rational)])
-    with pytest.raises(ValueError, match="not from the camera"):
-        record_db3(tmp_path / "hand.db3", [frame, *make_frames(1)])
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_missing_librealsense_says_what_to_install(
