@@ -145,6 +145,13 @@ def _parse_line(number: int, line: bytes) -> Event:
     if version not in (1, JOURNAL_VERSION):
         raise ValueError(f"session version {version} is not {JOURNAL_VERSION} or 1, those known")
     kinds = isinstance(event, str), isinstance(time, str), isinstance(data, dict)
-    if found != number or not all(kinds):
+    if found != number or not all(kinds) or not _is_time(time):
         raise ValueError(f"line {number} is not the event expected there")
     return Event(number, time, event, data)
+
+
+def _is_time(text: str) -> bool:
+    try:
+        return datetime.fromisoformat(text).tzinfo is not None
+    except ValueError:
+        return False

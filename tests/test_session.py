@@ -580,7 +580,8 @@ def test_a_strange_event_is_refused_or_harmless(
 ) -> None:
     path = tmp_path_factory.mktemp("copy") / "session"
     shutil.copytree(finished.path, path)
-    line = {"version": 2, "number": 13, "time": "", "event": event, "data": data}
+    line = {"version": 2, "number": 13, "event": event, "data": data}
+    line["time"] = "2026-11-21T12:00:00+00:00"
     with (path / "journal.jsonl").open("a") as journal:
         journal.write(json.dumps(line) + "\n")
     try:

@@ -64,8 +64,9 @@ class Review(QObject):
 
         def work(report: Report, is_cancelled: IsCancelled) -> _Stored:
             record = Session.open(path)
-            calibration = read_settings(CalibrationSettings, record.settings.get("calibration", {}))
-            settings = calibration.solve
+            stored = record.settings.get("calibration", {})
+            where = f"{path / 'settings.json'}: calibration"
+            settings = read_settings(CalibrationSettings, stored, where).solve
             if not record.alignments:
                 return _Stored(record, settings, None)
             try:

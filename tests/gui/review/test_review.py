@@ -1,0 +1,200 @@
+"""Stored sessions: opened, compared, given up, and refused where they are damaged."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QLabel, QProgressDialog, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.errors import CancelledError
+from handcal.results import Results
+from handcal.session import SessionRecord
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+
+PATIENCE_MS = 20_000
+
+
+@pytest.fixture
+def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
+    program = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(program.window)
+    program.window.show()
+    yield program
+    program.window.close()
+    assert [t.name for t in threading.enumerate() if t.name.startswith("handcal")] == []
+
+
+class Solver:
+    """Stands in for what solves a session: goes on until it is cancelled."""
+
+    def __init__(self) -> None:
+        self.began = threading.Event()
+        self.was_cancelled = threading.Event()
+
+    def __call__(
+        self, _alignments: Any, _rig: Any, _settings: Any, report: Any, is_cancelled: Any
+    ) -> Results:
+        report("Solving alignment 1 of 2", 0.0)
+        self.began.set()
+        while not is_cancelled():
+            threading.Event().wait(0.01)
+        self.was_cancelled.set()
+        raise CancelledError("solving was cancelled")
+
+
+def child(program: Program, kind: type[Any], name: str) -> Any:
+    found = program.window.findChild(kind, name)
+    assert isinstance(found, QWidget), name
+    return found
+
+
+def is_open(program: Program) -> bool:
+    return program.window.page == "review"
+
+
+def test_a_session_is_shown_and_closed_again(
+    program: Program, qtbot: QtBot, record: SessionRecord
+) -> None:
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    assert child(program, QLabel, "reviewHolds").text().startswith("2 alignments, 0 trials")
+    assert child(program, QLabel, "reviewLefteye").text()
+    assert program.preferences.sessions == (str(record.path),)
+    child(program, QPushButton, "reviewClose").click()
+    assert program.window.page == "start"
+    assert program.review.record is None
+
+
+def tear(path: Path) -> None:
+    journal = path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes()[:-20])
+
+
+def overwrite(name: str, content: bytes) -> Callable[[Path], object]:
+    return lambda path: (path / name).write_bytes(content)
+
+
+def remove(name: str) -> Callable[[Path], object]:
+    return lambda path: (path / name).unlink()
+
+
+def spoil_time(path: Path) -> None:
+    journal = path / "journal.jsonl"
+    first, rest = journal.read_text().split("\n", 1)
+    journal.write_text(first.replace('"time": "20', '"time": "yesterday 20') + "\n" + rest)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        remove("journal.jsonl"),
+        overwrite("journal.jsonl", b""),
+        overwrite("journal.jsonl", b"\xff\xfe garbage\n"),
+        overwrite("journal.jsonl", b"[1]\n"),
+        remove("alignments/1.npz"),
+        overwrite("alignments/1.npz", b"PK\x03\x04 garbage"),
+        remove("rig.yaml"),
+        overwrite("rig.yaml", b"%YAML:1.0\n"),
+        overwrite("settings.json", b"{"),
+        overwrite("settings.json", b'{"calibration": {"solve": {"method": "magic"}}}'),
+        overwrite("settings.json", b'{"calibration": 7}'),
+        overwrite("results.json", b"\x00"),
+        spoil_time,
+    ],
+)
+def test_a_damaged_session_is_refused_in_words_and_the_program_goes_on(
+    program: Program,
+    qtbot: QtBot,
+    record: SessionRecord,
+    tmp_path: Path,
+    damage: Callable[[Path], object],
+) -> None:
+    damage(record.path)
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: program.window.banner.text != "", timeout=PATIENCE_MS)
+    assert str(record.path) in program.window.banner.text
+    assert "broke down" not in program.window.banner.text
+    assert program.window.page == "start"
+    program.open_session(tmp_path / "nowhere")
+    qtbot.waitUntil(lambda: "nowhere" in program.window.banner.text, timeout=PATIENCE_MS)
+
+
+def test_a_session_whose_last_line_was_cut_off_is_opened_without_it(
+    program: Program, qtbot: QtBot, record: SessionRecord
+) -> None:
+    tear(record.path)
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    assert "unfinished, as after a crash" in child(program, QLabel, "reviewJournal").text()
+
+
+def test_opening_can_be_cancelled(
+    program: Program, qtbot: QtBot, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solver = Solver()
+    monkeypatch.setattr("handcal_gui.review.review.solve_session", solver)
+    program.open_session(record.path)
+    qtbot.waitUntil(
+        lambda: child(program, QProgressDialog, "opening").isVisible(), timeout=PATIENCE_MS
+    )
+    dialog = child(program, QProgressDialog, "opening")
+    qtbot.waitUntil(lambda: dialog.labelText() == "Solving alignment 1 of 2…", timeout=PATIENCE_MS)
+    dialog.findChild(QPushButton).click()
+    qtbot.waitUntil(lambda: "cancelled" in program.window.banner.text, timeout=PATIENCE_MS)
+    assert solver.was_cancelled.is_set()
+    assert program.window.page == "start"
+    monkeypatch.undo()
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    assert program.window.banner.text == ""
+
+
+def test_a_session_given_up_for_another_does_not_open_later(
+    program: Program, qtbot: QtBot, record: SessionRecord
+) -> None:
+    for _ in range(3):
+        program.open_session(record.path)
+    program.show_start()
+    qtbot.wait(200)
+    assert program.window.page == "start"
+    assert program.review.record is None
+
+
+def test_a_comparison_is_shown_or_cancelled(
+    program: Program, qtbot: QtBot, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    status = child(program, QLabel, "comparison-status")
+    start = child(program, QPushButton, "comparison-start")
+    cancel = child(program, QPushButton, "comparison-cancel")
+    program.window.panels.results.compare_requested.emit("linear")
+    qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
+
+    solver = Solver()
+    monkeypatch.setattr("handcal_gui.review.compare.solve_session", solver)
+    start.click()
+    assert solver.began.wait(PATIENCE_MS / 1000)
+    cancel.click()
+    assert solver.was_cancelled.wait(PATIENCE_MS / 1000)
+    qtbot.wait(100)
+    assert status.text() == "Cancelled."
+    assert start.isEnabled()
+
+
+def test_it_can_be_compared_and_closed_at_once(
+    program: Program, qtbot: QtBot, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    solver = Solver()
+    monkeypatch.setattr("handcal_gui.review.compare.solve_session", solver)
+    program.window.panels.results.compare_requested.emit("paper")
+    program.window.close()
+    assert solver.was_cancelled.is_set()
