@@ -1,0 +1,192 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.errors import FileError
+from handcal.geometry import rigid
+from handcal.rig.board import Board
+from handcal.rig.camera import calibrate_camera
+from handcal.rig.formats import (
+    FORMATS,
+    Format,
+    camera_json,
+    read_intrinsics,
+    read_pose,
+    read_stereo,
+    stereo_json,
+    write_intrinsics,
+    write_pose,
+)
+from handcal.rig.stereo import calibrate_stereo
+from handcal.rig.storage import MAX_STORAGE_BYTES
+from handcal.rig.views import View
+from handcal.sim.boards import board_poses, board_view
+from handcal.types import Intrinsics
+
+FIVE = (0.1, -0.2, 1 / 3 * 1e-3, 0.002, 0.03)
+CAMERA = Intrinsics(640, 480, 500.1, 501 / 3, 320.5, 239.5, FIVE)
+T_H_D = rigid([0.1, -0.2, 0.3], [0.01, -0.02, 0.03])
+ROS = """image_width: 640   # as written by others
+image_height: 480
+camera_name: head/rgb
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [500, 0, 320,
+         0, 501, 240, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data:
+  - 0.1
+  - -2.0e-01
+  - 0
+  - 0.0
+  - 0.5
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [1., 0., 0., 0., 1., 0., 0., 0., 1.]
+"""
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("more", [(), (0.4, 0.5, 0.6)])
+def test_intrinsics_survive_exactly(tmp_path: Path, kind: Format, more: tuple[float, ...]) -> None:
+    camera = Intrinsics(640, 480, 500.1, 501 / 3, 320.5, 239.5, FIVE + more)
+    write_intrinsics(tmp_path / "camera", camera, kind)
+    assert read_intrinsics(tmp_path / "camera") == camera
+
+
+@pytest.mark.parametrize("kind", ["opencv", "json"])
+def test_the_pose_survives_exactly(tmp_path: Path, kind: Format) -> None:
+    write_pose(tmp_path / "pose", T_H_D, kind)
+    np.testing.assert_array_equal(read_pose(tmp_path / "pose"), T_H_D)
+
+
+def test_opencv_reads_what_is_written_for_it(tmp_path: Path) -> None:
+    write_intrinsics(tmp_path / "camera.yaml", CAMERA, "opencv")
+    storage = cv2.FileStorage(str(tmp_path / "camera.yaml"), cv2.FILE_STORAGE_READ)
+    np.testing.assert_array_equal(
+        storage.getNode("distortion_coefficients").mat().ravel(), CAMERA.distortion
+    )
+    assert storage.getNode("camera_matrix").mat()[0, 0] == CAMERA.fx
+
+
+def test_ros_files_by_others_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "camera.yaml"
+    path.write_text(ROS)
+    expected = Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, -0.2, 0.0, 0.0, 0.5))
+    assert read_intrinsics(path) == expected
+
+
+def test_opencv_own_sample_is_read(shared_data: Path) -> None:
+    camera = read_intrinsics(shared_data / "boards" / "opencv_stereo" / "left_intrinsics.yml")
+    assert (camera.width, camera.height) == (640, 480)
+    assert camera.fx == pytest.approx(535.91573396)
+    assert len(camera.distortion) == 5
+
+
+def test_a_whole_calibration_survives(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    board = Board()
+    plain = Intrinsics(640, 480, 500.0, 500.0, 319.5, 239.5)
+    pairs = [
+        (
+            View(f"d{number}", board_view(board, T, plain, rng, 0.1), dropped=number == 2),
+            View(f"h{number}", board_view(board, T_H_D @ T, plain, rng, 0.1)),
+        )
+        for number, T in enumerate(board_poses(board, plain, 8, rng))
+    ]
+    stereo = calibrate_stereo(pairs, plain, plain)
+    (tmp_path / "stereo.json").write_text(json.dumps(stereo_json(stereo)))
+    again = read_stereo(tmp_path / "stereo.json")
+    assert json.dumps(stereo_json(again)) == json.dumps(stereo_json(stereo))
+    assert again.dropped == ("d2",)
+    np.testing.assert_array_equal(read_pose(tmp_path / "stereo.json"), stereo.T_H_D)
+    camera = calibrate_camera([first for first, _ in pairs])
+    (tmp_path / "camera.json").write_text(json.dumps(camera_json(camera)))
+    assert read_intrinsics(tmp_path / "camera.json") == camera.intrinsics
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "must be a map"),
+        ("{", "not valid JSON"),
+        ("{}", "handcal_camera must be 1"),
+        ("%YAML 1.2\n---\n" + "[" * 4000, "not valid FileStorage"),
+        ("#" * (MAX_STORAGE_BYTES + 1), "may hold 16,384 bytes"),
+        ("\x00", "map|FileStorage"),
+        (ROS.replace("plumb_bob", "equidistant"), "lens model equidistant is not known"),
+        (ROS.replace("rows: 3", "rows: 1000000000"), "camera_matrix must be a matrix of 3×3"),
+        (ROS.replace("cols: 5", "cols: 4"), "distortion_coefficients must be a matrix"),
+        (ROS.replace("[500, 0,", "[500, 1,"), "no skew"),
+        (ROS.replace("[500, 0,", "[-5, 0,"), "positive focal lengths"),
+        (ROS.replace("[500, 0,", "[.nan, 0,"), "camera must be finite"),
+        (ROS.replace("image_width: 640", "image_width: 99999"), "between 1 and 16384"),
+        (ROS.replace("image_height: 480", "image_height: a"), "image_height must be a whole"),
+        ('{"handcal_camera": 1, "width": 1e400}', "width must be a finite number"),
+        ('{"handcal_camera": 1, "width": [[1], [1, 2]]}', "width must be a finite number"),
+        ('{"handcal_camera": 2}', "the version known"),
+    ],
+)
+def test_what_is_wrong_with_intrinsics_is_named(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "camera"
+    path.write_text(text)
+    with pytest.raises(FileError, match=said):
+        read_intrinsics(path)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("T_H_D", [[1.0]], "pose must be rigid"),
+        ("T_H_D", (2 * np.eye(4)).tolist(), "pose must be rigid"),
+        ("covariance", [[1.0]], "covariance"),
+        ("covariance", "none", "covariance must hold finite numbers"),
+        ("depth", [], "depth must be an object"),
+        ("residuals_px", {"a": None}, "a must be a finite number"),
+        ("verdict", {"name": "perfect"}, "verdict.name"),
+        ("dropped", None, "dropped must be a list"),
+    ],
+)
+def test_what_is_wrong_with_a_stereo_calibration_is_named(
+    tmp_path: Path, field: str, value: object, said: str
+) -> None:
+    camera = {"width": 640, "height": 480, "fx": 500, "fy": 500, "cx": 320, "cy": 240}
+    values = {
+        "handcal_stereo": 1,
+        "T_H_D": T_H_D.tolist(),
+        "covariance": np.eye(6).tolist(),
+        "depth": camera,
+        "headset": camera,
+        "rms_px": 0.2,
+        "residuals_px": {"a": 0.2},
+        "spread_rad": 0.1,
+        "spread_m": 0.1,
+        "dropped": [],
+        "worst": {"name": "a", "rms_px": 0.2, "why": ""},
+        "verdict": {"name": "good", "reason": ""},
+    }
+    path = tmp_path / "stereo.json"
+    path.write_text(json.dumps(values))
+    assert read_stereo(path).rms_px == 0.2
+    path.write_text(json.dumps({**values, field: value}))
+    with pytest.raises(FileError, match=said):
+        read_stereo(path)
+
+
+def test_what_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="holds no pose"):
+        write_pose(tmp_path / "pose", T_H_D, "ros")
+    with pytest.raises(ValueError, match="rigid"):
+        write_pose(tmp_path / "pose", np.diag([1.0, 1.0, -1.0, 1.0]), "json")
+    fourteen = Intrinsics(640, 480, 500.0, 500.0, 320.0, 240.0, (0.1,) * 14)
+    with pytest.raises(ValueError, match="5 or 8"):
+        write_intrinsics(tmp_path / "camera", fourteen, "ros")
+    assert not list(tmp_path.iterdir())

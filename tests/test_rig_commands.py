@@ -1,0 +1,134 @@
+"""``handcal rig board``, ``camera``, ``stereo`` and ``convert`` as their user meets them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.__main__ import main
+from handcal.geometry import rigid
+from handcal.rig.board import Board, find_board
+from handcal.rig.formats import read_intrinsics, read_pose, write_pose
+from handcal.sim.boards import BoardPainter, board_poses
+from handcal.types import Float64, Intrinsics
+
+BOARD = Board(kind="checkerboard")
+CAMERA = Intrinsics(480, 360, 400.0, 401.0, 238.0, 181.0, (-0.1, 0.05, 0.0, 0.0, 0.0))
+T_H_D = rigid([-0.1, 0.0, 0.0], [-0.02, -0.03, 0.01])
+CHECKERBOARD = ("--kind", "checkerboard")
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Run ``handcal rig`` in this process."""
+
+    def run(*arguments: object) -> None:
+        monkeypatch.setattr(sys, "argv", ["handcal", "rig", *map(str, arguments)])
+        main()
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return folders of images of one board by the depth and the headset's camera."""
+    rng = np.random.default_rng(1)
+    painter = BoardPainter(BOARD, CAMERA)
+    poses = board_poses(BOARD, CAMERA, 5, rng, others=((T_H_D, CAMERA),))
+    made = []
+    for name, T_C_D in (("depth", np.eye(4)), ("headset", T_H_D)):
+        folder = tmp_path_factory.mktemp(name)
+        for number, T_D_B in enumerate(poses):
+            image = painter.paint(T_C_D @ T_D_B, rng)
+            cv2.imwrite(str(folder / f"{name}{number}.png"), image)
+        made.append(folder)
+    return made[0], made[1]
+
+
+def _angle_deg(T: Float64) -> float:
+    R = T[:3, :3] @ T_H_D[:3, :3].T
+    return float(np.degrees(np.arccos(min((np.trace(R) - 1) / 2, 1.0))))
+
+
+def test_a_board_to_put_up(
+    rig: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig("board", "--pdf", tmp_path / "new" / "b.pdf", "--png", tmp_path / "b.png")
+    assert (tmp_path / "new" / "b.pdf").read_bytes().startswith(b"%PDF-")
+    image = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_GRAYSCALE)
+    assert image is not None
+    assert len(find_board(image, Board()).ids) == 54
+    assert "print at 100 %" in capsys.readouterr().out
+
+
+def test_camera_then_stereo_then_conversion(
+    rig: Callable[..., None],
+    folders: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    depth, headset = folders
+    camera, stereo = tmp_path / "camera.yaml", tmp_path / "stereo.json"
+    dropped = "depth2.png"
+    rig(
+        *("camera", depth, *CHECKERBOARD, "--lens", "radial"),
+        *("--drop", dropped, "--output", camera, "--format", "ros"),
+    )
+    said = capsys.readouterr().out
+    assert f"{dropped} (left out)" in said
+    assert "needs more views: 4 views, 10 are better" in said
+    assert read_intrinsics(camera).fx == pytest.approx(CAMERA.fx, rel=0.005)
+
+    rig(
+        *("stereo", "--depth", depth, "--headset", headset, *CHECKERBOARD),
+        *("--depth-intrinsics", camera, "--headset-intrinsics", camera, "--output", stereo),
+    )
+    assert "needs more views: 5 pairs" in capsys.readouterr().out
+    assert json.loads(stereo.read_text())["rms_px"] < 0.3
+    found = read_pose(stereo)
+    assert _angle_deg(found) < 0.2
+    np.testing.assert_allclose(found[:3, 3], T_H_D[:3, 3], atol=1e-3)
+
+    for source, kind in ((camera, "json"), (stereo, "opencv")):
+        rig("convert", source, tmp_path / "converted", "--format", kind)
+    np.testing.assert_allclose(read_pose(tmp_path / "converted"), found, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("board",), "say where the board goes"),
+        (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
+        (("camera", "nowhere"), "no PNG or JPEG images"),
+        (("camera", "{depth}", "--drop", "x.png"), "there is no image x.png to drop"),
+        (("camera", "{depth}"), "found in 0 of 5 images used, at least 3 are needed; mostly: a"),
+        (("stereo", "--depth", "{depth}", "--headset", "{depth}", "--format", "ros"), "no pose"),
+        (("convert", "{pose}", "out", "--format", "ros"), "no pose between cameras"),
+        (("convert", "{depth}/depth0.png", "out", "--format", "json"), "depth0.png"),
+    ],
+)
+def test_what_is_wrong_is_one_line(
+    rig: Callable[..., None],
+    folders: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_pose(tmp_path / "pose.json", T_H_D, "json")
+    filled = [one.format(depth=folders[0], pose=tmp_path / "pose.json") for one in arguments]
+    with pytest.raises(SystemExit) as ended:
+        rig(*filled)
+    assert ended.value.code == 1
+    line = capsys.readouterr().err
+    assert said in line
+    assert line.count("\n") == 1
+    assert not (tmp_path / "out").exists()
