@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMessageBox,
-    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -31,6 +30,7 @@ from handcal.types import Frame
 from handcal_gui.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
@@ -61,7 +61,7 @@ class CameraPanel(QWidget):
         self._caption = ""
         self._pictures = _Pictures()
         self._status = _Status()
-        self._freeze = QToolButton()
+        self._freeze = tool_button()
         self._freeze.setText("Freeze")
         self._freeze.setToolTip("Keep the present picture (F)")
         self._freeze.setShortcut("F")

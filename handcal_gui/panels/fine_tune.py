@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QScrollArea,
     QSizePolicy,
-    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -30,6 +29,7 @@ from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.tuning.eye_shift_editor import EyeShiftEditor
 from handcal_gui.tuning.shift_history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.tuning.shift_stream import Arrival, ShiftStream
+from handcal_gui.widgets.fields import tool_button
 
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 _STEPS_MM = (0.1, 0.5, 1.0)
@@ -355,7 +355,7 @@ def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
         if item is None:
             row.addStretch(1)
         elif isinstance(item, QAction):
-            button = QToolButton()
+            button = tool_button()
             button.setDefaultAction(item)
             if not item.icon().isNull():
                 button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)

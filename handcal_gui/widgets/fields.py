@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QPushButton,
     QSizePolicy,
     QSpinBox,
+    QToolButton,
     QWidget,
 )
 
@@ -80,6 +81,16 @@ def main_button(name: str, text: str = "") -> MainButton:
     made.setFont(font)
     made.setMinimumHeight(5 * SPACING_PX)
     made.setDefault(True)
+    return made
+
+
+def tool_button() -> QToolButton:
+    """Return a tool button that stands out while it is checked, in the dark, too."""
+    made = QToolButton()
+    made.setStyleSheet(
+        "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text);"
+        " border: 1px solid palette(text); border-radius: 2px; }"
+    )
     return made
 
 
