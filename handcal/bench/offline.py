@@ -8,6 +8,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from handcal.bench.figure import Figure
+from handcal.bench.settings import BenchSettings
+from handcal.bench.trials import Measured, Progress
 from handcal.display import view_of_eye
 from handcal.geometry import image_points, invert, rigid
 from handcal.rig.assemble import screen_of, with_display, with_stereo
@@ -21,7 +24,7 @@ from handcal.rig.display import (
     pixel_size_m,
     undistort,
 )
-from handcal.rig.example import FOCAL_PX, Z_E_S_M
+from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
 from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.viewpoint import viewpoint_from_stereo
@@ -37,6 +40,14 @@ _MADE = "simulated"
 _CAMERA_TURN_RAD = 0.04
 # The manufacturer's figures of the example's displays: 2,456 px of focal length at 2 m.
 _KNOWN_PIXELS = DisplaySettings(pixel_m=pixel_size_m(2.0 * np.arctan(0.5 / FOCAL_PX), 1.0, Z_E_S_M))
+_FIGURES = (
+    ("offline: rotation of T_H_D", "rotation_deg", 1.0, "°", 0.05),
+    ("offline: translation of T_H_D", "translation_mm", 1.0, "mm", 0.3),
+    ("offline: focal lengths", "focal_share", 100.0, "%", 0.3),
+    ("offline: display homography", "homography_px", 1.0, "px", 0.3),
+    ("offline: z(C0→S)", "distance_share", 100.0, "%", 2.0),
+    ("offline: t(C0→V)", "viewpoint_mm", 1.0, "mm", None),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +99,22 @@ class OfflineRun:
     homography_px: float
     distance_share: float
     viewpoint_mm: float
+
+
+def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure what the calibration of some rigs from photographs is worth; the worst counts."""
+    runs = []
+    for seed in range(settings.offline_rigs):
+        runs.append(calibrate_from_photographs(example_rig(), seed))
+        progress((seed + 1) / settings.offline_rigs)
+    progress(1.0)
+    figures = [
+        Figure(what, max(scale * getattr(run, name) for run in runs), unit, at_most=target)
+        for what, name, scale, unit, target in _FIGURES
+        if runs
+    ]
+    rows = [{name: getattr(run, name) for _, name, *_ in _FIGURES} for run in runs]
+    return Measured(figures, rows)
 
 
 def calibrate_from_photographs(

@@ -11,6 +11,7 @@ from typing import Any
 
 from handcal.bench.delivery import measure_delivery
 from handcal.bench.measured_clouds import measure_covariance, measure_cuts
+from handcal.bench.offline import measure_offline
 from handcal.bench.paper_simulation import measure_paper_simulation
 from handcal.bench.settings import BenchSettings
 from handcal.bench.speed import measure_speed
@@ -23,6 +24,7 @@ _PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "wearer": measure_wearer,
     "cuts": measure_cuts,
     "covariance": measure_covariance,
+    "offline": measure_offline,
     "paper_simulation": measure_paper_simulation,
 }
 _LIBRARIES = ("handcal", "numpy", "scipy", "opencv-python-headless", "open3d-cpu", "open3d")

@@ -27,6 +27,8 @@ class BenchSettings:
         How often a duration is measured.
     paper_repeats : int
         The same for ``paper``.
+    offline_rigs : int
+        Rigs calibrated from rendered photographs, at some minutes each.
     """
 
     points: int = 5000
@@ -37,6 +39,7 @@ class BenchSettings:
     covariance_trials: int = 200
     repeats: int = 25
     paper_repeats: int = 3
+    offline_rigs: int = 1
 
 
 QUICK = BenchSettings(
@@ -48,5 +51,6 @@ QUICK = BenchSettings(
     covariance_trials=10,
     repeats=3,
     paper_repeats=1,
+    offline_rigs=0,
 )
 """A look whether everything runs, in some seconds; its figures say little."""
