@@ -13,6 +13,7 @@ import pytest
 
 from handcal.__main__ import main
 from handcal.geometry import rigid
+from handcal.image_file import read_image
 from handcal.rig.board import Board, find_board
 from handcal.rig.formats import read_intrinsics, read_pose, write_pose
 from handcal.sim.boards import BoardPainter, board_poses
@@ -61,8 +62,7 @@ def test_a_board_to_put_up(
 ) -> None:
     rig("board", "--pdf", tmp_path / "new" / "b.pdf", "--png", tmp_path / "b.png")
     assert (tmp_path / "new" / "b.pdf").read_bytes().startswith(b"%PDF-")
-    image = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_GRAYSCALE)
-    assert image is not None
+    image = read_image(tmp_path / "b.png", cv2.IMREAD_GRAYSCALE)
     assert len(find_board(image, Board()).ids) == 54
     assert "print at 100 %" in capsys.readouterr().out
 

@@ -1,11 +1,14 @@
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from handcal.geometry import image_points, rigid, transform
+from handcal.image_file import read_image
 from handcal.rig.board import Board, BoardError, corners_m, find_board
 from handcal.rig.board_print import draw_board
 from handcal.sim.boards import BoardPainter
@@ -39,7 +42,7 @@ def test_corners_of_a_tilted_board_are_found_to_a_tenth_of_a_pixel(board: Board)
 
 def test_a_blurred_image_is_told_by_its_edges() -> None:
     sharp = draw_board(CHECKERBOARD, SQUARE_PX)
-    blurred = cv2.GaussianBlur(sharp, (0, 0), 2.0)
+    blurred = np.asarray(cv2.GaussianBlur(sharp, (0, 0), 2.0), np.uint8)
     assert find_board(blurred, CHECKERBOARD).blur_px > 3 * find_board(sharp, CHECKERBOARD).blur_px
 
 
@@ -131,14 +134,14 @@ def test_an_impossible_board_is_refused(fields: dict[str, object], said: str) ->
 
 
 def test_only_images_are_looked_at() -> None:
-    for image in (np.zeros((480, 640)), np.zeros((10, 640), np.uint8)):
+    images: list[NDArray[Any]] = [np.zeros((480, 640)), np.zeros((10, 640), np.uint8)]
+    for image in images:
         with pytest.raises(ValueError, match="uint8 and at least 64"):
             find_board(image, CHARUCO)
 
 
 def test_a_photograph_of_a_charuco_board(shared_data: Path) -> None:
-    image = cv2.imread(str(shared_data / "boards" / "charuco_photo.jpg"), cv2.IMREAD_GRAYSCALE)
-    assert image is not None
+    image = read_image(shared_data / "boards" / "charuco_photo.jpg", cv2.IMREAD_GRAYSCALE)
     board = Board(squares=(5, 7), square_m=0.04, marker_m=0.02, dictionary="DICT_6X6_250")
     assert len(find_board(image, board).ids) == 24
     with pytest.raises(BoardError, match="DICT_6X6"):
@@ -147,7 +150,6 @@ def test_a_photograph_of_a_charuco_board(shared_data: Path) -> None:
 
 def test_part_of_a_larger_checkerboard_is_not_taken_for_the_board(shared_data: Path) -> None:
     file = shared_data / "boards" / "opencv_stereo" / "left01.jpg"
-    image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
-    assert image is not None
+    image = read_image(file, cv2.IMREAD_GRAYSCALE)
     with pytest.raises(BoardError, match="goes on: it has more squares than 8×7"):
         find_board(image, Board(kind="checkerboard", squares=(8, 7)))

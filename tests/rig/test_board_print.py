@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.image_file import read_image
 from handcal.rig.board import Board, charuco, find_board
 from handcal.rig.board_print import MAX_SIDE_PX, draw_board, write_board_pdf
 
@@ -42,8 +43,7 @@ def test_the_printed_board_has_its_true_size(tmp_path: Path, kind: str) -> None:
     dpi = 127  # five pixels a millimetre
     command = ["pdftoppm", "-r", str(dpi), "-gray", "-png", "-singlefile", "board.pdf", page.name]
     subprocess.run(command, cwd=tmp_path, check=True)
-    image = cv2.imread(str(page.with_suffix(".png")), cv2.IMREAD_GRAYSCALE)
-    assert image is not None
+    image = read_image(page.with_suffix(".png"), cv2.IMREAD_GRAYSCALE)
     assert image.shape == pytest.approx((0.210 / 0.0254 * dpi, 0.297 / 0.0254 * dpi), abs=1)
     found = find_board(image, board)
     across_m = np.ptp(found.points_m[:, :2], axis=0)
