@@ -13,7 +13,7 @@ from handcal_gui.wizard.steps import Action, View
 from handcal_gui.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7
-_PATIENCE_S = 60.0
+_PATIENCE_S = 120.0
 
 
 class Autopilot(QObject):
