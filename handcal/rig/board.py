@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from handcal.errors import HandcalError
-from handcal.rig.board_trouble import why_not_found
+from handcal.rig.board_trouble import MIN_CORNERS, why_not_found
 from handcal.types import Float64, UInt8, freeze
 
 BoardKind: TypeAlias = Literal["charuco", "checkerboard"]
 Int64: TypeAlias = NDArray[np.int64]
 
-MIN_CORNERS = 8
-_DICTIONARIES = {name: getattr(cv2.aruco, name) for name in dir(cv2.aruco) if name[:5] == "DICT_"}
+DICTIONARIES = {name: getattr(cv2.aruco, name) for name in dir(cv2.aruco) if name[:5] == "DICT_"}
 # Corners found further from where the others put them belong to something else, in squares.
 _STRAY_SQUARES = 0.5
 _MIN_SIDE_PX = 64
@@ -69,7 +68,7 @@ class Board:
             return
         if not 0.3 * self.square_m <= self.marker_m <= 0.95 * self.square_m:
             raise ValueError("the markers' side must be 0.3 to 0.95 of the squares' side")
-        if self.dictionary not in _DICTIONARIES:
+        if self.dictionary not in DICTIONARIES:
             raise ValueError(f"no dictionary {self.dictionary}; DICT_5X5_100 is one")
         markers = len(self.marker_dictionary.bytesList)
         if columns * rows // 2 > markers:
@@ -80,7 +79,7 @@ class Board:
     @property
     def marker_dictionary(self) -> cv2.aruco.Dictionary:
         """The markers that `dictionary` names."""
-        return cv2.aruco.getPredefinedDictionary(_DICTIONARIES[self.dictionary])
+        return cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary])
 
     @property
     def inner(self) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from handcal.types import Float64, UInt8
 if TYPE_CHECKING:
     from handcal.rig.board import Board
 
-_ENOUGH_CORNERS = 8
+MIN_CORNERS = 8
 # Fewer markers than these are also found in leaves and carpets.
 _ENOUGH_MARKERS = 4
 _FAMILIES = (
@@ -70,10 +70,10 @@ def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
 
 def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     mirrored = np.ascontiguousarray(gray[:, ::-1])
-    if len(find(mirrored, board)[0]) >= _ENOUGH_CORNERS:
+    if len(find(mirrored, board)[0]) >= MIN_CORNERS:
         return "the image is mirrored: switch that off in the camera"
     other_print = replace(board, legacy=not board.legacy)
-    if len(find(gray, other_print)[0]) >= _ENOUGH_CORNERS:
+    if len(find(gray, other_print)[0]) >= MIN_CORNERS:
         kind = "an older" if other_print.legacy else "a newer"
         return f"the board was printed by {kind} OpenCV: set `legacy` to {other_print.legacy}"
     ids = _markers(gray, board.marker_dictionary)
