@@ -48,7 +48,8 @@ def main() -> NoReturn:
         _fail(str(error), 1)
     sys.excepthook = lambda *error: _tell(program, *error)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: program.window.close())
+        # By the event loop, which may have yet to begin.
+        signal.signal(number, lambda *_: QTimer.singleShot(0, program.window.close))
     awake = QTimer()  # lets Python see the signal
     awake.start(200)
     if arguments.size:
