@@ -93,7 +93,7 @@ class CalibrationSettings:
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     camera_latency_s: float = 0.03
-    match_tolerance_s: float = 0.1
+    match_tolerance_s: float = 0.15
     steady_s: float = 0.4
     steady_m: float = 0.005
     apply_timeout_s: float = 5.0

@@ -215,8 +215,10 @@ class Endpoint(Closable):
                 self._handle(envelope)
 
     def _work(self, now_s: float) -> None:
+        # Before anybody has come it is no news: whoever comes is sent the newest of each slot.
+        level = logging.INFO if self._channel is None else logging.WARNING
         for message in self._outbox.expire(now_s):
-            _LOG.warning("gave up sending the %s", message.slot.name.lower())
+            _LOG.log(level, "gave up sending the %s", message.slot.name.lower())
         if self._channel is not None:
             receipts = self._channel.inbox.take_receipts()
             if receipts:
