@@ -231,10 +231,8 @@ def calibrate_display(
         ]
     )
     off_axis = np.linalg.solve(homography.H_C_S, camera_matrix(camera)) @ invert(T_V_C)[:3, :3]
-    z_C0_S_m = settings.distance_m
-    if settings.pixel_m is not None:
-        z_C0_S_m = focal_px * settings.pixel_m
-    assert z_C0_S_m is not None
+    z_C0_S_m = focal_px * settings.pixel_m if settings.pixel_m else settings.distance_m
+    assert z_C0_S_m is not None, "DisplaySettings sees to it"
     display = EyeDisplay(
         K=K,
         H0=np.linalg.solve(K, off_axis / off_axis[2, 2]),
