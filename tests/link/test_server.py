@@ -196,7 +196,8 @@ def test_poses_are_told_at_the_hosts_time(
     assert server.statistics().lost_inbound == 11
 
 
-def test_giving_up_is_loud(pairing_key: bytes, caplog: pytest.LogCaptureFixture) -> None:
+def test_giving_up_is_told(pairing_key: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
     with HeadsetServer(pairing_key, settings=LinkSettings(give_up_s=0.1)) as server:
         message = server.send_prompt("Raise your hand")
         assert server.statistics().unacked == 1
