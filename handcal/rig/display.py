@@ -88,6 +88,8 @@ class DisplaySettings:
             raise ValueError(
                 "tell either the measured distance of the display or the size of its pixels"
             )
+        if not (self.distance_m or self.pixel_m or 0.0) > 0.0:
+            raise ValueError("the display's distance, or the size of its pixels, must be positive")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -129,6 +129,12 @@ def test_the_distance_must_come_from_one_source(settings: dict[str, float]) -> N
         DisplaySettings(**settings)
 
 
+@pytest.mark.parametrize("settings", [{"distance_m": -2.0}, {"pixel_m": 0.0}])
+def test_the_distance_must_be_positive(settings: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="must be positive"):
+        DisplaySettings(**settings)
+
+
 def test_few_and_noisy_corners_ask_for_more() -> None:
     found = calibrate(DISPLAY, R_E_C, DisplaySettings(distance_m=2.0), noise_px=0.8)
     assert found.verdict.name == "needs more views"
