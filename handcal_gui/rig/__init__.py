@@ -1,0 +1,1 @@
+"""The rig wizard: the offline calibration in the window, on the functions of `handcal.rig`."""

@@ -1,0 +1,79 @@
+"""Where in the image the board was seen, and how often."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from handcal.rig.views import Coverage
+from handcal_gui.theme import SPACING_PX, colors
+
+_PLENTY = 6
+"""Views in a cell from which on it is as full as it gets."""
+_SIDE_PX = 20
+
+
+class CoverageMap(QWidget):
+    """Shows the image's cells: the fuller, the more views have a corner there; the number, too.
+
+    Parameters
+    ----------
+    title : str
+        Whose image it is.
+    """
+
+    def __init__(self, title: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("coverage")
+        self.setAccessibleName(f"Coverage, {title.lower()}")
+        self.setToolTip(
+            "In how many images the board has a corner in each part of the view. Empty parts tell "
+            "nothing of the lens there."
+        )
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self._title = title
+        self._coverage: Coverage | None = None
+        self.setFixedSize(8 * _SIDE_PX + 1, 6 * _SIDE_PX + 3 * SPACING_PX)
+
+    def show_coverage(self, coverage: Coverage | None) -> None:
+        """Show how the corners lie; None before there are any."""
+        self._coverage = coverage
+        self.setAccessibleDescription(self.caption)
+        self.update()
+
+    @property
+    def caption(self) -> str:
+        """What is said above the cells."""
+        share = "–" if self._coverage is None else f"{100 * self._coverage.share:.0f} %"
+        return f"{self._title}: {share}"
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw the cells below the caption."""
+        painter = QPainter(self)
+        painter.setPen(self.palette().windowText().color())
+        head = QRectF(0, 0, self.width(), 3 * SPACING_PX)
+        painter.drawText(head, Qt.AlignmentFlag.AlignVCenter, self.caption)
+        font = painter.font()
+        font.setPointSizeF(0.8 * font.pointSizeF())
+        painter.setFont(font)
+        for row in range(6):
+            for column in range(8):
+                corner = QPointF(column * _SIDE_PX, row * _SIDE_PX + 3 * SPACING_PX)
+                cell = QRectF(corner.x(), corner.y(), _SIDE_PX, _SIDE_PX)
+                self._paint_cell(painter, cell, self._hits(row, column))
+        painter.end()
+
+    def _hits(self, row: int, column: int) -> int:
+        return 0 if self._coverage is None else int(self._coverage.hits[row, column])
+
+    def _paint_cell(self, painter: QPainter, cell: QRectF, hits: int) -> None:
+        fill = QColor(colors().live)
+        fill.setAlphaF(0.7 * min(1.0, hits / _PLENTY))
+        painter.fillRect(cell, self.palette().base())
+        painter.fillRect(cell, fill)
+        painter.setPen(QColor(colors().muted))
+        painter.drawRect(cell.adjusted(0, 0, 0, -1))
+        if hits:
+            painter.setPen(self.palette().windowText().color())
+            painter.drawText(cell, Qt.AlignmentFlag.AlignCenter, str(hits))

@@ -1,0 +1,54 @@
+"""What there is to say about a rig, line by line, doubtful things marked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
+
+from handcal.rig.report import RigFinding
+from handcal_gui.theme import colors, icon, quiet
+
+
+class FindingList(QTreeWidget):
+    """Lists what was found, and what is expected where it is doubtful.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers.
+    """
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("rigFindings")
+        self.setAccessibleName(name)
+        self.setRootIsDecorated(False)
+        self.setAlternatingRowColors(True)
+        self.setHeaderLabels(["What", "Found", "Expected"])
+        quiet(self.header())
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self._findings: tuple[RigFinding, ...] = ()
+
+    def show_findings(self, findings: Sequence[RigFinding]) -> None:
+        """Replace what is listed, doubtful things first."""
+        self._findings = tuple(sorted(findings, key=lambda one: one.is_fine))
+        self._refresh()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw icons when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._refresh()
+
+    def _refresh(self) -> None:
+        self.clear()
+        good, doubtful = icon("check", colors().good), icon("warning", colors().warning)
+        for one in self._findings:
+            expected = "" if one.is_fine else one.expected
+            item = QTreeWidgetItem([one.what, one.found, expected])
+            item.setIcon(0, good if one.is_fine else doubtful)
+            for column in range(3):
+                item.setToolTip(column, item.text(column))
+            self.addTopLevelItem(item)

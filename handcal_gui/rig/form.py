@@ -1,0 +1,114 @@
+"""The entries of a step as fields in two columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeVar, cast
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QSpinBox, QWidget
+
+from handcal.rig.camera import LensModel
+from handcal_gui.rig.work import DisplayEntries, StereoEntries, ViewpointEntries
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import choice
+from handcal_gui.widgets.path_field import PathField
+
+Entries = TypeVar("Entries", StereoEntries, ViewpointEntries, DisplayEntries)
+
+INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
+_LENSES: dict[LensModel, str] = {
+    "none": "No distortion",
+    "radial": "k1, k2",
+    "full": "k1, k2, p1, p2, k3",
+    "rational": "k1 to k6, p1, p2",
+}
+
+
+def intrinsics_field(name: str) -> PathField:
+    """Return a field for a file of intrinsics that are solved if there is none."""
+    field = PathField(name, "file", INTRINSICS_FILES, "Solved from the images")
+    field.setToolTip("OpenCV's FileStorage, ROS's camera_info or handcal's JSON.")
+    return field
+
+
+def lens_field() -> QComboBox:
+    """Return a choice of lens models."""
+    return choice("lens", "Lens", _LENSES, "Coefficients of distortion to solve for.")
+
+
+class EntriesForm(QWidget):
+    """Shows some fields of a dataclass of entries.
+
+    Parameters
+    ----------
+    fields : mapping of str to (str, QWidget)
+        By the dataclass's field: label and widget.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self, fields: Mapping[str, tuple[str, QWidget]], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._fields = {name: field for name, (_, field) in fields.items()}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(SPACING_PX)
+        grid.setVerticalSpacing(SPACING_PX // 2)
+        for column in (1, 4):
+            grid.setColumnStretch(column, 1)
+        grid.setColumnMinimumWidth(2, SPACING_PX)
+        half = (len(fields) + 1) // 2
+        for number, (text, field) in enumerate(fields.values()):
+            row, column = number % half, 3 * (number // half)
+            label = QLabel(text)
+            label.setBuddy(field)
+            grid.addWidget(label, row, column)
+            grid.addWidget(field, row, column + 1)
+            _change_of(field).connect(self.changed)
+
+    def show_entries(self, entries: object) -> None:
+        """Show the fields' values."""
+        for name, field in self._fields.items():
+            _show(field, getattr(entries, name))
+
+    def enter(self, **values: object) -> None:
+        """Show other values of some fields, as if they had been typed."""
+        for name, value in values.items():
+            _show(self._fields[name], value)
+
+    def take(self, entries: Entries) -> Entries:
+        """Return entries with what is shown."""
+        return replace(entries, **{name: _value(field) for name, field in self._fields.items()})
+
+
+def _change_of(field: QWidget) -> Any:
+    if isinstance(field, PathField):
+        return field.changed
+    if isinstance(field, QComboBox):
+        return field.currentIndexChanged
+    return cast(QSpinBox, field).valueChanged
+
+
+def _show(field: QWidget, value: Any) -> None:
+    if isinstance(field, PathField):
+        field.set_path(value)
+    elif isinstance(field, QComboBox):
+        field.setCurrentIndex(field.findData(value))
+    else:
+        cast(QSpinBox, field).setValue(value)
+
+
+def _value(field: QWidget) -> Any:
+    if isinstance(field, PathField):
+        return field.path
+    if isinstance(field, QComboBox):
+        return field.currentData()
+    return cast(QSpinBox, field).value()

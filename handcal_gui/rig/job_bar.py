@@ -1,0 +1,103 @@
+"""One job at a time, with a bar for how far it is and a button to give it up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QLabel, QProgressBar, QWidget
+
+from handcal_gui.running.jobs import Job, Work
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import beside, button, named
+
+_WHOLE = 1000
+
+
+class JobBar(QWidget):
+    """Runs jobs one at a time; keeps its place while there is none.
+
+    Attributes
+    ----------
+    failed : Signal(str)
+        Why a job came to nothing, for a person to read.
+    busy_changed : Signal(bool)
+    """
+
+    failed = Signal(str)
+    busy_changed = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._job: Job | None = None
+        self._then: Callable[[Any], object] = lambda _: None
+        self._doing: QLabel = named(ElidedLabel(), "doing")
+        self._bar = named(QProgressBar(), "progress", "Progress")
+        self._bar.setFixedWidth(20 * SPACING_PX)
+        self._cancel = button("cancel", "Cancel")
+        self._cancel.clicked.connect(self.cancel)
+        beside(self, self._bar, self._doing, self._cancel, grows=self._doing)
+        self._refresh()
+        self.setMinimumHeight(self._cancel.sizeHint().height())
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a job runs."""
+        return self._job is not None
+
+    def run(self, doing: str, work: Work, then: Callable[[Any], object]) -> None:
+        """Give up what runs, and do something else; `then` takes what it comes to."""
+        self.stop()
+        self._then = then
+        # Without a parent: should the bar be destroyed, the job's thread keeps the job alive.
+        self._job = Job(work)
+        self._job.progressed.connect(self._show_progress)
+        self._job.succeeded.connect(self._succeed)
+        self._job.failed.connect(self._fail)
+        self._job.cancelled.connect(self._end)
+        self._doing.setText(f"{doing}…")
+        self._bar.setRange(0, 0)  # moves, until a share is told
+        self._job.start()
+        self._refresh()
+
+    def cancel(self) -> None:
+        """Give up what runs, once it comes to where it can."""
+        if self._job is not None:
+            self._job.cancel()
+            self._doing.setText("Being cancelled…")
+            self._cancel.setEnabled(False)
+
+    def stop(self) -> None:
+        """Give up what runs, and wait for its end."""
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+            self._refresh()
+
+    def _show_progress(self, doing: str, share: float) -> None:
+        if self._cancel.isEnabled():
+            self._doing.setText(f"{doing}…")
+        self._bar.setRange(0, _WHOLE)
+        self._bar.setValue(round(_WHOLE * share))
+
+    def _succeed(self, done: object) -> None:
+        self._end()
+        self._then(done)
+
+    def _fail(self, why: str) -> None:
+        self._end()
+        self.failed.emit(why)
+
+    def _end(self) -> None:
+        assert self._job is not None
+        self._job.wait()
+        self._job = None
+        self._refresh()
+
+    def _refresh(self) -> None:
+        for widget in (self._bar, self._doing, self._cancel):
+            widget.setVisible(self.is_busy)
+        self._cancel.setEnabled(True)
+        self.busy_changed.emit(self.is_busy)

@@ -1,0 +1,134 @@
+"""The rig's numbers as rows of a table: in a person's units, with how well they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handcal.rig.assemble import STEREO_PARAMETERS
+from handcal.rig.camera import CameraCalibration
+from handcal.rig.compare import compare_rigs
+from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration
+from handcal.rig.stereo import StereoCalibration
+from handcal.types import EYES, Float64, Rig
+from handcal_gui.widgets.number_label import UNKNOWN
+from handcal_gui.widgets.number_table import Row
+
+COLUMNS = ("Value", "± σ")
+_LENSES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_TURN = "The depth camera's rotation vector in the headset's camera: axis times angle."
+_SHIFT = "Where the depth camera is in the headset's camera: x right, y down, z forward."
+_T_C0_V = "From the headset's rendering camera V to the offline viewpoint C0, V's axes."
+_Z_C0_S = "Distance of the virtual screen S from the offline viewpoint C0."
+
+
+def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
+    """Return a camera's intrinsics."""
+    solved = result.intrinsics
+    sigmas = [*result.sigma, *[np.inf] * len(solved.distortion)]
+    values = (solved.fx, solved.fy, solved.cx, solved.cy)
+    rows = [
+        _row(name, value, sigma, "px", 2, "Pixels; σ from the residuals.")
+        for name, value, sigma in zip(("fx", "fy", "cx", "cy"), values, sigmas, strict=False)
+    ]
+    rows += [
+        _row(name, value, sigma, "", 5, "Coefficient of the lens's distortion, OpenCV's model.")
+        for name, value, sigma in zip(_LENSES, solved.distortion, sigmas[4:], strict=False)
+    ]
+    rows.append(
+        Row("Pixel", (f"{result.arcmin_per_px:.2f}′", ""), "Angle of a pixel in the middle.")
+    )
+    return (_rms(result.rms_px), *rows)
+
+
+def stereo_rows(result: StereoCalibration) -> tuple[Row, ...]:
+    """Return the depth camera's place."""
+    spread = f"{np.degrees(result.spread_rad):.2f}°, {1e3 * result.spread_m:.1f} mm"
+    return (
+        _rms(result.rms_px),
+        *_place_rows(result.T_H_D, _sigmas(result.covariance, len(STEREO_PARAMETERS))),
+        Row("Each pair alone", (spread, ""), "RMS difference from what each pair alone gives."),
+    )
+
+
+def display_rows(result: DisplayCalibration) -> tuple[Row, ...]:
+    """Return one eye's display."""
+    display, sigmas = result.display, _sigmas(result.covariance, len(DISPLAY_PARAMETERS))
+    return (
+        _rms(result.homography.rms_px),
+        Row(
+            "Corners",
+            (f"{result.homography.sigma_px:.2f} px", ""),
+            "How well the least known corner of the display is known, σ, px of the display.",
+        ),
+        *_display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas),
+        Row("f", (f"{display.K[0, 0]:.1f} px", ""), "Focal length of K, on the display's axis."),
+        Row(
+            "Turned",
+            (f"{np.degrees(result.turn_rad):.2f}°", ""),
+            "Angle between the display's axes and the headset's V; H0 takes it up.",
+        ),
+    )
+
+
+def rig_rows(rig: Rig) -> tuple[Row, ...]:
+    """Return a whole rig's numbers; σ is known of what was calibrated with handcal."""
+    return tuple(_rig_rows(rig))
+
+
+def difference_rows(a: Rig, b: Rig) -> tuple[Row, ...]:
+    """Return by how much two rigs differ."""
+    return tuple(
+        Row(one.name, (f"{one.value:.3g} {one.unit}",), "Not negative; 0 if both agree.")
+        for one in compare_rigs(a, b)
+    )
+
+
+def _rig_rows(rig: Rig) -> Iterator[Row]:
+    for eye in EYES:
+        display, origin = rig.eyes[eye], rig.origins.get(eye)
+        sigmas = _sigmas(origin.covariance if origin else None, len(DISPLAY_PARAMETERS))
+        for row in _display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas):
+            yield Row(f"{eye.capitalize()}: {row.label}", row.cells, row.tooltip)
+        yield Row(
+            f"{eye.capitalize()}: f",
+            (f"{display.K[0, 0]:.1f} px", UNKNOWN),
+            "Focal length of K, on the display's axis.",
+        )
+    origin = rig.origins.get("T_H_D")
+    sigmas = _sigmas(origin.covariance if origin else None, len(STEREO_PARAMETERS))
+    yield from _place_rows(rig.T_H_D, sigmas)
+    camera = rig.depth_intrinsics
+    for name in ("fx", "fy", "cx", "cy"):
+        value = f"{getattr(camera, name):.2f} px"
+        yield Row(f"Depth camera: {name}", (value, UNKNOWN), "Of the depth camera's intrinsics.")
+
+
+def _display_rows(t_C0_V_m: Float64, z_C0_S_m: float, sigmas: Sequence[float]) -> Iterator[Row]:
+    for axis, value, sigma in zip("xyz", t_C0_V_m, sigmas, strict=False):
+        yield _row(f"t(C0→V) {axis}", 1e3 * value, 1e3 * sigma, "mm", 2, _T_C0_V)
+    yield _row("z(C0→S)", z_C0_S_m, sigmas[3], "m", 3, _Z_C0_S)
+
+
+def _place_rows(T_H_D: Float64, sigmas: Sequence[float]) -> Iterator[Row]:
+    turn_deg = np.degrees(Rotation.from_matrix(T_H_D[:3, :3]).as_rotvec())
+    for axis, value, sigma in zip("xyz", turn_deg, np.degrees(sigmas[:3]), strict=True):
+        yield _row(f"T_H_D turn {axis}", value, sigma, "°", 3, _TURN)
+    for axis, value, sigma in zip("xyz", T_H_D[:3, 3], sigmas[3:], strict=True):
+        yield _row(f"T_H_D {axis}", 1e3 * value, 1e3 * sigma, "mm", 2, _SHIFT)
+
+
+def _sigmas(covariance: Float64 | None, count: int) -> list[float]:
+    return [np.inf] * count if covariance is None else list(np.sqrt(np.diag(covariance)))
+
+
+def _rms(rms_px: float) -> Row:
+    return Row("RMS", (f"{rms_px:.3f} px", ""), "Root mean square distance of seen and expected.")
+
+
+def _row(label: str, value: float, sigma: float, unit: str, decimals: int, tooltip: str) -> Row:
+    blank = "" if unit in ("°", "") else " "
+    known = f"{sigma:.{decimals}f}{blank}{unit}" if np.isfinite(sigma) else UNKNOWN
+    return Row(label, (f"{value:.{decimals}f}{blank}{unit}", known), tooltip)

@@ -1,0 +1,125 @@
+"""The images of a step as they are shown: what was found on each, and a small picture of it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from handcal.errors import CancelledError, FileError
+from handcal.files import make_folder, write_atomic
+from handcal.image_file import read_image
+from handcal.rig.board import Board
+from handcal.rig.views import View, image_files, pair_views, read_views, view
+from handcal.types import UInt8
+from handcal_gui.running.jobs import IsCancelled, Report
+
+_SMALL_PX = 96
+_AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One image, or the two of a pair that were taken at one moment.
+
+    Attributes
+    ----------
+    views : tuple of View
+        One for each camera.
+    files : tuple of Path
+    small : (h, w, 3) uint8 or None
+        The first image, small; None if it cannot be read.
+    """
+
+    views: tuple[View, ...]
+    files: tuple[Path, ...]
+    small: UInt8 | None
+
+    @property
+    def name(self) -> str:
+        """The first image's."""
+        return self.views[0].name
+
+    @property
+    def problem(self) -> str:
+        """Why nothing was found; empty if all was."""
+        return "; ".join(view.problem for view in self.views if view.problem)
+
+
+def look(
+    folders: Sequence[Path], board: Board, report: Report, is_cancelled: IsCancelled
+) -> tuple[Shot, ...]:
+    """Look for the board in one folder of images, or in two whose images belong together.
+
+    Raises
+    ------
+    CancelledError
+    FileError, ViewsError
+        If there are no images, too many, or none that belong together.
+    """
+    of_camera = []
+    files: dict[tuple[int, str], Path] = {}
+    for number, folder in enumerate(folders):
+
+        def told(name: str, share: float, number: int = number) -> None:
+            if is_cancelled():
+                raise CancelledError("the search was cancelled")
+            report(f"Looking for the board in {name}", (number + share) / len(folders))
+
+        paths = image_files([folder])
+        views = read_views(paths, board, told)
+        files |= {(number, path.name): path for path in paths}
+        of_camera.append(views)
+    together = pair_views(*of_camera) if len(of_camera) == 2 else [(one,) for one in of_camera[0]]
+    shots = []
+    for views in together:
+        of_views = tuple(files[number, view.name] for number, view in enumerate(views))
+        shots.append(Shot(views, of_views, _small(of_views[0])))
+    return tuple(shots)
+
+
+def without(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[View, ...]]:
+    """Return the views, those of shots called one of `names` left out."""
+    return [
+        tuple(replace(view, dropped=shot.name in names) for view in shot.views) for shot in shots
+    ]
+
+
+def read_color(path: Path) -> UInt8:
+    """Return an image (H, W, 3), RGB, or raise FileError."""
+    return np.asarray(read_image(path, cv2.IMREAD_COLOR_RGB | _AS_STORED), np.uint8)
+
+
+def _small(path: Path) -> UInt8 | None:
+    try:
+        image = read_image(path, cv2.IMREAD_REDUCED_COLOR_4 | _AS_STORED)
+    except FileError:
+        return None
+    scale = _SMALL_PX / max(image.shape[:2])
+    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(small[..., ::-1], np.uint8)
+
+
+def keep_images(images: Sequence[UInt8], folders: Sequence[Path], board: Board) -> tuple[View, ...]:
+    """Write RGB images into a folder each, under the next number, and look for the board in them.
+
+    Raises
+    ------
+    FileError
+        If one cannot be written.
+    """
+    number = 1 + max(_last_number(make_folder(folder)) for folder in folders)
+    views = []
+    for image, folder in zip(images, folders, strict=True):
+        name = f"{folder.name}-{number:03}.png"
+        write_atomic(folder / name, cv2.imencode(".png", image[..., ::-1])[1].tobytes())
+        views.append(view(name, image, board))
+    return tuple(views)
+
+
+def _last_number(folder: Path) -> int:
+    names = (path.stem.rpartition("-")[2] for path in folder.glob(f"{folder.name}-*.png"))
+    return max((int(name) for name in names if name.isdecimal()), default=0)

@@ -1,0 +1,197 @@
+"""The rig wizard: the offline calibration, step by step, in a window of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.types import RigPart
+from handcal_gui.rig.board_page import BoardPage
+from handcal_gui.rig.display_page import DisplayPage
+from handcal_gui.rig.draft import Draft
+from handcal_gui.rig.result_page import ResultPage
+from handcal_gui.rig.stereo_page import StereoPage
+from handcal_gui.rig.viewpoint_page import ViewpointPage
+from handcal_gui.rig.work import WorkFolder
+from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.widgets.banner import Banner
+from handcal_gui.widgets.fields import button, named
+
+_FIRST_SIZE = QSize(1240, 760)
+_RAIL_PX = 25 * SPACING_PX
+_SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
+_STEPS: dict[str, tuple[str, RigPart | None]] = {
+    "Board": ("The board to take images of, and the rig to begin from.", None),
+    "Depth and headset camera": ("Where the depth camera is on the headset: T_H_D.", "T_H_D"),
+    "Viewpoint camera": ("The camera put where the wearer's eye will be.", None),
+    "Left display": ("Projection and place of the left eye's display.", "left"),
+    "Right display": ("Projection and place of the right eye's display.", "right"),
+    "Result": ("The rig as a whole: check, compare and save it.", None),
+}
+"""By title: what the step is for, and the part of the rig that comes of it."""
+
+
+class Page(Protocol):
+    """What the wizard asks of a page."""
+
+    def enter(self) -> None:
+        """Come into sight."""
+
+    def stop(self) -> None:
+        """End what runs in the background."""
+
+
+class RigWizard(QDialog):
+    """Leads through the offline calibration; everything entered is kept in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Created if needed; a later wizard goes on from there.
+
+    Attributes
+    ----------
+    rig_saved : Signal(Path)
+        A rig file to be used for the next calibration.
+    draft : Draft
+
+    Raises
+    ------
+    FileError
+        If the folder cannot be created.
+    """
+
+    rig_saved = Signal(object)
+
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("rigWizard")
+        self.setWindowTitle("Calibrate a rig")
+        self.draft = Draft(WorkFolder(folder), self)
+        self._banner = Banner()
+        self._rail = named(QListWidget(), "rigRail", "Steps")
+        self._title, self._purpose = QLabel(), QLabel()
+        self._stack = QStackedWidget()
+        result = ResultPage(self.draft)
+        self._pages: list[Page] = []
+        for page in (
+            BoardPage(self.draft),
+            StereoPage(self.draft),
+            ViewpointPage(self.draft),
+            DisplayPage(self.draft, "left"),
+            DisplayPage(self.draft, "right"),
+            result,
+        ):
+            self._stack.addWidget(page)
+            self._pages.append(page)
+        self._back = button("rigBack", "Back")
+        self._next = button("rigNext", "Next")
+        self._close = button("rigClose", "Close", help_text="Everything entered is kept")
+        for title in _STEPS:
+            self._rail.addItem(QListWidgetItem(title))
+        self._lay_out()
+        self._rail.currentRowChanged.connect(self._go_to)
+        self._back.clicked.connect(lambda: self.show_step(self.step - 1))
+        self._next.clicked.connect(lambda: self.show_step(self.step + 1))
+        self._close.clicked.connect(self.accept)
+        self.draft.rig_changed.connect(self._refresh)
+        self.draft.failed.connect(self._banner.show_message)
+        result.rig_saved.connect(self.rig_saved)
+        self._banner.show_message(self.draft.complaint)
+        screen = QGuiApplication.primaryScreen().availableSize()
+        self.resize(screen.boundedTo(_FIRST_SIZE))
+        self._refresh()
+        self.show_step(0)
+
+    @property
+    def step(self) -> int:
+        """The step shown, from 0."""
+        return self._rail.currentRow()
+
+    @property
+    def page(self) -> Page:
+        """The page shown."""
+        return self._pages[self.step]
+
+    def show_step(self, step: int) -> None:
+        """Show a step."""
+        self._rail.setCurrentRow(step)
+
+    def done(self, result: int) -> None:
+        """Keep everything, end what runs, and close."""
+        for page in self._pages:
+            page.stop()
+        self.draft.save()
+        super().done(result)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw the signs when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._refresh()
+
+    def _go_to(self, step: int) -> None:
+        title = list(_STEPS)[step]
+        self._title.setText(title)
+        self._purpose.setText(_STEPS[title][0])
+        self._stack.setCurrentIndex(step)
+        self._back.setEnabled(step > 0)
+        self._next.setEnabled(step < len(_STEPS) - 1)
+        self._pages[step].enter()
+
+    def _refresh(self) -> None:
+        """Mark the steps by what the rig has of them."""
+        for row, (_, part) in enumerate(_STEPS.values()):
+            origin = self.draft.rig.origins.get(part) if part else None
+            verdict = origin.verdict if origin else ""
+            if row == 2 and self.draft.camera_file.exists():
+                verdict = "good"
+            name, role = _SIGNS.get(verdict, ("wait", "muted"))
+            item = self._rail.item(row)
+            if part or row == 2:
+                item.setIcon(icon(name, getattr(colors(), role)))
+                item.setToolTip(verdict or "not calibrated yet")
+
+    def _lay_out(self) -> None:
+        font = self._title.font()
+        font.setPointSizeF(1.6 * font.pointSizeF())
+        font.setBold(True)
+        self._title.setFont(font)
+        self._rail.setFixedWidth(_RAIL_PX)
+        self._rail.setSpacing(SPACING_PX // 2)
+        head = QHBoxLayout()
+        head.setSpacing(2 * SPACING_PX)
+        head.addWidget(self._title)
+        head.addWidget(self._purpose, 1, Qt.AlignmentFlag.AlignBottom)
+        foot = QHBoxLayout()
+        foot.setSpacing(SPACING_PX)
+        foot.addStretch(1)
+        for one in (self._back, self._next, self._close):
+            foot.addWidget(one)
+        right = QVBoxLayout()
+        right.setSpacing(SPACING_PX)
+        right.addLayout(head)
+        right.addWidget(self._stack, 1)
+        right.addLayout(foot)
+        row = QHBoxLayout()
+        row.setSpacing(2 * SPACING_PX)
+        row.addWidget(self._rail)
+        row.addLayout(right, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._banner)
+        layout.addLayout(row, 1)

@@ -1,0 +1,175 @@
+"""What was entered in the rig wizard, and the folder that keeps it from one opening to the next."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from handcal.config import read_settings, settings_json
+from handcal.errors import FileError
+from handcal.files import make_folder, read_json, write_json
+from handcal.resources import resource_path
+from handcal.rig.board import Board
+from handcal.rig.board_print import Paper
+from handcal.rig.camera import LensModel
+from handcal.rig.rig_file import read_rig, write_rig
+from handcal.types import Rig
+
+Distance: TypeAlias = Literal["measured", "solved"]
+
+
+@dataclass(frozen=True, slots=True)
+class StereoEntries:
+    """What the pose of the depth camera is solved from; paths, empty where there is none.
+
+    Attributes
+    ----------
+    depth_images, headset_images : str
+        Folders of the two cameras' images.
+    depth_intrinsics, headset_intrinsics : str
+        Files; solved from the images if empty.
+    imager_intrinsics, depth_to_color : str
+        Files: the depth imager's own, and its pose in the colour imager, if the images are the
+        colour imager's.
+    lens : LensModel
+        Of intrinsics that are solved.
+    dropped : tuple of str
+        Images left out, by the depth camera's name.
+    """
+
+    depth_images: str = ""
+    headset_images: str = ""
+    depth_intrinsics: str = ""
+    headset_intrinsics: str = ""
+    imager_intrinsics: str = ""
+    depth_to_color: str = ""
+    lens: LensModel = "full"
+    dropped: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ViewpointEntries:
+    """What the viewpoint camera's intrinsics are solved from, or the file that has them."""
+
+    images: str = ""
+    intrinsics: str = ""
+    lens: LensModel = "full"
+    dropped: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayEntries:
+    """What one eye's display is calibrated from.
+
+    Attributes
+    ----------
+    grid_images : str
+        Folder of images of the grid on the display.
+    square_px : int
+        Side of the grid's squares.
+    board_images, tracked : str
+        Folder of images of the tracked board, and the file of its poses.
+    distance : {"measured", "solved"}
+        How z(C0→S) is known: as `distance_m`, or from what a square subtends.
+    distance_m, square_arcmin, nominal_m : float
+        As measured; what a square subtends from the nominal distance.
+    dropped_grid, dropped_board : tuple of str
+    """
+
+    grid_images: str = ""
+    square_px: int = 80
+    board_images: str = ""
+    tracked: str = ""
+    distance: Distance = "measured"
+    distance_m: float = 2.0
+    square_arcmin: float = 112.0
+    nominal_m: float = 2.0
+    dropped_grid: tuple[str, ...] = ()
+    dropped_board: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RigWork:
+    """Everything entered in the rig wizard."""
+
+    board: Board = field(default_factory=Board)
+    paper: Paper = "a4"
+    stereo: StereoEntries = field(default_factory=StereoEntries)
+    viewpoint: ViewpointEntries = field(default_factory=ViewpointEntries)
+    left: DisplayEntries = field(default_factory=DisplayEntries)
+    right: DisplayEntries = field(default_factory=DisplayEntries)
+
+
+class WorkFolder:
+    """Keeps entries, images taken, and the rig as far as it is calibrated.
+
+    Parameters
+    ----------
+    path : Path
+        Created if needed.
+
+    Attributes
+    ----------
+    path : Path
+    viewpoint : Path
+        The viewpoint camera's intrinsics, once solved.
+
+    Raises
+    ------
+    FileError
+        If the folder cannot be created.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = make_folder(path)
+        self.viewpoint = path / "viewpoint.json"
+        self._entries = path / "work.json"
+        self._rig = path / "rig.yaml"
+
+    def load(self) -> tuple[RigWork, str]:
+        """Return the entries, and what went wrong for a person to read; empty if nothing did.
+
+        A file that cannot be used is kept beside, ending in ``.bad``.
+        """
+        if not self._entries.exists():
+            return RigWork(), ""
+        try:
+            return read_settings(RigWork, read_json(self._entries), "work"), ""
+        except FileError as error:
+            return RigWork(), f"The entries start anew: {error}; {_set_aside(self._entries)}"
+
+    def save(self, work: RigWork) -> None:
+        """Write the entries, or raise FileError."""
+        write_json(self._entries, settings_json(work))
+
+    def load_rig(self) -> tuple[Rig, str]:
+        """Return the rig as far as it is calibrated, the example at first, and what went wrong."""
+        example = resource_path("example_rig.yaml")
+        if not self._rig.exists():
+            return read_rig(example), ""
+        try:
+            return read_rig(self._rig), ""
+        except FileError as error:
+            return read_rig(example), f"The rig starts anew: {error}; {_set_aside(self._rig)}"
+
+    def save_rig(self, rig: Rig) -> None:
+        """Write the rig as far as it is calibrated.
+
+        Raises
+        ------
+        ValueError
+            If it is implausible.
+        FileError
+            If it cannot be written.
+        """
+        write_rig(self._rig, rig)
+
+
+def _set_aside(path: Path) -> str:
+    bad = path.with_name(f"{path.name}.bad")
+    with suppress(OSError):
+        path.replace(bad)
+        return f"the old are in {bad}"
+    return "they cannot be moved aside"
