@@ -105,9 +105,14 @@ class Live(QObject):
 
     def do(self, action: Action) -> None:
         """Do what the wizard offers, unless something that it offered is still being done."""
-        snapshot = self._snapshot
-        if snapshot is None or self._shown < self._doing:
-            return
+        if action is Action.EXPORT:
+            self.export_requested.emit()
+        elif action is Action.NEXT_WEARER:
+            self.next_wearer_requested.emit()
+        elif self._snapshot is not None and self._shown >= self._doing:
+            self._go_on(action, self._snapshot)
+
+    def _go_on(self, action: Action, snapshot: Snapshot) -> None:
         eyes = self._wizard_panel.wizard.eyes(snapshot)
         commands: dict[Action, Callable[[Calibration], object]] = {
             Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
@@ -120,10 +125,6 @@ class Live(QObject):
             self._doing = self._calibrate(action.value, commands[action])
         elif action is Action.FINISH:
             self._doing = self._ask(action.value, Station.finish)
-        elif action is Action.EXPORT:
-            self.export_requested.emit()
-        elif action is Action.NEXT_WEARER:
-            self.next_wearer_requested.emit()
         else:
             self._wizard_panel.wizard.move(action, snapshot)
             self._wizard_panel.show_snapshot(snapshot)

@@ -125,15 +125,18 @@ def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT
     technician.wait(lambda: studio.headset.shown.cursor_W_m is not None)
 
 
+def is_turned(technician: Technician) -> bool:
+    """Tell whether the hand is seen that is not the cursor's."""
+    seen = technician.snapshot.observation
+    if seen is None or seen.rotation_rad is None:
+        return False
+    return bool(np.linalg.norm(seen.rotation_rad) > 0.02)
+
+
 def align(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:
     make_cursor(technician, studio, first)
     studio.camera.shows = "live"
-    technician.wait(
-        lambda: (
-            technician.snapshot.observation is not None
-            and technician.snapshot.observation.rotation_rad is not None
-        )
-    )
+    technician.wait(lambda: is_turned(technician))
     studio.headset.confirm()
     technician.wait_for_state(State.ALIGNED)
 

@@ -114,7 +114,7 @@ def test_deletions_in_their_order(record: SessionRecord) -> None:
 
 
 def test_an_old_session_has_nothing_to_take_back() -> None:
-    old = Session.open(Path(__file__).parents[1] / "data" / "session-v1")
+    old = Session.open(Path(__file__).parents[2] / "data" / "session-v1")
     assert deletions(old) == []
     assert list(alignment_rows(old, None)) == list(old.alignment_numbers)
 
