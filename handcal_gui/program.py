@@ -31,6 +31,7 @@ from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review import Review
 from handcal_gui.review.review_page import ReviewPage
+from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.running.live import Live
 from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import use_theme
@@ -157,6 +158,18 @@ class Program(QObject):
         dialog.open()
         return dialog
 
+    def calibrate_rig(self) -> RigWizard | None:
+        """Lead through the offline calibration; None if what is entered could not be kept."""
+        try:
+            wizard = RigWizard(self._file.path.parent / "rig", self.window)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return None
+        wizard.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        wizard.rig_saved.connect(self._use_rig)
+        wizard.open()
+        return wizard
+
     def close(self) -> None:
         """Remember the window, end what runs; safe to call twice."""
         layouts = self.window.layouts()
@@ -171,6 +184,8 @@ class Program(QObject):
         )
         for dialog in self.window.findChildren(ExportDialog):
             dialog.stop()
+        for wizard in self.window.findChildren(RigWizard):
+            wizard.accept()
         self.live.stop()
         self.review.close()
         self.start.stop()
@@ -179,6 +194,7 @@ class Program(QObject):
         self.start.start_requested.connect(self.start_calibration)
         self.start.resume_requested.connect(self.resume_session)
         self.start.open_requested.connect(self.open_session)
+        self.start.rig_wanted.connect(self.calibrate_rig)
         self.live.ended.connect(self._take_end)
         self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
         self.live.export_requested.connect(lambda: self.export())
@@ -203,6 +219,7 @@ class Program(QObject):
         add("File", "&Next wearer", "Ctrl+N", self.show_start)
         add("File", "&Open session…", "Ctrl+O", self._browse)
         add("File", "&Export…", "Ctrl+E", self.export)
+        add("File", "&Calibrate a rig…", "", self.calibrate_rig)
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
         add("File", "&Quit", "Ctrl+Q", self.window.close)
         add("View", "&Reset layout", "", self.window.reset_layout)
@@ -268,6 +285,11 @@ class Program(QObject):
             self._remember(dialog.preferences())
             self._use_theme()
             self.start.show_preferences(self._preferences)
+
+    def _use_rig(self, path: Path) -> None:
+        station = replace(self._preferences.station, rig=str(path))
+        self._remember(replace(self._preferences, station=station))
+        self.start.set_rig(path)
 
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
         self._remember(replace(self._preferences, export=settings, export_folder=str(folder)))

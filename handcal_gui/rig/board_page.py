@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import get_args
 
 import cv2
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
@@ -203,7 +202,7 @@ class BoardPage(QWidget):
         left.setSpacing(SPACING_PX)
         left.addLayout(form)
         left.addWidget(self._found)
-        left.addStretch(1)
+        left.addSpacing(2 * SPACING_PX)
         left.addWidget(
             paragraph(
                 text="The rig to begin from tells what the headset itself knows: the size of its "
@@ -211,12 +210,12 @@ class BoardPage(QWidget):
             )
         )
         left.addWidget(rig)
+        left.addStretch(1)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(3 * SPACING_PX)
         layout.addLayout(left, 1)
         layout.addWidget(self._preview, 1)
-        layout.setAlignment(left, Qt.AlignmentFlag.AlignTop)
 
 
 def _draw(board: Board) -> UInt8:

@@ -67,12 +67,20 @@ class DisplayPage(StepPage):
             "Where the headset tracked the board in each image: "
             '{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}, metres.'
         )
+        stereo = PathField(
+            "Stereo calibration", "file", "Stereo calibrations (*.json)", "Not needed"
+        )
+        stereo.setToolTip(
+            "Instead of images and poses of the board: what 'handcal rig stereo' made of the "
+            "viewpoint camera, as its depth camera, and the headset's."
+        )
         form = EntriesForm(
             {
                 "grid_images": ("Images of the grid", PathField("Grid images", "folder")),
                 "board_images": ("Images of the board", PathField("Board images", "folder")),
                 "tracked": ("Board's poses", tracked),
                 "square_px": ("Grid's squares", square),
+                "stereo": ("or a stereo calibration", stereo),
                 "distance": ("Distance z(C0→S)", distance),
                 "distance_m": ("measured", distance_m),
                 "square_arcmin": ("Square's angle", arcmin),

@@ -29,6 +29,8 @@ class FindingList(QTreeWidget):
         self.setHeaderLabels(["What", "Found", "Expected"])
         quiet(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        self.header().setStretchLastSection(False)
         self._findings: tuple[RigFinding, ...] = ()
 
     def show_findings(self, findings: Sequence[RigFinding]) -> None:

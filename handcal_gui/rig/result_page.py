@@ -144,7 +144,7 @@ class ResultPage(QWidget):
         inside.addWidget(self._compared)
         inside.addWidget(self._differences, 1)
         inside.addStretch(0)
-        tabs = QTabWidget()
+        tabs = QTabWidget(documentMode=True)
         tabs.addTab(self._findings, "Check")
         tabs.addTab(self._numbers, "Numbers")
         tabs.addTab(compare, "Compare")

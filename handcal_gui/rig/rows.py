@@ -81,7 +81,7 @@ def rig_rows(rig: Rig) -> tuple[Row, ...]:
 def difference_rows(a: Rig, b: Rig) -> tuple[Row, ...]:
     """Return by how much two rigs differ."""
     return tuple(
-        Row(one.name, (f"{one.value:.3g} {one.unit}",), "Not negative; 0 if both agree.")
+        Row(one.name, (_with_unit(one.value, one.unit, 3),), "Not negative; 0 if both agree.")
         for one in compare_rigs(a, b)
     )
 
@@ -129,6 +129,10 @@ def _rms(rms_px: float) -> Row:
 
 
 def _row(label: str, value: float, sigma: float, unit: str, decimals: int, tooltip: str) -> Row:
-    blank = "" if unit in ("°", "") else " "
-    known = f"{sigma:.{decimals}f}{blank}{unit}" if np.isfinite(sigma) else UNKNOWN
-    return Row(label, (f"{value:.{decimals}f}{blank}{unit}", known), tooltip)
+    known = _with_unit(sigma, unit, decimals) if np.isfinite(sigma) else UNKNOWN
+    return Row(label, (_with_unit(value, unit, decimals), known), tooltip)
+
+
+def _with_unit(value: float, unit: str, decimals: int) -> str:
+    blank = "" if unit in ("°", "′", "") else " "
+    return f"{value:.{decimals}f}{blank}{unit}"

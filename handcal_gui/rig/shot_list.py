@@ -19,10 +19,10 @@ _COLUMNS = {
     "Corners": "Corners of the board that were found, in each camera's image.",
     "Off, px": "Root mean square distance of the corners seen and expected, after solving.",
     "Tilt": "Angle between the board's normal and the line of sight, after solving.",
-    "What is wrong": "Why nothing was found, or which image fits worst.",
 }
-_IMAGE, _CORNERS, _OFF, _TILT, _NOTE = range(5)
-_SMALL = QSize(7 * SPACING_PX, 4 * SPACING_PX)
+_IMAGE, _CORNERS, _OFF, _TILT = range(4)
+_NAME, _PROBLEM = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
+_SMALL = QSize(6 * SPACING_PX, 4 * SPACING_PX)
 
 
 class ShotList(QTreeWidget):
@@ -51,12 +51,13 @@ class ShotList(QTreeWidget):
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         for column, tooltip in enumerate(_COLUMNS.values()):
             self.headerItem().setToolTip(column, tooltip)
-            if column in (_CORNERS, _OFF, _TILT):
+            if column != _IMAGE:
                 self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
         quiet(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.header().setStretchLastSection(True)
-        self.setMinimumSize(45 * SPACING_PX, 12 * SPACING_PX)
+        self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
+        self.header().setStretchLastSection(False)
+        self.setMinimumSize(50 * SPACING_PX, 12 * SPACING_PX)
         self.currentItemChanged.connect(self._choose)
         self.itemChanged.connect(self._take_change)
 
@@ -64,7 +65,7 @@ class ShotList(QTreeWidget):
     def dropped(self) -> tuple[str, ...]:
         """The shots that are not ticked."""
         return tuple(
-            item.text(_IMAGE)
+            _name(item)
             for item in self._items()
             if item.checkState(_IMAGE) is Qt.CheckState.Unchecked
         )
@@ -89,13 +90,13 @@ class ShotList(QTreeWidget):
         """Show how far off each is, its tilt, and which is worst and why."""
         self.blockSignals(True)
         for item in self._items():
-            name = item.text(_IMAGE)
+            name = _name(item)
             off, tilt = residuals_px.get(name), tilts_rad.get(name)
             item.setText(_OFF, UNKNOWN if off is None else f"{off:.2f}")
             item.setText(_TILT, UNKNOWN if tilt is None else f"{np.degrees(tilt):.0f}°")
-            problem = item.data(_NOTE, Qt.ItemDataRole.UserRole)
-            note = f"Worst: {worst[1]}" if name == worst[0] else ""
-            _note(item, problem or note)
+            # Of a pair, the worst is called as the one image: "headset camera's of NAME".
+            note = f"worst: {worst[1]}" if worst[0].endswith(name) else ""
+            _note(item, item.data(_IMAGE, _PROBLEM) or note)
         self.blockSignals(False)
 
     def _choose(self, item: QTreeWidgetItem | None) -> None:
@@ -112,7 +113,8 @@ class ShotList(QTreeWidget):
 
 def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:
     item = QTreeWidgetItem()
-    item.setText(_IMAGE, shot.name)
+    item.setData(_IMAGE, _NAME, shot.name)
+    item.setData(_IMAGE, _PROBLEM, shot.problem)
     checked = Qt.CheckState.Unchecked if is_dropped else Qt.CheckState.Checked
     item.setCheckState(_IMAGE, checked)
     if shot.small is not None:
@@ -124,16 +126,21 @@ def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:
     for column in (_CORNERS, _OFF, _TILT):
         item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         item.setFont(column, number_font())
-    item.setData(_NOTE, Qt.ItemDataRole.UserRole, shot.problem)
-    _note(item, shot.problem)
     if shot.problem:
-        item.setIcon(_NOTE, icon("warning"))
+        item.setIcon(_CORNERS, icon("warning"))
+    _note(item, shot.problem)
     return item
 
 
-def _note(item: QTreeWidgetItem, text: str) -> None:
-    item.setText(_NOTE, f"{text[:1].upper()}{text[1:]}")
-    item.setToolTip(_NOTE, item.text(_NOTE))
+def _name(item: QTreeWidgetItem) -> str:
+    return str(item.data(_IMAGE, _NAME))
+
+
+def _note(item: QTreeWidgetItem, note: str) -> None:
+    """Show the image's name, and below it what there is to say about it."""
+    text = "\n".join(filter(None, (_name(item), f"{note[:1].upper()}{note[1:]}")))
+    item.setText(_IMAGE, text)
+    item.setToolTip(_IMAGE, text)
 
 
 def _picture(image: UInt8) -> QIcon:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from handcal.rig.board import BoardView
 from handcal.rig.views import View
@@ -21,7 +21,7 @@ _ARM = 0.006  # of a corner's cross, relative to the image's width
 
 
 class ShotView(QWidget):
-    """Shows one image, or the two of a pair beside each other.
+    """Shows one image, or the two of a pair above each other.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class ShotView(QWidget):
         self._read = LatestJob(_read, self)
         self._read.answered.connect(self._show_images)
         self._read.failed.connect(self._show_failure)
-        layout = QHBoxLayout(self)
+        layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX)
         for image in self._images:

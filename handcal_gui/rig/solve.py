@@ -21,12 +21,18 @@ from handcal.rig.display import (
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.formats import camera_json, read_intrinsics, read_pose
+from handcal.rig.formats import camera_json, read_intrinsics, read_pose, read_stereo
 from handcal.rig.grid import Grid, on_display
 from handcal.rig.stereo import StereoSettings, calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.viewpoint import TrackedView, ViewpointPose, board_pose, locate_viewpoint
+from handcal.rig.viewpoint import (
+    TrackedView,
+    ViewpointPose,
+    board_pose,
+    locate_viewpoint,
+    viewpoint_from_stereo,
+)
 from handcal.rig.views import View, used
 from handcal.rig.worst import WorstView
 from handcal.types import Eye, Float64, Intrinsics, Rig
@@ -74,7 +80,9 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
         stereo=result,
         made=_now(),
         depth_intrinsics=_intrinsics(entries.imager_intrinsics),
-        T_C_D=read_pose(Path(entries.depth_to_color)) if entries.depth_to_color else None,
+        T_C_D=read_pose(Path(entries.depth_to_color).expanduser())
+        if entries.depth_to_color
+        else None,
     )
     return Solved(
         result.verdict,
@@ -140,7 +148,12 @@ def grid_of(entries: DisplayEntries, width_px: int, height_px: int) -> Grid:
 def _place(
     shots: Sequence[Shot], entries: DisplayEntries, camera: Intrinsics
 ) -> tuple[ViewpointPose, Solved]:
-    poses = read_tracked(Path(entries.tracked))
+    if entries.stereo:
+        place = viewpoint_from_stereo(read_stereo(Path(entries.stereo).expanduser()))
+        return place, Solved(place.verdict, (), place.residuals_px)
+    if not entries.tracked:
+        raise HandcalError("say where the board was tracked: the file of its poses is missing")
+    poses = read_tracked(Path(entries.tracked).expanduser())
     views = [view for (view,) in without(shots, entries.dropped_board)]
     found = used(views, 1)
     missing = sorted(set(found) - set(poses))
@@ -166,7 +179,7 @@ def _tilts(views: Sequence[View], camera: Intrinsics) -> dict[str, float]:
 
 
 def _intrinsics(path: str) -> Intrinsics | None:
-    return read_intrinsics(Path(path)) if path else None
+    return read_intrinsics(Path(path).expanduser()) if path else None
 
 
 def _now() -> str:

@@ -60,7 +60,7 @@ class SolveBox(QWidget):
     def show_origin(self, origin: Origin | None) -> None:
         """Show what is known of an earlier result; None if there is none."""
         self._worst.hide()
-        self._table.show_rows(COLUMNS, ())
+        self._table.hide()
         if origin is None:
             self.show_finding(Finding("", Health.LIMITED, "Not solved yet"))
             return
@@ -81,10 +81,11 @@ class SolveBox(QWidget):
             worst = f"Worst: {solved.worst.name}, {solved.worst.rms_px:.2f} px: {solved.worst.why}"
             self._worst.show_finding(Finding("", Health.LIMITED, worst))
         self._table.show_rows(COLUMNS, solved.rows)
+        self._table.show()
 
     def _show_failure(self, why: str) -> None:
         self._worst.hide()
-        self._table.show_rows(COLUMNS, ())
+        self._table.hide()
         self.show_finding(Finding("", Health.BROKEN, why))
 
     def _lay_out(self) -> None:

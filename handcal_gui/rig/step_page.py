@@ -109,8 +109,9 @@ class StepPage(QWidget):
         if len(panels) == 1:
             layout.addWidget(self.panels[0], 1)
         else:
-            tabs = QTabWidget()
+            tabs = QTabWidget(documentMode=True)
             for title, panel in panels.items():
+                panel.setContentsMargins(*4 * (SPACING_PX,))
                 tabs.addTab(panel, title)
             layout.addWidget(tabs, 1)
         layout.addWidget(self.box)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QDialog,
     QHBoxLayout,
@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.types import RigPart
+from handcal.types import RIG_PARTS, RigPart
 from handcal_gui.rig.board_page import BoardPage
 from handcal_gui.rig.display_page import DisplayPage
 from handcal_gui.rig.draft import Draft
@@ -31,7 +31,7 @@ from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, named
 
 _FIRST_SIZE = QSize(1240, 760)
-_RAIL_PX = 25 * SPACING_PX
+_RAIL_PX = 29 * SPACING_PX
 _SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
     "Board": ("The board to take images of, and the rig to begin from.", None),
@@ -137,6 +137,11 @@ class RigWizard(QDialog):
         self.draft.save()
         super().done(result)
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Let Enter press only the button that has the focus."""
+        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            super().keyPressEvent(event)
+
     def changeEvent(self, event: QEvent) -> None:
         """Redraw the signs when the colours change."""
         super().changeEvent(event)
@@ -153,17 +158,28 @@ class RigWizard(QDialog):
         self._pages[step].enter()
 
     def _refresh(self) -> None:
-        """Mark the steps by what the rig has of them."""
-        for row, (_, part) in enumerate(_STEPS.values()):
-            origin = self.draft.rig.origins.get(part) if part else None
-            verdict = origin.verdict if origin else ""
-            if row == 2 and self.draft.camera_file.exists():
-                verdict = "good"
+        """Mark the steps by what has come of them."""
+        for row, title in enumerate(_STEPS):
+            verdict = self._verdict(title)
             name, role = _SIGNS.get(verdict, ("wait", "muted"))
-            item = self._rail.item(row)
-            if part or row == 2:
-                item.setIcon(icon(name, getattr(colors(), role)))
-                item.setToolTip(verdict or "not calibrated yet")
+            sign = icon(name, getattr(colors(), role))
+            chosen = icon(name, self.palette().highlightedText().color().name())
+            sign.addPixmap(chosen.pixmap(2 * SPACING_PX), QIcon.Mode.Selected)
+            self._rail.item(row).setIcon(sign)
+            self._rail.item(row).setToolTip(verdict or "not done yet")
+
+    def _verdict(self, title: str) -> str:
+        """Return how a step ended; empty if it has not."""
+        origins = self.draft.rig.origins
+        part = _STEPS[title][1]
+        if part is not None:
+            return origins[part].verdict if part in origins else ""
+        if title == "Board":
+            return "good"
+        if title == "Viewpoint camera":
+            return "good" if self.draft.camera_file.exists() else ""
+        verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
+        return "good" if verdicts == {"good"} else ""
 
     def _lay_out(self) -> None:
         font = self._title.font()
@@ -172,6 +188,8 @@ class RigWizard(QDialog):
         self._title.setFont(font)
         self._rail.setFixedWidth(_RAIL_PX)
         self._rail.setSpacing(SPACING_PX // 2)
+        self._rail.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
+        self._rail.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         head = QHBoxLayout()
         head.setSpacing(2 * SPACING_PX)
         head.addWidget(self._title)

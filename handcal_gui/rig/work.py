@@ -71,6 +71,9 @@ class DisplayEntries:
         Side of the grid's squares.
     board_images, tracked : str
         Folder of images of the tracked board, and the file of its poses.
+    stereo : str
+        Instead of both, the JSON of a stereo calibration with the viewpoint camera as its depth
+        camera.
     distance : {"measured", "solved"}
         How z(C0→S) is known: as `distance_m`, or from what a square subtends.
     distance_m, square_arcmin, nominal_m : float
@@ -82,6 +85,7 @@ class DisplayEntries:
     square_px: int = 80
     board_images: str = ""
     tracked: str = ""
+    stereo: str = ""
     distance: Distance = "measured"
     distance_m: float = 2.0
     square_arcmin: float = 112.0

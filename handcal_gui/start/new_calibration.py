@@ -40,10 +40,13 @@ class NewCalibration(Card):
         A station that has just been found ready, and the wearer.
     changed : Signal()
         Other settings are shown.
+    rig_wanted : Signal()
+        A rig is to be calibrated.
     """
 
     start_requested = Signal(object, str)
     changed = Signal()
+    rig_wanted = Signal()
 
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
@@ -74,6 +77,7 @@ class NewCalibration(Card):
         self._again.timeout.connect(self.check)
         self._form.changed.connect(self._settle.start)
         self._form.changed.connect(self.changed)
+        self._form.rig_wanted.connect(self.rig_wanted)
         self._button.clicked.connect(self.start)
         self.show_preferences(preferences)
 
@@ -89,6 +93,10 @@ class NewCalibration(Card):
         self._wearer.addItems(list(preferences.wearers))
         self._wearer.setCurrentIndex(-1)
         self._wearer.clearEditText()
+
+    def set_rig(self, path: str) -> None:
+        """Show another rig file."""
+        self._form.set_rig(path)
 
     def set_pairing_key(self, pairing_key: str) -> None:
         """Take another key for network headsets."""

@@ -39,11 +39,14 @@ class StartPage(QWidget):
         A station that has just been found ready, and the wearer.
     open_requested, resume_requested : Signal(Path)
         A session's folder.
+    rig_wanted : Signal()
+        A rig is to be calibrated.
     """
 
     start_requested = Signal(object, str)
     open_requested = Signal(object)
     resume_requested = Signal(object)
+    rig_wanted = Signal()
 
     def __init__(
         self,
@@ -77,6 +80,7 @@ class StartPage(QWidget):
         self._find = LatestJob(lambda question: find_offers(*question), self)
         self._find.answered.connect(self._take_offers)
         self.new.start_requested.connect(self.start_requested)
+        self.new.rig_wanted.connect(self.rig_wanted)
         self.new.changed.connect(self._look_in_another_folder)
         self._unfinished.chosen.connect(self.resume_requested)
         self._opened.chosen.connect(self.open_requested)
@@ -88,6 +92,10 @@ class StartPage(QWidget):
         self._recent = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
         self._look_for_sessions()
+
+    def set_rig(self, path: Path) -> None:
+        """Show another rig file, whatever else is being entered."""
+        self.new.set_rig(str(path))
 
     def set_pairing_key(self, pairing_key: str) -> None:
         """Take another key for network headsets."""

@@ -17,6 +17,7 @@ from handcal_gui.start.advanced_fields import AdvancedFields
 from handcal_gui.start.camera_field import CameraField
 from handcal_gui.start.headset_field import HeadsetField
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import beside, button
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
 
@@ -35,9 +36,12 @@ class StationForm(QWidget):
     Attributes
     ----------
     changed : Signal()
+    rig_wanted : Signal()
+        A rig is to be calibrated.
     """
 
     changed = Signal()
+    rig_wanted = Signal()
 
     def __init__(
         self,
@@ -55,6 +59,8 @@ class StationForm(QWidget):
         self._rig.setToolTip(
             "The offline calibration of headset and camera; the virtual headset wears any."
         )
+        self._calibrate_rig = button("calibrateRig", "Calibrate…", "Calibrate a rig")
+        self._calibrate_rig.clicked.connect(self.rig_wanted)
         self._sessions = PathField("Session folder", "folder")
         self._sessions.setToolTip("Every calibration gets a folder of its own in here.")
         self._advanced = AdvancedFields()
@@ -80,6 +86,10 @@ class StationForm(QWidget):
         self._rig.set_path(settings.rig)
         self._sessions.set_path(settings.sessions)
 
+    def set_rig(self, path: str) -> None:
+        """Show another rig file."""
+        self._rig.set_path(path)
+
     def set_pairing_key(self, pairing_key: str) -> None:
         """Show another key."""
         self._headset.set_pairing_key(pairing_key)
@@ -94,10 +104,12 @@ class StationForm(QWidget):
         self.show_settings(replace(self.settings, **changes))
 
     def _lay_out(self, wearer: QWidget) -> None:
+        rig = QWidget()
+        beside(rig, self._rig, self._calibrate_rig, grows=self._rig)
         fields: dict[Part, QWidget] = {
             "camera": self._camera,
             "headset": self._headset,
-            "rig": self._rig,
+            "rig": rig,
             "sessions": self._sessions,
         }
         grid = QGridLayout(self)
