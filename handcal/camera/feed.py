@@ -99,9 +99,12 @@ class CameraFeed(Closable):
             if time.monotonic() - self._heard_s > self._settings.silent_s:
                 self._problem = str(error)
             return None
-        except CameraEndError:
-            self.close()  # a recording begins again
-            self._next_open_s = 0.0
+        except CameraEndError as error:
+            if self._last_index is None:
+                self._problem = f"{error} without a frame"
+            else:
+                self._next_open_s = 0.0  # a recording begins again
+            self.close()
             return None
         except CameraError as error:
             self.close()

@@ -121,3 +121,11 @@ def test_a_recording_begins_again() -> None:
         assert feed.status.problem == ""
         assert read_frame(feed).index == 1
     assert len(opened) == 2
+
+
+def test_a_recording_without_a_frame_is_named_and_not_opened_all_the_time() -> None:
+    open_camera, opened = opener(*[[CameraEndError("the recording has ended")]] * 3)
+    with CameraFeed(open_camera, SETTINGS) as feed:
+        assert [feed.read() for _ in range(3)] == [None, None, None]
+        assert feed.status.problem == "the recording has ended without a frame"
+    assert len(opened) == 1
