@@ -16,6 +16,7 @@ from handcal.errors import FileError
 from handcal.types import UInt8
 
 MAX_JSON_BYTES = 16 * 2**20
+_MOST_DIGITS = 20  # 64 bits and a sign: what neither NumPy nor a float overflows at
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
 
@@ -98,12 +99,18 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     data = read_limited(path, MAX_JSON_BYTES)
     try:
-        value = json.loads(data)
+        value = json.loads(data, parse_int=_whole_number)
     except (ValueError, RecursionError) as error:
         raise FileError(f"{path} is not valid JSON: {error}") from error
     if not isinstance(value, dict):
         raise FileError(f"{path} must hold a JSON object")
     return value
+
+
+def _whole_number(digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise ValueError("a whole number is too large")
+    return int(digits)
 
 
 def write_ply(

@@ -178,9 +178,9 @@ def read_trial(data: Mapping[str, Any], time: str) -> Trial:
         If anything in it is missing or wrong.
     """
     try:
-        return Trial(
-            **{name: data[name] for name in ("eye", "target_depth_m", *_SHAPES)}, time=time
-        )
+        depth_m = float(data["target_depth_m"])
+        arrays = {name: data[name] for name in _SHAPES}
+        return Trial(eye=data["eye"], target_depth_m=depth_m, **arrays, time=time)
     except KeyError as error:
         raise ValueError(f"the trial has no {error}") from error
     except (TypeError, OverflowError) as error:

@@ -94,6 +94,7 @@ def test_json_refuses_nan(tmp_path: Path) -> None:
         (b"\xff", "not valid JSON"),
         (b"[" * 100_000, "not valid JSON"),
         (json.dumps([1]).encode(), "must hold a JSON object"),
+        (b'{"x": 1%s}' % (b"0" * 400), "a whole number is too large"),
     ],
 )
 def test_bad_json_is_a_file_error(tmp_path: Path, content: bytes, problem: str) -> None:

@@ -71,7 +71,8 @@ def test_it_comes_back_from_json_bit_for_bit() -> None:
     [
         ({"eye": "middle"}, "left or right"),
         ({"eye": ["left"]}, "left or right"),
-        ({"target_depth_m": "far"}, "something else than numbers"),
+        ({"target_depth_m": "far"}, "convert string"),
+        ({"target_depth_m": [0.5]}, "something else than numbers"),
         ({"truth_px": [[1.0, 2.0]]}, "truth_px: expected an array of shape 4×2, got 1×2"),
         ({"error_px": [1.0, 2.0, 3.0, None]}, "error_px"),
         ({"error_px": [1.0, 2.0, 3.0, float("nan")]}, "error_px: must be finite"),
