@@ -2,7 +2,7 @@
 
 ::
 
-    NAME/journal.jsonl     what events, one JSON object a line; the only file appended to
+    NAME/journal.jsonl     what happened, one JSON object a line; the only file appended to
          rig.yaml          the rig as it was
          settings.json     the settings as they were
          alignments/1.npz  the clouds and poses of each alignment, whose number never changes
@@ -81,7 +81,7 @@ class SessionRecord:
     fine_tuned : mapping of eye to (3,) float64, or None
         The φ last set by hand, as settled; None if none since the last results.
     is_finished : bool
-        Whether the session was ended on purpose, and nothing events since.
+        Whether the session was ended on purpose, and nothing happened since.
     journal_bytes : int
         Length of the journal's complete lines.
     torn_bytes : int
@@ -296,12 +296,6 @@ class Session(Closable):
         shelf.require(number, shelf.deleted)
         self._remove_results()
         self._append(SessionEvent.ALIGNMENT_RESTORED, {"number": number})
-
-    def drop_alignment(self) -> None:
-        """Delete the last alignment; raises as `delete_alignment`."""
-        if not self._history.alignments.kept:
-            raise ValueError("there is no alignment to drop")
-        self.delete_alignment(max(self._history.alignments.kept))
 
     def save_trial(self, trial: Trial) -> int:
         """Store a trial of the user test, as of now, and return its number, from 1.

@@ -329,14 +329,14 @@ def test_a_journal_without_its_beginning_is_refused(
         Session.open(path)
 
 
-def test_a_dropped_alignment_is_left_out_with_its_results(
+def test_a_deleted_alignment_is_left_out_with_its_results(
     session: Session, alignment: Alignment
 ) -> None:
     second = replace(alignment, t_b_ns=2)
     session.save_alignment(alignment)
     session.save_alignment(second)
     session.save_results(RESULTS)
-    session.drop_alignment()
+    session.delete_alignment(2)
     record = Session.open(session.path)
     assert [kept.t_b_ns for kept in record.alignments] == [alignment.t_b_ns]
     assert record.results is None
@@ -344,10 +344,10 @@ def test_a_dropped_alignment_is_left_out_with_its_results(
     session.close()
     with Session(session.path) as again:
         assert again.save_alignment(replace(alignment, t_b_ns=3)) == 3
-        again.drop_alignment()
-        again.drop_alignment()
-        with pytest.raises(ValueError, match="no alignment to drop"):
-            again.drop_alignment()
+        again.delete_alignment(3)
+        again.delete_alignment(1)
+        with pytest.raises(ValueError, match="there is no alignment 1"):
+            again.delete_alignment(1)
         with pytest.raises(ValueError, match="alignment_dropped"):
             again.record("alignment_dropped")
     assert Session.open(session.path).alignments == ()
@@ -380,7 +380,7 @@ def test_any_alignment_can_be_deleted_and_restored_at_its_place(
     assert numbers(record) == ([1, 3], [2])
     session.close()
     with Session(session.path) as again:
-        again.drop_alignment()
+        again.delete_alignment(3)
         assert again.save_alignment(replace(alignment, t_b_ns=4)) == 4
         assert numbers(Session.open(session.path)) == ([1, 4], [2, 3])
         again.restore_alignment(3)
@@ -411,8 +411,7 @@ def test_reading_again_takes_the_alignments_that_are_known(
 
 def test_a_session_of_many_alignments_is_full(session: Session, alignment: Alignment) -> None:
     for _ in range(MAX_ALIGNMENTS):
-        session.save_alignment(alignment)
-        session.drop_alignment()
+        session.delete_alignment(session.save_alignment(alignment))
     with pytest.raises(FileError, match="full: no room for more than 100 alignments"):
         session.save_alignment(alignment)
 
