@@ -33,8 +33,6 @@ class Procedure:
     guard_limit_rad : float
     results : Results or None
         Of all alignments; None while there are none, or alignments have changed since.
-    expected_after_another_arcmin : mapping of eye to float
-        The error to expect in the display if one more alignment were added; empty without results.
     applied_shift_m : mapping of eye to (3,) float64
         What the headset renders with.
     is_applied : bool
@@ -48,7 +46,6 @@ class Procedure:
     refused: int
     guard_limit_rad: float
     results: Results | None
-    expected_after_another_arcmin: Mapping[Eye, float]
     applied_shift_m: Mapping[Eye, Float64]
     is_applied: bool
 

@@ -279,7 +279,6 @@ class Station(Closable):
 
     def _procedure(self) -> Procedure:
         calibration = self.calibration
-        results = calibration.results
         return Procedure(
             state=calibration.state,
             eyes=calibration.eyes,
@@ -287,8 +286,7 @@ class Station(Closable):
             refusal=calibration.refusal,
             refused=calibration.refused,
             guard_limit_rad=self.settings.calibration.guard.limit_rad,
-            results=results,
-            expected_after_another_arcmin=results.expected_after_another_arcmin if results else {},
+            results=calibration.results,
             applied_shift_m=calibration.applied_shift_m,
             is_applied=calibration.is_applied,
         )

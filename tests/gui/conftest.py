@@ -333,7 +333,6 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
         refused=0,
         guard_limit_rad=float(np.radians(9.0)),
         results=results if is_solved else None,
-        expected_after_another_arcmin={"left": 3.1, "right": 3.4} if is_solved else {},
         applied_shift_m=applied_m,
         is_applied=state is not State.APPLYING,
     )
