@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.calibrate import Calibration, State
 from handcal.errors import FileError
+from handcal.results import SolveSettings
 from handcal.snapshot import Snapshot
 from handcal.station import Station
 from handcal_gui.review.compare import Comparison
@@ -61,6 +62,7 @@ class Live(QObject):
         self._window = window
         self._wizard_panel = wizard_panel
         self._comparison = comparison
+        self._solve_settings = SolveSettings()
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
         self._is_watching = False
@@ -248,8 +250,6 @@ class Live(QObject):
         self.opened.emit(station.session.path)
 
     def _take_answer(self, name: str, _answer: object) -> None:
-        if name == Action.FINISH and self._snapshot is not None:
-            self._wizard_panel.wizard.move(Action.FINISH, self._snapshot)
         # One thing that the wizard offers done makes up for another that could not be.
         if name == self._complained_of or {name, self._complained_of} <= set(Action):
             self._window.banner.clear()

@@ -108,9 +108,10 @@ def next_eyes(plan: EyePlan, alignments: Sequence[Alignment]) -> tuple[Eye, ...]
     return ("right",) if counts["right"] < counts["left"] else ("left",)
 
 
-def is_complete(alignments: Sequence[Alignment]) -> bool:
-    """Tell whether every eye has been aligned."""
-    return all(any(eye in alignment.eyes for alignment in alignments) for eye in EYES)
+def is_complete(plan: EyePlan, alignments: Sequence[Alignment]) -> bool:
+    """Tell whether every eye of the plan has been aligned."""
+    eyes = (plan,) if plan in EYES else EYES
+    return all(any(eye in alignment.eyes for alignment in alignments) for eye in eyes)
 
 
 class Wizard:
@@ -125,7 +126,6 @@ class Wizard:
         self.plan = plan
         self._repeat: Eye | None = None
         self._free = Step.CONNECT
-        self._is_finished = False
 
     def step(self, snapshot: Snapshot) -> Step:
         """Return the present step."""
@@ -145,7 +145,7 @@ class Wizard:
         return self._free
 
     def move(self, action: Action, snapshot: Snapshot) -> None:
-        """Make a move that the engine has no part in, or that follows from its success."""
+        """Make a move that the engine has no part in."""
         place = STEPS.index(self._free)
         match action:
             case Action.NEXT:
@@ -154,12 +154,9 @@ class Wizard:
                 is_another = snapshot.procedure.state is State.APPLIED
                 to_verify = is_another and self._free is Step.SHOW_HAND
                 self._free = Step.VERIFY if to_verify else STEPS[place - 1]
-                self._is_finished = False
             case Action.ANOTHER | Action.REPEAT_LEFT | Action.REPEAT_RIGHT:
                 self._repeat = _REPEATS.get(action)
                 self._free = Step.SHOW_HAND
-            case Action.FINISH:
-                self._is_finished = True
             case _:
                 raise ValueError(f"{action} is the engine's")
 
@@ -273,7 +270,7 @@ class Wizard:
                 Offer(Action.SOLVE, "Solve"),
                 (Offer(Action.ANOTHER, "Add alignment"),),
             )
-        if not is_complete(snapshot.record.alignments):
+        if not is_complete(self.plan, snapshot.record.alignments):
             eyes = _names(self.eyes(snapshot))
             return View(
                 Step.VERIFY,
@@ -298,7 +295,7 @@ class Wizard:
     def _save(self, snapshot: Snapshot) -> View:
         where = snapshot.session_path
         others = (Offer(Action.EXPORT, "Export…"), Offer(Action.BACK, "Back"))
-        if self._is_finished:
+        if snapshot.record.is_finished:
             return View(
                 Step.SAVE,
                 "The session is complete. Take the headset off, or go on with the next wearer.",
