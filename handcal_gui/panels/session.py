@@ -25,13 +25,13 @@ from handcal_gui.records.session_rows import (
     Deletion,
     alignment_rows,
     deletions,
-    local_time,
     trial_rows,
     trials_id,
 )
 from handcal_gui.records.undo_strip import UndoStrip
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.times import local_time
 
 
 class SessionPanel(QWidget):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -19,6 +18,7 @@ from handcal_gui.records.record_table import Column
 from handcal_gui.results.rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed
+from handcal_gui.widgets.times import local_time
 
 Kind: TypeAlias = Literal["alignment", "trial"]
 
@@ -46,6 +46,7 @@ TRIAL_COLUMNS = (
 )
 STATISTICS_COLUMNS = ("n", "Mean ± SD ′", "Median ′", "Max ′", "Mean ± SD px")
 
+_CLOCK = "%H:%M:%S"
 _DELETED: dict[str, Kind] = {
     SessionEvent.ALIGNMENT_DELETED: "alignment",
     SessionEvent.TRIAL_DELETED: "trial",
@@ -104,7 +105,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
             *(_phi_text(shifts.get(eye)) for eye in EYES),
             " / ".join(rms) or NOTHING,
             " / ".join(inliers) or NOTHING,
-            local_time(times[number]),
+            local_time(times[number], _CLOCK),
         )
     return rows
 
@@ -123,7 +124,7 @@ def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:
             f"{trial.target_depth_m:g}",
             f"{trial.error_px.mean():.1f}",
             f"{trial.error_arcmin.mean():.1f}",
-            local_time(trial.time),
+            local_time(trial.time, _CLOCK),
         )
         for number, trial in zip(record.trial_numbers, record.trials, strict=True)
     }
@@ -167,14 +168,6 @@ def statistics_text(statistics: TrialStatistics) -> str:
 def _eyes_text(eyes: Sequence[Eye]) -> str:
     """Return the name of one eye, or of both."""
     return EYE_NAMES[eyes[0]] if len(eyes) == 1 else "Both eyes"
-
-
-def local_time(utc: str, form: str = "%H:%M:%S") -> str:
-    """Return a time in ISO 8601 as the clock on the wall shows it; as it is if it is no time."""
-    try:
-        return f"{datetime.fromisoformat(utc).astimezone():{form}}"
-    except ValueError:
-        return utc
 
 
 def _phi_text(shift: EyeShift | None) -> str:

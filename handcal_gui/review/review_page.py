@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import datetime
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
@@ -13,6 +12,7 @@ from handcal.session import SessionRecord
 from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.times import local_time
 
 
 class ReviewPage(QWidget):
@@ -82,8 +82,7 @@ class ReviewPage(QWidget):
 
 def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
     """Give what is to be known of a session, by name."""
-    started = datetime.fromisoformat(record.events[0].time).astimezone()
-    yield "Started", f"{started:%d %B %Y, %H:%M}"
+    yield "Started", local_time(record.events[0].time)
     yield "Rig", record.rig.name
     state = "finished" if record.is_finished else "not finished"
     counts = _count(len(record.alignments), "alignment"), _count(len(record.trials), "trial")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.journal import read_journal
 from handcal.unfinished import UnfinishedSession, unfinished_sessions
+from handcal_gui.widgets.times import local_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +69,4 @@ def _recent(path: Path) -> Entry:
 
 
 def _title(wearer: str, started: str) -> str:
-    return f"{wearer or 'No name'} · {_local_time(started)}"
-
-
-def _local_time(utc: str) -> str:
-    try:
-        return f"{datetime.fromisoformat(utc).astimezone():%d %b %Y, %H:%M}"
-    except ValueError:
-        return utc
+    return f"{wearer or 'No name'} · {local_time(started)}"

@@ -19,7 +19,6 @@ from handcal_gui.records.session_rows import (
     Deletion,
     alignment_rows,
     deletions,
-    local_time,
     statistics_rows,
     statistics_text,
     trial_rows,
@@ -117,8 +116,3 @@ def test_an_old_session_has_nothing_to_take_back() -> None:
     old = Session.open(Path(__file__).parents[2] / "data" / "session-v1")
     assert deletions(old) == []
     assert list(alignment_rows(old, None)) == list(old.alignment_numbers)
-
-
-def test_time_is_local() -> None:
-    assert local_time("2026-11-21T12:34:56+00:00", "%M:%S") == "34:56"
-    assert local_time("before noon") == "before noon"
