@@ -55,11 +55,8 @@ def _inspect(path: Path) -> UnfinishedSession | None:
             started = events[0].time
             if events[-1].name == SessionEvent.FINISHED:
                 return None
-        lock = FileLock(path / "lock")
-        try:
-            record = Session.open(path)
-        finally:
-            lock.release()
+        FileLock(path / "lock").release()  # only tried: reading takes longer than anyone may wait
+        record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))
     return UnfinishedSession(

@@ -105,8 +105,8 @@ class NewCalibration(Card):
         self.check()
 
     def check(self) -> None:
-        """Look at the station as it is set up now, unless it may be in use: out of sight."""
-        if self.isVisible():
+        """Look at the station as it is set up now, unless it may be in use or being opened."""
+        if self.isVisible() and self.isEnabled():
             self._check.ask(self._question())
 
     def start(self) -> None:
@@ -157,7 +157,6 @@ class NewCalibration(Card):
         self._button.setEnabled(is_ready(findings))
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
-            self._again.start()  # not while the station is being opened
             self.start_requested.emit(self._form.settings, wearer)
 
     def _give_up(self, why: str) -> None:
