@@ -87,18 +87,18 @@ def _camera(settings: StationSettings) -> Finding:
 
 
 def _recording(name: str) -> Finding:
-    if name and Path(name).is_dir():
-        with FolderCamera(Path(name)) as camera:
-            return _good(f"{camera.name}, played over and over")
-    librealsense()
-    path = Path(name)
+    kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, or a folder that handcal recorded"
     if not name:
-        return _broken("no recording is chosen", "choose a file")
-    if path.suffix not in RECORDING_SUFFIXES:
-        kinds = " or ".join(RECORDING_SUFFIXES)
-        return _broken(f"{path.name} is no RealSense recording", f"choose a {kinds} file")
+        return _broken("no recording is chosen", f"choose {kinds}")
+    path = Path(name)
+    if path.is_dir():
+        with FolderCamera(path) as camera:
+            return _good(f"{camera.name}, played over and over")
     if not path.is_file():
-        return _broken(f"there is no file {path}", "choose another")
+        return _broken(f"there is no recording {path}", f"choose {kinds}")
+    if path.suffix not in RECORDING_SUFFIXES:
+        return _broken(f"{path.name} is no recording", f"choose {kinds}")
+    librealsense()
     return _good(f"{path.stat().st_size / 2**20:,.1f} MiB, played over and over")
 
 

@@ -117,7 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--source",
         metavar="SOURCE",
-        help="simulator, realsense, or the path of a .db3 or .bag recording",
+        help="simulator, realsense, or a recording: a .db3 or .bag file, or a folder",
     )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig file")
     parser.add_argument("--seed", type=_seed, metavar="N", help="of the simulated wearer")

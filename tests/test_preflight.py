@@ -90,23 +90,29 @@ def test_a_realsense_is_found_or_missed(
 
 @pytest.mark.parametrize("source", ["realsense", "recording"])
 def test_a_missing_sdk_is_named(
-    settings: StationSettings, monkeypatch: pytest.MonkeyPatch, source: str
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
-    finding = find("camera", replace(settings, source=source))  # type: ignore[arg-type]
+    path = tmp_path / "hand.db3"
+    path.touch()
+    settings = replace(settings, source=source, recording=str(path))  # type: ignore[arg-type]
+    finding = find("camera", settings)
     assert finding.health is Health.BROKEN
     assert "no package exists for macOS" in finding.found
     assert "simulator" in finding.advice
 
 
 def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) -> None:
-    pytest.importorskip("pyrealsense2")
     played = replace(settings, source="recording")
     assert find("camera", played).found == "no recording is chosen"
     text, path = tmp_path / "hand.txt", tmp_path / "hand.db3"
-    assert "is no RealSense recording" in find("camera", replace(played, recording=str(text))).found
+    text.touch()
+    finding = find("camera", replace(played, recording=str(text)))
+    assert finding.found == "hand.txt is no recording"
+    assert ".db3 or .bag file, or a folder" in finding.advice
     with_path = replace(played, recording=str(path))
-    assert find("camera", with_path).found == f"there is no file {path}"
+    assert find("camera", with_path).found == f"there is no recording {path}"
+    pytest.importorskip("pyrealsense2")
     path.write_bytes(bytes(2**21))
     assert find("camera", with_path).found == "2.0 MiB, played over and over"
     assert find("camera", replace(played, recording="\0.db3")).health is Health.BROKEN

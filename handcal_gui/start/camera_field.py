@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
+from handcal.camera.settings import RealSenseSettings
 from handcal.preflight import RECORDING_SUFFIXES
 from handcal.station_settings import Source, StationSettings
-from handcal_gui.widgets.fields import beside, choice, named
+from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
+from handcal_gui.widgets.fields import beside, button, choice, named
 from handcal_gui.widgets.path_field import PathField
 
 _SOURCES: dict[Source, str] = {
@@ -21,7 +23,7 @@ _PATTERN = f"RealSense recordings ({' '.join(f'*{suffix}' for suffix in RECORDIN
 
 
 class CameraField(QWidget):
-    """Simulator, RealSense with its serial number, or a recording with its path.
+    """Simulator, RealSense with serial number and settings, or a recording with its path.
 
     Attributes
     ----------
@@ -36,19 +38,30 @@ class CameraField(QWidget):
         self._serial = named(
             QLineEdit(placeholderText="Serial number; any if empty"), "serial", "Serial number"
         )
-        self._recording = PathField("Recording", "file", _PATTERN)
+        self._realsense = RealSenseSettings()
+        edit = button(
+            "editRealSense",
+            "Settings…",
+            "Camera settings",
+            "Image size, preset, exposure, laser power and filters.",
+        )
+        camera = QWidget()
+        beside(camera, self._serial, edit, grows=self._serial)
+        self._recording = PathField("Recording", "either", _PATTERN)
         details = QStackedWidget()
-        for page in (QWidget(), self._serial, self._recording):  # in the order of _SOURCES
+        for page in (QWidget(), camera, self._recording):  # in the order of _SOURCES
             details.addWidget(page)
         beside(self, self._source, details, grows=details)
         self._source.currentIndexChanged.connect(details.setCurrentIndex)
         self._source.currentIndexChanged.connect(self.changed)
         self._serial.textChanged.connect(self.changed)
+        edit.clicked.connect(self.edit_realsense)
         self._recording.changed.connect(self.changed)
 
     def show_settings(self, settings: StationSettings) -> None:
         """Show the camera of a station."""
         self._source.setCurrentIndex(self._source.findData(settings.source))
+        self._realsense = settings.realsense
         self._serial.setText(settings.realsense.serial)
         self._recording.set_path(settings.recording)
 
@@ -57,6 +70,17 @@ class CameraField(QWidget):
         return replace(
             settings,
             source=self._source.currentData(),
-            realsense=replace(settings.realsense, serial=self._serial.text().strip()),
+            realsense=replace(self._realsense, serial=self._serial.text().strip()),
             recording=self._recording.path,
         )
+
+    def edit_realsense(self) -> None:
+        """Ask how the RealSense is to be run."""
+        dialog = CameraSettingsDialog(self._realsense, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.accepted.connect(lambda: self._take_realsense(dialog.settings()))
+        dialog.open()
+
+    def _take_realsense(self, settings: RealSenseSettings) -> None:
+        self._realsense = settings
+        self.changed.emit()

@@ -11,13 +11,13 @@ from handcal_gui.widgets.fields import beside, button
 
 
 class PathField(QWidget):
-    """A line with a button beside it.
+    """A line with a button beside it, or two where file and folder will both do.
 
     Parameters
     ----------
     name : str
         What is chosen, as the dialog's title says: "Rig file".
-    kind : {"file", "folder"}
+    kind : {"file", "folder", "either"}
     pattern : str
         Of the files offered, as `QFileDialog` takes it: ``"Recordings (*.db3 *.bag)"``.
     empty : str
@@ -34,20 +34,24 @@ class PathField(QWidget):
     def __init__(
         self,
         name: str,
-        kind: Literal["file", "folder"],
+        kind: Literal["file", "folder", "either"],
         pattern: str = "",
         empty: str = "",
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.name = name
-        self._kind, self._pattern = kind, pattern
+        self._pattern = pattern
         self._line = QLineEdit(placeholderText=empty, clearButtonEnabled=bool(empty))
         self._line.setAccessibleName(name)
         self._line.textChanged.connect(self.changed)
-        choose = button("choose", "Choose…", f"Choose {name.lower()}")
-        choose.clicked.connect(self.choose)
-        beside(self, self._line, choose, grows=self._line)
+        buttons = []
+        for one, ask in (("file", self.choose_file), ("folder", self.choose_folder)):
+            if kind in (one, "either"):
+                text = f"{one.capitalize()}…" if kind == "either" else "Choose…"
+                buttons.append(button(f"{one}Choice", text, f"Choose {name.lower()}"))
+                buttons[-1].clicked.connect(ask)
+        beside(self, self._line, *buttons, grows=self._line)
         self.setFocusProxy(self._line)
 
     @property
@@ -60,11 +64,12 @@ class PathField(QWidget):
         if path != self.path:
             self._line.setText(path)
 
-    def choose(self) -> None:
-        """Ask for a path in the system's dialog."""
-        if self._kind == "folder":
-            chosen = QFileDialog.getExistingDirectory(self, self.name, self.path)
-        else:
-            chosen, _ = QFileDialog.getOpenFileName(self, self.name, self.path, self._pattern)
-        if chosen:
-            self.set_path(chosen)
+    def choose_file(self) -> None:
+        """Ask for a file in the system's dialog."""
+        chosen, _ = QFileDialog.getOpenFileName(self, self.name, self.path, self._pattern)
+        self.set_path(chosen or self.path)
+
+    def choose_folder(self) -> None:
+        """Ask for a folder in the system's dialog."""
+        chosen = QFileDialog.getExistingDirectory(self, self.name, self.path)
+        self.set_path(chosen or self.path)

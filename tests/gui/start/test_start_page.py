@@ -13,7 +13,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
+    QDialog,
     QDoubleSpinBox,
     QFileDialog,
     QLabel,
@@ -245,6 +247,27 @@ def test_every_choice_reaches_the_settings(
     assert inspector.folders[-1] == Path("/Session folder")
     page.show_preferences(Preferences(station=StationSettings()))
     assert page.new.settings == StationSettings()
+
+
+def test_what_is_set_of_a_realsense_reaches_the_settings(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page(source="realsense", realsense=RealSenseSettings("42", preset="hand"))
+
+    def answer(result: QDialog.DialogCode) -> RealSenseSettings:
+        button(page, "editRealSense").click()
+        dialog = find(page, QDialog, "cameraSettings")
+        find(dialog, QCheckBox, "temporal").click()
+        dialog.done(result)
+        qtbot.waitUntil(lambda: page.findChild(QDialog, "cameraSettings") is None)
+        return page.new.settings.realsense
+
+    before = page.new.settings.realsense
+    assert answer(QDialog.DialogCode.Rejected) == before
+    chosen = answer(QDialog.DialogCode.Accepted)
+    assert chosen == replace(before, temporal_filter=True)
+    find(page, QLineEdit, "serial").setText("43")
+    assert page.new.settings.realsense == replace(chosen, serial="43")
 
 
 def test_the_gate_stays_open(open_page: Callable[..., StartPage]) -> None:

@@ -26,7 +26,7 @@ def test_a_file_or_a_folder_is_chosen_in_a_dialog(
     folder = PathField("Folder", "folder")
     for field in (file, folder):
         qtbot.addWidget(field)
-    button = file.findChild(QPushButton, "choose")
+    button = file.findChild(QPushButton, "fileChoice")
     assert isinstance(button, QPushButton)
     with qtbot.waitSignal(file.changed):
         button.click()
@@ -34,8 +34,20 @@ def test_a_file_or_a_folder_is_chosen_in_a_dialog(
     assert asked == [("Rig file", "", "Rig files (*.yaml)")]
     folder.set_path("/b")
     with qtbot.assertNotEmitted(folder.changed):
-        folder.choose()
+        folder.choose_folder()
     assert folder.path == "/b"
+
+
+def test_either_is_chosen_by_its_own_button(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("/a.db3", ""))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: "/b")
+    field = PathField("Recording", "either")
+    qtbot.addWidget(field)
+    buttons = field.findChildren(QPushButton)
+    assert [button.text() for button in buttons] == ["File…", "Folder…"]
+    for button, path in zip(buttons, ("/a.db3", "/b"), strict=True):
+        button.click()
+        assert field.path == path
 
 
 def test_blanks_around_a_typed_path_do_not_count(qtbot: QtBot) -> None:

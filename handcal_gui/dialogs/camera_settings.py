@@ -1,0 +1,171 @@
+"""How a RealSense is to be run."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.camera.settings import Preset, Profile, RealSenseSettings
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import beside, choice, named, paragraph, whole_number
+
+_AS_IT_IS = "As the camera has it"
+_PROFILES: dict[Profile, str] = {
+    "auto": "Largest on offer",
+    "1280x720": "1280 × 720 px",
+    "848x480": "848 × 480 px",
+}
+_PRESETS: dict[Preset | Literal[""], str] = {
+    "": _AS_IT_IS,
+    "default": "Default",
+    "hand": "Hand",
+    "high_accuracy": "High accuracy",
+    "high_density": "High density",
+    "medium_density": "Medium density",
+}
+
+
+class CameraSettingsDialog(QDialog):
+    """Image size, preset, exposure, laser power and filters.
+
+    Parameters
+    ----------
+    settings : RealSenseSettings
+        As they are now; the serial number is not shown, and stays.
+    """
+
+    def __init__(self, settings: RealSenseSettings, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("cameraSettings")
+        self.setWindowTitle("Camera settings")
+        self._serial = settings.serial
+        self._profile = choice(
+            "profile", "Image size", _PROFILES, "Of depth and colour alike, at 30 Hz."
+        )
+        self._preset = choice(
+            "preset",
+            "Depth preset",
+            _PRESETS,
+            "The RealSense SDK's visual preset, but for what is set below.",
+        )
+        self._exposure = _OwnNumber(
+            "Exposure",
+            _number("exposure", 1, 200_000, 500, " µs", "Of the depth; a frame lasts 33,333 µs."),
+            "Automatic",
+            8_500,
+        )
+        self._laser = _OwnNumber(
+            "Laser power",
+            _number("laser", 0, 360, 30, " mW", "Of the projector; 0 mW switches it off."),
+            _AS_IT_IS,
+            150,
+        )
+        self._spatial = _filter("spatial", "Spatial", "Smooths each depth image, keeping edges.")
+        self._temporal = _filter("temporal", "Temporal", "Averages over the last depth images.")
+        self._holes = _filter("holes", "Hole filling", "Makes up depth where none was measured.")
+        self._lay_out()
+        self._show(settings)
+
+    def settings(self) -> RealSenseSettings:
+        """Return the settings shown."""
+        return RealSenseSettings(
+            serial=self._serial,
+            profile=self._profile.currentData(),
+            preset=self._preset.currentData() or None,
+            exposure_us=self._exposure.value,
+            laser_power_mw=self._laser.value,
+            spatial_filter=self._spatial.isChecked(),
+            temporal_filter=self._temporal.isChecked(),
+            hole_filling=self._holes.isChecked(),
+        )
+
+    def _show(self, settings: RealSenseSettings) -> None:
+        self._profile.setCurrentIndex(self._profile.findData(settings.profile))
+        self._preset.setCurrentIndex(self._preset.findData(settings.preset or ""))
+        self._exposure.show_value(settings.exposure_us)
+        self._laser.show_value(settings.laser_power_mw)
+        self._spatial.setChecked(settings.spatial_filter)
+        self._temporal.setChecked(settings.temporal_filter)
+        self._holes.setChecked(settings.hole_filling)
+
+    def _lay_out(self) -> None:
+        filters = QWidget()
+        beside(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
+        form = QFormLayout()
+        form.setSpacing(SPACING_PX)
+        form.addRow("Image size", self._profile)
+        form.addRow("Depth preset", self._preset)
+        form.addRow("Exposure", self._exposure)
+        form.addRow("Laser power", self._laser)
+        form.addRow("Depth filters", filters)
+        form.addRow("", paragraph(text="Filters smooth and invent: calibrate without them."))
+        standard = QDialogButtonBox.StandardButton
+        buttons = QDialogButtonBox(standard.Ok | standard.Cancel | standard.RestoreDefaults)
+        for one in buttons.buttons():
+            one.setIcon(QIcon())  # as all other buttons
+        restore = named(buttons.button(standard.RestoreDefaults), "restore", "Restore defaults")
+        restore.setText("Restore defaults")
+        restore.clicked.connect(lambda: self._show(RealSenseSettings()))
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(2 * SPACING_PX)
+        layout.addLayout(form)
+        layout.addWidget(buttons)
+
+
+class _OwnNumber(QWidget):
+    """A number, unless that is left to the camera.
+
+    Parameters
+    ----------
+    label : str
+        Said to those who do not see the form.
+    number : QSpinBox
+    left : str
+        What to call leaving it to the camera.
+    usual : int
+        To begin with, once it is not.
+    """
+
+    def __init__(self, label: str, number: QSpinBox, left: str, usual: int) -> None:
+        super().__init__()
+        self._number, self._usual = number, usual
+        number.setAccessibleName(label)
+        self._left = named(
+            QCheckBox(left), f"{number.objectName()}Left", f"{label}: {left}", number.toolTip()
+        )
+        self._left.toggled.connect(number.setDisabled)
+        beside(self, number, self._left, grows=self._left)
+
+    @property
+    def value(self) -> float | None:
+        """The number; None if it is left to the camera."""
+        return None if self._left.isChecked() else float(self._number.value())
+
+    def show_value(self, value: float | None) -> None:
+        """Show a number, or that it is left to the camera."""
+        self._left.setChecked(value is None)
+        self._number.setValue(round(self._usual if value is None else value))
+
+
+def _number(name: str, low: int, high: int, step: int, unit: str, help_text: str) -> QSpinBox:
+    field = whole_number(name, low, high, help_text)
+    field.setSingleStep(step)
+    field.setSuffix(unit)
+    return field
+
+
+def _filter(name: str, text: str, help_text: str) -> QCheckBox:
+    return named(QCheckBox(text), name, f"{text} filter", help_text)
