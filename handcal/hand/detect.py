@@ -37,7 +37,7 @@ class DetectSettings:
 
     pixels: int = 92_160
     score_min: float = 0.3
-    overlap_max: float = 0.5
+    overlap_max: float = 0.4
     hands: int = 20
 
 

@@ -45,6 +45,8 @@ class RoiSettings:
         While there is none, the detector looks this often.
     misses : int
         A followed hand that the detector does not see in so many looks in a row is dropped.
+    filled_min : float
+        Share of a hand's box that is at the hand's depth.
     side_min_m, side_max_m : float
         Range of the square root of a hand's box's area, at its depth.
     """
@@ -53,6 +55,7 @@ class RoiSettings:
     check_s: float = 0.15
     search_s: float = 0.06
     misses: int = 2
+    filled_min: float = 0.25
     side_min_m: float = 0.05
     side_max_m: float = 0.30
 
@@ -109,11 +112,13 @@ class RoiFinder:
 
     def _look(self, color: UInt8, cloud: _CoarseCloud) -> None:
         """Let the detector confirm the track, drop it, or begin one."""
-        hands = [
-            track
-            for box in self._detector.detect(color).boxes_px
-            if (track := cloud.track(box)) is not None and self._is_hand_sized(track, cloud)
-        ]
+        hands: list[_Track] = []
+        for box in self._detector.detect(color).boxes_px:
+            hand = cloud.track(box)
+            if hand is None or not self._is_plausible(hand, cloud):
+                continue
+            if not any(_on_one_hand(hand, surer) for surer in hands):
+                hands.append(hand)
         if self._track is not None:
             same = [hand for hand in hands if _overlap(hand, self._track) >= _SAME_OVERLAP]
             self._misses = 0 if same else self._misses + 1
@@ -125,10 +130,15 @@ class RoiFinder:
             self._misses = 0
             self._track = min(hands, key=self._order, default=None)
 
-    def _is_hand_sized(self, track: _Track, cloud: _CoarseCloud) -> bool:
+    def _is_plausible(self, track: _Track, cloud: _CoarseCloud) -> bool:
+        """Tell whether what is in a box is of a hand's size and fills it as a hand does."""
+        settings = self._settings
         side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
         side_m = side_px * track.depth_m / cloud.camera.fx
-        return bool(self._settings.side_min_m <= side_m <= self._settings.side_max_m)
+        filled = track.pixels * _STEP_PX**2 / side_px**2
+        return bool(
+            settings.side_min_m <= side_m <= settings.side_max_m and filled >= settings.filled_min
+        )
 
     def _order(self, track: _Track) -> float:
         if self._settings.wanted == "nearest":
@@ -212,6 +222,14 @@ def _inside(px: Float64, box: Float64) -> Bool:
 def _center(box: Float64) -> Float64:
     center: Float64 = (box[:2] + box[2:]) / 2.0
     return center
+
+
+def _on_one_hand(track: _Track, other: _Track) -> bool:
+    """Tell whether one of two boxes holds the other's centre."""
+    return bool(
+        _inside(_center(track.box)[None], other.box).any()
+        or _inside(_center(other.box)[None], track.box).any()
+    )
 
 
 def _overlap(track: _Track, other: _Track) -> float:

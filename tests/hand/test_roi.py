@@ -67,6 +67,17 @@ def test_what_has_not_a_hands_size_is_none(box: Box) -> None:
     assert finder(Eyes([box])).find(frame(0, (box, 0.5))) is None
 
 
+def test_what_does_not_fill_its_box_is_none() -> None:
+    corner = NEAR[0], NEAR[1], NEAR[0] + 60, NEAR[1] + 60
+    assert finder(Eyes([NEAR])).find(frame(0, (corner, 0.5))) is None
+
+
+def test_of_two_boxes_on_one_hand_the_surer() -> None:
+    nearer_part = 110, 110, 190, 200
+    eyes = Eyes([NEAR, nearer_part])
+    assert finder(eyes).find(frame(0, (NEAR, 0.5), (nearer_part, 0.48))) == NEAR
+
+
 def test_without_colour_there_is_no_box() -> None:
     eyes = Eyes([NEAR])
     blind = replace(frame(0, (NEAR, 0.5)), color=None, color_intrinsics=None)

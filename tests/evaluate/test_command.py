@@ -1,0 +1,42 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.__main__ import main
+
+
+def evaluate(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
+    monkeypatch.setattr("sys.argv", ["handcal", "evaluate", "detector", *map(str, arguments)])
+    main()
+
+
+def test_writes_the_figures_and_the_failures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((96, 128, 3), 127, np.uint8))
+    box = [10, 10, 60, 60]
+    quad = [[10, 10], [60, 10], [60, 60], [10, 60]]
+    hands = [{"box": box, "quad": quad, "large": True}]
+    annotations = tmp_path / "annotations.json"
+    annotations.write_text(json.dumps({"a.png": {"width": 128, "height": 96, "hands": hands}}))
+    figures, sheet = tmp_path / "out" / "figures.json", tmp_path / "out" / "sheet.png"
+    files = ("--images", tmp_path, "--annotations", annotations)
+    evaluate(monkeypatch, *files, "--json", figures, "--sheet", sheet)
+    result = json.loads(figures.read_text())
+    # No hand is in the gray picture, whatever the annotations say.
+    assert result["ap50"] == result["ap50_large"] == result["ap50_rel15"] == 0.0
+    assert (result["images"], result["hands"]) == (1, 1)
+    assert cv2.imread(str(sheet)) is not None
+
+
+def test_a_missing_file_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = tmp_path / "no.json"
+    with pytest.raises(SystemExit) as ended:
+        evaluate(monkeypatch, "--images", tmp_path, "--annotations", missing)
+    assert ended.value.code == 1
+    assert "no.json" in capsys.readouterr().err
