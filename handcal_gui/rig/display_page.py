@@ -77,9 +77,9 @@ class DisplayPage(StepPage):
         form = EntriesForm(
             {
                 "grid_images": ("Images of the grid", PathField("Grid images", "folder")),
+                "square_px": ("Grid's squares", square),
                 "board_images": ("Images of the board", PathField("Board images", "folder")),
                 "tracked": ("Board's poses", tracked),
-                "square_px": ("Grid's squares", square),
                 "stereo": ("or a stereo calibration", stereo),
                 "distance": ("Distance z(C0→S)", distance),
                 "distance_m": ("measured", distance_m),

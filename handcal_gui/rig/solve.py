@@ -80,9 +80,7 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
         stereo=result,
         made=_now(),
         depth_intrinsics=_intrinsics(entries.imager_intrinsics),
-        T_C_D=read_pose(Path(entries.depth_to_color).expanduser())
-        if entries.depth_to_color
-        else None,
+        T_C_D=_pose(entries.depth_to_color),
     )
     return Solved(
         result.verdict,
@@ -180,6 +178,10 @@ def _tilts(views: Sequence[View], camera: Intrinsics) -> dict[str, float]:
 
 def _intrinsics(path: str) -> Intrinsics | None:
     return read_intrinsics(Path(path).expanduser()) if path else None
+
+
+def _pose(path: str) -> Float64 | None:
+    return read_pose(Path(path).expanduser()) if path else None
 
 
 def _now() -> str:

@@ -39,6 +39,11 @@ class TakeDialog(QDialog):
         Looked for in each image taken.
     open_camera : callable
         Given a source and the folder above the images', opens a camera.
+
+    Attributes
+    ----------
+    shown_images : tuple of (H, W, 3) uint8, or None
+        What is seen now; None while no camera is shown.
     """
 
     def __init__(
@@ -54,7 +59,7 @@ class TakeDialog(QDialog):
         self._folders, self._board = dict(folders), board
         self._open_camera = open_camera
         self._live: LiveImages | None = None
-        self._shown: Images | None = None
+        self.shown_images: Images | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in folders}
         self._views = {title: ImageView(title) for title in folders}
         self._found = FindingLine("taken")
@@ -97,7 +102,7 @@ class TakeDialog(QDialog):
 
     def take(self) -> None:
         """Keep the images shown, and look for the board in them."""
-        images = self._shown
+        images = self.shown_images
         if images is None or self._bar.is_busy:
             return
 
@@ -113,10 +118,11 @@ class TakeDialog(QDialog):
         super().done(result)
 
     def _poll(self) -> None:
-        if self._live is None or self._live.newest is None or self._live.newest is self._shown:
+        newest = self._live.newest if self._live is not None else None
+        if newest is None or newest is self.shown_images:
             return
-        self._shown = self._live.newest
-        for view, image in zip(self._views.values(), self._shown, strict=True):
+        self.shown_images = newest
+        for view, image in zip(self._views.values(), newest, strict=True):
             view.show_text()
             view.show_image(image)
         self._refresh()
@@ -126,7 +132,7 @@ class TakeDialog(QDialog):
         if self._live is not None:
             self._live.stop()
             self._live = None
-        self._shown = None
+        self.shown_images = None
         self._refresh()
 
     def _show_failure(self, why: str) -> None:
@@ -145,7 +151,7 @@ class TakeDialog(QDialog):
         self._found.show_finding(found)
 
     def _refresh(self) -> None:
-        self._take.setEnabled(self._shown is not None and not self._bar.is_busy)
+        self._take.setEnabled(self.shown_images is not None and not self._bar.is_busy)
 
     def _lay_out(self) -> None:
         grid = QGridLayout()

@@ -1,0 +1,68 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.errors import CancelledError, FileError
+from handcal.rig.views import ViewsError
+from handcal_gui.rig.shots import keep_images, look, read_color, without
+
+
+def silent(_what: str, _share: float) -> None:
+    pass
+
+
+def go_on() -> bool:
+    return False
+
+
+def test_pairs_are_looked_through(photographs: Any) -> None:
+    told: list[float] = []
+    folders = [photographs.folder / name for name in ("depth", "headset")]
+    shots = look(folders, photographs.work.board, lambda _, share: told.append(share), go_on)
+    assert [shot.name for shot in shots][::8] == ["depth-001.png", "depth-099.png"]
+    assert shots[0].files == tuple(folder / f"{folder.name}-001.png" for folder in folders)
+    assert all(view.found for shot in shots[:8] for view in shot.views)
+    assert shots[8].problem
+    assert shots[0].small is not None
+    assert max(shots[0].small.shape) == 96
+    assert told == sorted(told)
+    assert 0.9 < told[-1] < 1.0
+
+
+def test_what_is_left_out_is_marked(photographs: Any) -> None:
+    shots = look([photographs.folder / "grid"], photographs.work.board, silent, go_on)
+    views = without(shots, ["grid-002.png"])
+    assert [[view.dropped for view in one] for one in views] == [[False], [True]]
+
+
+def test_looking_can_be_given_up(photographs: Any) -> None:
+    with pytest.raises(CancelledError):
+        look([photographs.folder / "depth"], photographs.work.board, silent, lambda: True)
+
+
+def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path: Path) -> None:
+    keep_images(
+        [np.zeros((100, 100, 3), np.uint8)] * 2,
+        [tmp_path / "a", tmp_path / "b"],
+        photographs.work.board,
+    )
+    (tmp_path / "b" / "b-001.png").rename(tmp_path / "b" / "b-7.png")
+    with pytest.raises(ViewsError, match="belong together"):
+        look([tmp_path / "a", tmp_path / "b"], photographs.work.board, silent, go_on)
+
+
+def test_an_empty_folder_is_told(photographs: Any, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no PNG"):
+        look([tmp_path], photographs.work.board, silent, go_on)
+
+
+def test_images_are_kept_under_the_next_number(photographs: Any, tmp_path: Path) -> None:
+    folders = tmp_path / "depth", tmp_path / "headset"
+    images = photographs.image("depth"), photographs.image("headset")
+    keep_images(images[:1], folders[:1], photographs.work.board)
+    views = keep_images(images, folders, photographs.work.board)
+    assert [view.name for view in views] == ["depth-002.png", "headset-002.png"]
+    assert all(view.found for view in views)
+    np.testing.assert_array_equal(read_color(folders[1] / "headset-002.png"), images[1])
