@@ -91,9 +91,10 @@ def _station(settings: StationSettings, arguments: argparse.Namespace) -> Statio
         case "realsense":
             settings = replace(settings, source="realsense", headset="network")
         case path:
-            settings = replace(settings, source="recording", recording=path, headset="virtual")
+            recording = str(Path(path).absolute())  # remembered, to be found from any folder
+            settings = replace(settings, source="recording", recording=recording, headset="virtual")
     if arguments.rig:
-        settings = replace(settings, rig=str(arguments.rig))
+        settings = replace(settings, rig=str(arguments.rig.absolute()))
     if arguments.seed is not None:
         settings = replace(settings, seed=arguments.seed)
     return settings
