@@ -32,6 +32,7 @@ from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review import Review
 from handcal_gui.review.review_page import ReviewPage
 from handcal_gui.rig.wizard import RigWizard
+from handcal_gui.rig.work import WorkFolder
 from handcal_gui.running.live import Live
 from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import use_theme
@@ -161,7 +162,7 @@ class Program(QObject):
     def calibrate_rig(self) -> RigWizard | None:
         """Lead through the offline calibration; None if what is entered could not be kept."""
         try:
-            wizard = RigWizard(self._file.path.parent / "rig", self.window)
+            wizard = RigWizard(WorkFolder(self._file.path.parent / "rig"), self.window)
         except FileError as error:
             self.window.banner.show_message(str(error))
             return None

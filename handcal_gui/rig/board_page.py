@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.doctor import Finding, Health
-from handcal.errors import FileError
+from handcal.errors import FileError, HandcalError
 from handcal.files import write_atomic
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import Paper, draw_board, write_board_pdf
@@ -56,9 +56,9 @@ class BoardPage(QWidget):
         self._columns = whole_number("columns", 3, 40, squares_help)
         self._rows = whole_number("rows", 3, 40, squares_help)
         self._square = number(
-            "square", 1.0, 1000.0, 0.1, " mm", "Side of a square: measure it on the print."
+            "square", 1.0, 1000.0, 0.05, " mm", "Side of a square: measure it on the print."
         )
-        self._marker = number("marker", 0.3, 950.0, 0.1, " mm", "Side of a marker, as measured.")
+        self._marker = number("marker", 0.3, 950.0, 0.05, " mm", "Side of a marker, as measured.")
         self._dictionary = choice(
             "dictionary", "Dictionary", {name: name for name in DICTIONARIES}, "Of the markers."
         )
@@ -162,7 +162,7 @@ class BoardPage(QWidget):
             return
         try:
             self._draft.begin_from(Path(path))
-        except FileError as error:
+        except HandcalError as error:
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _may_give_up(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from handcal.errors import FileError
+from handcal.errors import FileError, HandcalError
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
 from handcal_gui.rig.solve import Solved
@@ -68,28 +68,31 @@ class Draft(QObject):
             self.entered.emit()
 
     def begin_from(self, path: Path) -> None:
-        """Begin from a rig file, or raise FileError; what was calibrated before is given up."""
+        """Begin from a rig file, or raise HandcalError; what was calibrated before is given up."""
         self.take_rig(read_rig(path))
 
     def take_part(self, solved: Solved) -> str:
         """Put a calibrated part into the rig; return what became of it, for a person to read."""
         if solved.put is None:
             return "it was not put into the rig"
-        return self.take_rig(solved.put(self.rig))
+        try:
+            self.take_rig(solved.put(self.rig))
+        except HandcalError as error:
+            return f"it was not put into the rig: {error}"
+        return "it is in the rig now"
 
     def camera_solved(self) -> None:
         """Say that the viewpoint camera's intrinsics may be others now."""
         self.rig_changed.emit()
 
-    def take_rig(self, rig: Rig) -> str:
-        """Take another rig; return what became of it, for a person to read."""
+    def take_rig(self, rig: Rig) -> None:
+        """Take another rig, or raise HandcalError if it is implausible or cannot be kept."""
         try:
             self.folder.save_rig(rig)
-        except (FileError, ValueError) as error:
-            return f"it was not put into the rig: {error}"
+        except ValueError as error:
+            raise HandcalError(f"this is no plausible rig: {error}") from error
         self.rig = rig
         self.rig_changed.emit()
-        return "it is in the rig now"
 
     def save(self) -> None:
         """Keep the entries."""

@@ -18,11 +18,10 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.doctor import Finding, Health
-from handcal.errors import FileError
+from handcal.errors import FileError, HandcalError
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.types import Rig
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.finding_list import FindingList
 from handcal_gui.rig.rows import COLUMNS, difference_rows, rig_rows
@@ -61,7 +60,9 @@ class ResultPage(QWidget):
         self._save = main_button("saveRig", "Save rig file…")
         self._use = button("useRig", "Use for the next calibration")
         self._lay_out()
+        self.enter()
         self._other.changed.connect(self._compare)
+        self._name.editingFinished.connect(self._take_name)
         self._save.clicked.connect(self.save)
         self._use.clicked.connect(self._ask_to_use)
         draft.rig_changed.connect(self.enter)
@@ -91,26 +92,28 @@ class ResultPage(QWidget):
 
     def save_as(self, path: Path) -> None:
         """Save the rig file."""
-        rig = self._named_rig()
+        self._take_name()
         try:
-            write_rig(path, rig)
-        except (ValueError, FileError) as error:
+            write_rig(path, self._draft.rig)
+        except FileError as error:
             self._end.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
             return
-        if rig.name != self._draft.rig.name:
-            self._draft.take_rig(rig)
         self._saved = path.absolute()
         self._use.setEnabled(True)
         self._end.show_finding(Finding("", Health.GOOD, f"saved as {path}"))
 
     def stop(self) -> None:
-        """Keep the name; nothing runs in the background."""
-        rig = self._named_rig()
-        if rig.name and rig.name != self._draft.rig.name:
-            self._draft.take_rig(rig)
+        """Nothing runs in the background."""
 
-    def _named_rig(self) -> Rig:
-        return replace(self._draft.rig, name=self._name.text().strip())
+    def _take_name(self) -> None:
+        name = self._name.text().strip()
+        if name == self._draft.rig.name:
+            return
+        try:
+            self._draft.take_rig(replace(self._draft.rig, name=name))
+        except HandcalError as error:
+            self._name.setText(self._draft.rig.name)
+            self._end.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _ask_to_use(self) -> None:
         if self._saved is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
@@ -59,28 +58,23 @@ class RigWizard(QDialog):
 
     Parameters
     ----------
-    folder : Path
-        Created if needed; a later wizard goes on from there.
+    folder : WorkFolder
+        A later wizard goes on from there.
 
     Attributes
     ----------
     rig_saved : Signal(Path)
         A rig file to be used for the next calibration.
     draft : Draft
-
-    Raises
-    ------
-    FileError
-        If the folder cannot be created.
     """
 
     rig_saved = Signal(object)
 
-    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+    def __init__(self, folder: WorkFolder, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
         self.setWindowTitle("Calibrate a rig")
-        self.draft = Draft(WorkFolder(folder), self)
+        self.draft = Draft(folder, self)
         self._banner = Banner()
         self._rail = named(QListWidget(), "rigRail", "Steps")
         self._title, self._purpose = QLabel(), QLabel()

@@ -32,7 +32,7 @@ def folder(photographs: Any, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def wizard(qtbot: QtBot, folder: Path) -> Iterator[RigWizard]:
-    wizard = RigWizard(folder)
+    wizard = RigWizard(WorkFolder(folder))
     qtbot.addWidget(wizard)
     wizard.show()
     yield wizard
@@ -92,7 +92,7 @@ def test_a_rig_is_calibrated_saved_and_used(
     np.testing.assert_array_equal(rig.eyes["right"].K, truth.eyes["right"].K)
     # Nothing of it is lost by closing.
     wizard.accept()
-    again = RigWizard(folder)
+    again = RigWizard(WorkFolder(folder))
     qtbot.addWidget(again)
     assert marks(again) == marks(wizard)
     assert again.draft.rig.name == "Our headset"
