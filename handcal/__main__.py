@@ -19,6 +19,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.export.formats import FORMATS
 from handcal.files import make_folder
 from handcal.rig_commands import add_rig_commands
+from handcal.rig_file_commands import add_rig_file_commands
 from handcal.terminal import Parser, add_command, console, fail, number, progress, save, table
 from handcal.types import METHODS
 
@@ -387,7 +388,9 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "The offline calibration: boards, cameras, displays, and the rig file made of them."
     rig = commands.add_parser("rig", help=text, description=text)
-    add_rig_commands(rig.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser))
+    steps = rig.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
+    add_rig_commands(steps)
+    add_rig_file_commands(steps)
     return parser
 
 

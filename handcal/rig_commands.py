@@ -1,4 +1,4 @@
-"""``handcal rig …``: the offline calibration from the command line.
+"""``handcal rig board, camera, stereo, convert``: boards and cameras from the command line.
 
 Each command reads images or files, says what was found and how far to trust it, and writes one
 part; they import what they need when they run.
@@ -131,11 +131,10 @@ def convert(arguments: argparse.Namespace) -> None:
 
 
 def add_rig_commands(commands: Commands) -> None:
-    """Add the commands below ``handcal rig``."""
+    """Add ``handcal rig board, camera, stereo, convert``."""
     from handcal.rig.board_print import PAPERS
     from handcal.rig.camera import LensModel
     from handcal.rig.formats import FORMATS
-    from handcal.rig_file_commands import add_rig_file_commands
 
     one = add_command(commands, board, json=False)
     add_board_options(one)
@@ -167,8 +166,6 @@ def add_rig_commands(commands: Commands) -> None:
     one.add_argument("input", type=Path, help="any of the formats")
     one.add_argument("output", type=Path, help="the file to write")
     one.add_argument("--format", choices=FORMATS, required=True, help="of the output")
-
-    add_rig_file_commands(commands)
 
 
 def add_board_options(command: Parser) -> None:

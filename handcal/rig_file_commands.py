@@ -117,7 +117,7 @@ def migrate(arguments: argparse.Namespace) -> None:
 
 
 def add_rig_file_commands(commands: Commands) -> None:
-    """Add the commands below ``handcal rig``."""
+    """Add ``handcal rig grid, display, make, check, compare, migrate``."""
     from handcal.types import EYES
 
     one = add_command(commands, grid, json=False)

@@ -18,7 +18,7 @@ from handcal.rig.example import FOCAL_PX, example_rig
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.tracked_file import write_tracked
-from handcal.rig_commands import add_rig_commands
+from handcal.rig_file_commands import add_rig_file_commands
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
 from handcal.terminal import Parser
@@ -31,7 +31,7 @@ PICTURES = PictureSettings(samples=1)
 
 def run(*words: object) -> None:
     parser = Parser(prog="handcal rig")
-    add_rig_commands(parser.add_subparsers(required=True, parser_class=Parser))
+    add_rig_file_commands(parser.add_subparsers(required=True, parser_class=Parser))
     arguments = parser.parse_args([str(word) for word in words])
     arguments.command(arguments)
 
