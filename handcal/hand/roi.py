@@ -52,7 +52,7 @@ class RoiSettings:
     """
 
     wanted: Wanted = "nearest"
-    check_s: float = 0.15
+    check_s: float = 0.19
     search_s: float = 0.06
     misses: int = 2
     filled_min: float = 0.25

@@ -24,7 +24,7 @@ from handcal.types import UInt8
 
 _OVERLAP = 0.5
 # Luminance of the skin in even light that parts three groups of about the same size.
-_TONES = {"dark": 0.0, "medium": 117.0, "light": 157.0}
+_TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
 _RUNS = 50
 
 
