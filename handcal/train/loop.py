@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -49,7 +50,7 @@ class TrainSettings:
     """
 
     seed: int = 1
-    steps: int = 6000
+    steps: int = 60_000
     batch: int = 8
     rate: float = 1e-3
     backbone_rate: float = 3e-4
@@ -285,7 +286,5 @@ def _grid(height: int, width: int, device: torch.device) -> Grid:
 
 
 def _quiet_worker(_: int) -> None:
-    import cv2
-
     cv2.setNumThreads(0)
     torch.set_num_threads(1)
