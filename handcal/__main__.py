@@ -78,24 +78,19 @@ def solve(arguments: argparse.Namespace) -> None:
     """Solve a session's alignments again; the session itself stays as it is."""
     import numpy as np
 
-    from handcal.calibrate import CalibrationSettings
-    from handcal.config import read_settings
-    from handcal.results import results_json, solve_session
+    from handcal.results import results_json
     from handcal.session import Session
+    from handcal.solve_again import solve_again, stored_solve_settings
 
     record = Session.open(arguments.session)
     if record.torn_bytes:
         console.print("The journal's last line is unfinished, as after a crash, and left out.")
-    if not record.alignments:
-        raise FileError(f"{arguments.session} holds no alignment to solve")
-    calibration = read_settings(CalibrationSettings, record.settings.get("calibration", {}))
-    settings = calibration.solve
+    settings = stored_solve_settings(record)
     if arguments.method:
         settings = replace(settings, method=arguments.method)
-    try:
-        results = solve_session(record.alignments, record.rig, settings)
-    except ValueError as error:
-        raise FileError(f"{arguments.session} cannot be solved: {error}") from error
+    results = solve_again(record, settings)
+    if results is None:
+        raise FileError(f"{arguments.session} holds no alignment to solve")
     save(arguments.json, results_json(results))
     shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.shifts.items():

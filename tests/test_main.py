@@ -326,7 +326,7 @@ def test_a_session_that_cannot_be_solved_says_why(
         in fails("solve", stored("few", alignment))[1]
     )
     odd = stored("odd", alignment, calibration={"solve": {"method": "guess"}})
-    assert "settings.solve.method must be one of paper, linear" in fails("solve", odd)[1]
+    assert "calibration.solve.method must be one of paper, linear" in fails("solve", odd)[1]
 
 
 def test_a_session_is_exported_in_the_formats_asked_for(

@@ -8,12 +8,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.calibrate import CalibrationSettings
-from handcal.config import read_settings
 from handcal.display import projection_matrix
-from handcal.errors import FileError
-from handcal.results import Results, SolveSettings, solve_session
+from handcal.results import Results, SolveSettings
 from handcal.session import SessionRecord
+from handcal.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, Eye, Float64, Projection
 
 Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
@@ -90,15 +88,8 @@ def conclude(
     FileError
         If its settings are unreadable or an alignment cannot be solved.
     """
-    settings = read_settings(CalibrationSettings, record.settings.get("calibration", {})).solve
-    results = None
-    if record.alignments:
-        try:
-            results = solve_session(
-                record.alignments, record.rig, settings, lambda _what, share: checkpoint(share)
-            )
-        except ValueError as error:
-            raise FileError(f"{record.path} cannot be solved: {error}") from error
+    settings = stored_solve_settings(record)
+    results = solve_again(record, settings, lambda _what, share: checkpoint(share))
     return Outcome(
         record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
     )

@@ -8,11 +8,9 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
-from handcal.calibrate import CalibrationSettings
-from handcal.config import read_settings
-from handcal.errors import FileError
-from handcal.results import Results, SolveSettings, solve_session
+from handcal.results import Results, SolveSettings
 from handcal.session import Session, SessionRecord
+from handcal.solve_again import solve_again, stored_solve_settings
 from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review_page import ReviewPage
 from handcal_gui.running.jobs import IsCancelled, Job, Report
@@ -64,17 +62,8 @@ class Review(QObject):
 
         def work(report: Report, is_cancelled: IsCancelled) -> _Stored:
             record = Session.open(path)
-            stored = record.settings.get("calibration", {})
-            where = f"{path / 'settings.json'}: calibration"
-            settings = read_settings(CalibrationSettings, stored, where).solve
-            if not record.alignments:
-                return _Stored(record, settings, None)
-            try:
-                results = solve_session(
-                    record.alignments, record.rig, settings, report, is_cancelled
-                )
-            except ValueError as error:
-                raise FileError(f"{path} cannot be solved: {error}") from error
+            settings = stored_solve_settings(record)
+            results = solve_again(record, settings, report, is_cancelled)
             return _Stored(record, settings, results)
 
         self._job = Job(work, self)

@@ -1,0 +1,47 @@
+"""A stored session solved again, as it was or with another method; the session stays as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from handcal.calibrate import CalibrationSettings
+from handcal.config import read_settings
+from handcal.errors import FileError
+from handcal.results import Results, SolveSettings, solve_session
+from handcal.session import SessionRecord
+
+
+def stored_solve_settings(record: SessionRecord) -> SolveSettings:
+    """Return how a session was solved; FileError if its settings cannot be read."""
+    where = f"{record.path / 'settings.json'}: calibration"
+    return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
+
+
+def solve_again(
+    record: SessionRecord,
+    settings: SolveSettings,
+    report: Callable[[str, float], object] = lambda *_: None,
+    is_cancelled: Callable[[], bool] = lambda: False,
+) -> Results | None:
+    """Return what a session's alignments say; None if there are none.
+
+    Parameters
+    ----------
+    record : SessionRecord
+    settings : SolveSettings
+    report, is_cancelled : callable
+        As `solve_session` takes them.
+
+    Raises
+    ------
+    FileError
+        If an alignment cannot be solved.
+    CancelledError
+        If it was cancelled.
+    """
+    if not record.alignments:
+        return None
+    try:
+        return solve_session(record.alignments, record.rig, settings, report, is_cancelled)
+    except ValueError as error:
+        raise FileError(f"{record.path} cannot be solved: {error}") from error
