@@ -75,7 +75,6 @@ class ReviewPage(QWidget):
             self._facts.removeRow(0)
         for name, fact in _facts(record, results, note):
             text = paragraph(f"review{name.replace(' ', '')}", fact)
-            text.setTextFormat(Qt.TextFormat.PlainText)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(name, text)
 

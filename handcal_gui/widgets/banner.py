@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.widgets.fields import paragraph
 
 
 class Banner(QWidget):
@@ -21,8 +22,7 @@ class Banner(QWidget):
         self._message = ""
         self._condition = ""
         self._icon = QLabel()
-        self._text = QLabel(wordWrap=True)
-        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._text = paragraph()
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         close = QToolButton(autoRaise=True)
         close.setText("Close")
@@ -66,7 +66,7 @@ class Banner(QWidget):
 
     def _refresh(self) -> None:
         self._icon.setPixmap(icon("warning").pixmap(2 * SPACING_PX))
-        self._text.setText(self.text)
+        self._text.setText(self.text[:1].upper() + self.text[1:])
         self._close.setVisible(bool(self._message))
         self.setStyleSheet(f"#banner {{ border: 1px solid {colors().red}; border-radius: 4px; }}")
         self.setVisible(bool(self.text))

@@ -95,8 +95,8 @@ def tool_button() -> QToolButton:
 
 
 def paragraph(name: str = "", text: str = "") -> QLabel:
-    """Return a label whose text is wrapped and takes the width that there is."""
-    label = QLabel(text, wordWrap=True)
+    """Return a label whose text is shown as it is, wrapped, and takes the width that there is."""
+    label = QLabel(text, wordWrap=True, textFormat=Qt.TextFormat.PlainText)
     label.setObjectName(name)
     label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
     return label
