@@ -34,7 +34,7 @@ class CoverageMap(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._title = title
         self._coverage: Coverage | None = None
-        self.setFixedSize(8 * _SIDE_PX + 1, 6 * _SIDE_PX + 3 * SPACING_PX)
+        self.setFixedSize(8 * _SIDE_PX + 1, 6 * _SIDE_PX + 3 * SPACING_PX + 1)
 
     def show_coverage(self, coverage: Coverage | None) -> None:
         """Show how the corners lie; None before there are any."""
@@ -73,7 +73,7 @@ class CoverageMap(QWidget):
         painter.fillRect(cell, self.palette().base())
         painter.fillRect(cell, fill)
         painter.setPen(QColor(colors().muted))
-        painter.drawRect(cell.adjusted(0, 0, 0, -1))
+        painter.drawRect(cell)
         if hits:
             painter.setPen(self.palette().windowText().color())
             painter.drawText(cell, Qt.AlignmentFlag.AlignCenter, str(hits))

@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
@@ -156,7 +156,7 @@ class ResultPage(QWidget):
         form.addRow("Name", self._name)
         foot = QHBoxLayout()
         foot.setSpacing(2 * SPACING_PX)
-        foot.addWidget(self._end, 1)
+        foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
         foot.addWidget(self._use)
         foot.addWidget(self._save)
         layout = QVBoxLayout(self)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QImage, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
@@ -99,6 +99,13 @@ class ShotList(QTreeWidget):
             _note(item, item.data(_IMAGE, _PROBLEM) or note)
         self.blockSignals(False)
 
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw the signs when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            for item in self._items():
+                _mark(item)
+
     def _choose(self, item: QTreeWidgetItem | None) -> None:
         self.chosen.emit(-1 if item is None else self.indexOfTopLevelItem(item))
 
@@ -126,10 +133,14 @@ def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:
     for column in (_CORNERS, _OFF, _TILT):
         item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         item.setFont(column, number_font())
-    if shot.problem:
-        item.setIcon(_CORNERS, icon("warning"))
+    _mark(item)
     _note(item, shot.problem)
     return item
+
+
+def _mark(item: QTreeWidgetItem) -> None:
+    if item.data(_IMAGE, _PROBLEM):
+        item.setIcon(_CORNERS, icon("warning"))
 
 
 def _name(item: QTreeWidgetItem) -> str:

@@ -32,8 +32,8 @@ def test_pairs_are_looked_through(photographs: Any) -> None:
 
 
 def test_what_is_left_out_is_marked(photographs: Any) -> None:
-    shots = look([photographs.folder / "grid"], photographs.work.board, silent, go_on)
-    views = without(shots, ["grid-002.png"])
+    shots = look([photographs.folder / "grid-left"], photographs.work.board, silent, go_on)
+    views = without(shots, ["grid-left-002.png"])
     assert [[view.dropped for view in one] for one in views] == [[False], [True]]
 
 

@@ -37,7 +37,7 @@ def shots_of(photographs: Any, *folders: str, board: Any = None) -> tuple[Shot, 
 def display_shots(photographs: Any) -> tuple[tuple[Shot, ...], tuple[Shot, ...]]:
     screen = screen_of(RIG, "left")
     grid = grid_of(photographs.work.left, screen.width_px, screen.height_px)
-    return shots_of(photographs, "grid", board=grid.board), shots_of(photographs, "board")
+    return shots_of(photographs, "grid-left", board=grid.board), shots_of(photographs, "board-left")
 
 
 def test_the_depth_camera_is_where_it_was(photographs: Any) -> None:
@@ -87,7 +87,7 @@ def test_the_display_is_where_it_was(photographs: Any, display_shots: Any, tmp_p
     found, truth = display.put(RIG).eyes["left"], RIG.eyes["left"]
     assert np.linalg.norm(found.t_C0_V_m - truth.t_C0_V_m) < 0.001
     np.testing.assert_allclose(found.K[0, 0], truth.K[0, 0], rtol=0.003)
-    assert set(display.residuals_px) == {"grid-001.png", "grid-002.png"}
+    assert set(display.residuals_px) == {"grid-left-001.png", "grid-left-002.png"}
     assert len(place.tilts_rad) == 4
 
 
@@ -108,10 +108,10 @@ def test_what_is_missing_is_named(photographs: Any, display_shots: Any, tmp_path
     with pytest.raises(HandcalError, match="poses is missing"):
         solve_left(photographs, display_shots, tmp_path, replace(entries, tracked=""))
     poses = read_tracked(Path(entries.tracked))
-    del poses["board-002.png"]
+    del poses["board-left-002.png"]
     write_tracked(tmp_path / "some.json", poses)
     some = replace(entries, tracked=str(tmp_path / "some.json"))
-    with pytest.raises(FileError, match=r"no pose for board-002\.png"):
+    with pytest.raises(FileError, match=r"no pose for board-left-002\.png"):
         solve_left(photographs, display_shots, tmp_path, some)
 
 
