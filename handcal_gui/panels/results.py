@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
@@ -16,6 +16,7 @@ from handcal_gui.results.convergence_plot import ConvergencePlot
 from handcal_gui.results.residuals_tab import ResidualsTab
 from handcal_gui.results.rows import (
     EYE_NAMES,
+    NOTHING,
     PHI,
     alignment_rows,
     another_text,
@@ -69,19 +70,20 @@ class ResultsPanel(QWidget):
         """Show the results of a snapshot, if they are others than those shown."""
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
-            self.show_results(procedure.results, record.alignments, record.rig)
+            numbered = dict(zip(record.alignment_numbers, record.alignments, strict=True))
+            self.show_results(procedure.results, numbered, record.rig)
 
     def show_results(
-        self, results: Results | None, alignments: Sequence[Alignment], rig: Rig
+        self, results: Results | None, alignments: Mapping[int, Alignment], rig: Rig
     ) -> None:
         """Show results, or that there are none.
 
         Parameters
         ----------
         results : Results or None
-        alignments : sequence of Alignment
-            Those that were solved, in the same order; of any that are missing no residual map is
-            shown.
+        alignments : mapping of int to Alignment
+            Those that were solved, by number, in the same order, and maybe later ones. The last
+            may be missing, as on a full disk; of them no residual map is shown.
         rig : Rig
         """
         self._results = results
@@ -92,9 +94,11 @@ class ResultsPanel(QWidget):
             card.show_verdict(results.verdicts.get(eye))
         eyes = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(eyes, result_rows(results, rig))
-        self._convergence.show_results(results)
+        count = len(results.alignments)
+        names = [*map(str, alignments), *count * [NOTHING]][:count]
+        self._convergence.show_results(results, names)
         self._residuals.show_results(results, alignments)
-        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, rig))
+        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, names, rig))
         self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
 

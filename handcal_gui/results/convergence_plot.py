@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
@@ -26,10 +28,10 @@ class ConvergencePlot(Plot):
         )
         self.show_legend()
 
-    def show_results(self, results: Results) -> None:
-        """Replace the lines."""
+    def show_results(self, results: Results, names: Sequence[str]) -> None:
+        """Replace the lines; each ends in its alignment's name."""
         self.clear()
-        for number, shifts in enumerate(results.alignments, 1):
+        for alignment, shifts in zip(names, results.alignments, strict=True):
             for eye, shift in shifts.items():
                 rms_mm = 1e3 * np.sqrt(shift.history_m2)
                 line = self.add_line(
@@ -39,4 +41,4 @@ class ConvergencePlot(Plot):
                     symbol=_SYMBOLS[eye] if len(rms_mm) <= _MAX_SYMBOLS else None,
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
-                self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))
+                self.add_text(alignment, len(rms_mm), float(rms_mm[-1]))

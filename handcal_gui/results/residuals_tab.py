@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from PySide6.QtGui import QShowEvent
@@ -22,7 +22,7 @@ class ResidualsTab(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("residuals")
-        self._solved: list[tuple[Alignment, Mapping[Eye, EyeShift]]] = []
+        self._solved: dict[int, tuple[Alignment, Mapping[Eye, EyeShift]]] = {}
         self._choice = QComboBox()
         self._choice.setObjectName("residuals-choice")
         self._choice.setAccessibleName("Alignment and eye")
@@ -36,14 +36,15 @@ class ResidualsTab(QWidget):
         layout.addWidget(self._map, 1)
         layout.addWidget(note)
 
-    def show_results(self, results: Results, alignments: Sequence[Alignment]) -> None:
+    def show_results(self, results: Results, alignments: Mapping[int, Alignment]) -> None:
         """Show the first alignment's map and offer the others, as far as their clouds are known."""
-        self._solved = list(zip(alignments, results.alignments, strict=False))
+        solved = zip(alignments.items(), results.alignments, strict=False)
+        self._solved = {number: (alignment, shifts) for (number, alignment), shifts in solved}
         self._choice.clear()
-        for index, (_, shifts) in enumerate(self._solved):
+        for number, (_, shifts) in self._solved.items():
             for eye in shifts:
-                name = f"Alignment {index + 1}, {EYE_NAMES[eye].lower()}"
-                self._choice.addItem(name, (index, eye))
+                name = f"Alignment {number}, {EYE_NAMES[eye].lower()}"
+                self._choice.addItem(name, (number, eye))
 
     def showEvent(self, event: QShowEvent) -> None:
         """Draw what was chosen while nobody looked."""
@@ -57,7 +58,7 @@ class ResidualsTab(QWidget):
         if chosen is None:
             self._map.show_residuals(np.empty((0, 2)), np.empty(0))
             return
-        index, eye = chosen
-        alignment, shifts = self._solved[index]
+        number, eye = chosen
+        alignment, shifts = self._solved[number]
         hand_E_m = transform(alignment.T_E_W[eye], alignment.hand_m)
         self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m)

@@ -106,7 +106,8 @@ class Review(QObject):
         panels = self._window.panels
         note = "" if stored.results else "It holds no alignment yet."
         self._page.show_session(record, stored.results, note)
-        panels.results.show_results(stored.results, record.alignments, record.rig)
+        numbered = dict(zip(record.alignment_numbers, record.alignments, strict=True))
+        panels.results.show_results(stored.results, numbered, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)

@@ -239,7 +239,7 @@ class Live(QObject):
         host, port = station.address
         panels.camera.begin(station.settings.calibration.segment)
         panels.fine_tune.set_rig(station.rig)
-        panels.results.show_results(None, (), station.rig)
+        panels.results.show_results(None, {}, station.rig)
         panels.session.set_read_only(False)
         panels.trials.set_read_only(False)
         panels.link.show_pairing(

@@ -32,6 +32,10 @@ def child(parent: QObject, kind: type[Child], name: str = "") -> Child:
     return next(found for found in parent.findChildren(kind) if found.objectName().startswith(name))
 
 
+def numbered(alignments: Sequence[Alignment]) -> dict[int, Alignment]:
+    return dict(enumerate(alignments, 1))
+
+
 @pytest.fixture
 def panel(qtbot: QtBot) -> ResultsPanel:
     panel = ResultsPanel()
@@ -45,7 +49,7 @@ def panel(qtbot: QtBot) -> ResultsPanel:
 def solved(
     panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
 ) -> ResultsPanel:
-    panel.show_results(results, alignments, rig)
+    panel.show_results(results, numbered(alignments), rig)
     return panel
 
 
@@ -105,12 +109,12 @@ def test_an_eye_without_part_is_not_judged(
     panel: ResultsPanel, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
     one = replace(alignments[0], eyes=("right",))
-    panel.show_results(solve_session([one], rig, SolveSettings()), [one], rig)
+    panel.show_results(solve_session([one], rig, SolveSettings()), {3: one}, rig)
     card = child(panel, VerdictCard, "verdict-left")
     texts = [label.text() for label in card.findChildren(QLabel)]
     assert "– Not solved" in texts
     choices = child(panel, QComboBox, "residuals-choice")
-    assert [choices.itemText(i) for i in range(choices.count())] == ["Alignment 1, right eye"]
+    assert [choices.itemText(i) for i in range(choices.count())] == ["Alignment 3, right eye"]
 
 
 def test_convergence_has_a_line_for_each_alignment_and_eye(
@@ -143,13 +147,23 @@ def test_the_map_shows_each_point_of_the_chosen_hand_once(
 def test_an_alignment_whose_cloud_is_missing_has_no_map(
     panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
-    panel.show_results(results, alignments[:1], rig)
+    panel.show_results(results, numbered(alignments[:1]), rig)
     child(panel, QTabWidget).setCurrentIndex(2)
     assert child(panel, QComboBox, "residuals-choice").count() == 2
     assert len(child(panel, ResidualMap).scatters[0].getData()[0])
-    panel.show_results(results, (), rig)
+    panel.show_results(results, {}, rig)
     assert child(panel, QComboBox, "residuals-choice").count() == 0
     assert not len(child(panel, ResidualMap).scatters[0].getData()[0])
+
+
+def test_an_alignment_added_since_is_not_among_the_results(
+    panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
+) -> None:
+    panel.show_results(results, numbered([*alignments, alignments[0]]), rig)
+    table = child(panel, NumberTable, "each-alignment-alone")
+    labels = [line.split("\t")[0] for line in table.as_text().splitlines()[1:]]
+    assert labels == ["1 left", "1 right", "2 left", "2 right"]
+    assert child(panel, QComboBox, "residuals-choice").count() == 4
 
 
 def test_a_comparison_is_asked_for_and_shown(
@@ -191,7 +205,7 @@ def test_other_results_cancel_a_comparison_under_way(
 ) -> None:
     button(solved, "start").click()
     with qtbot.waitSignal(solved.compare_cancelled):
-        solved.show_results(replace(results), (), rig)
+        solved.show_results(replace(results), {}, rig)
     assert button(solved, "start").isEnabled()
 
 
