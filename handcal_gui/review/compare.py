@@ -57,7 +57,7 @@ class Comparison(QObject):
             assert rig is not None
             return solve_session(alignments, rig, settings, report, is_cancelled)
 
-        self._job = Job(work, self)
+        self._job = Job(work)
         self._job.succeeded.connect(self._panel.show_comparison)
         self._job.failed.connect(self._panel.comparison_failed)
         self._job.start()

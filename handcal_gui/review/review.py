@@ -66,7 +66,7 @@ class Review(QObject):
             results = solve_again(record, settings, report, is_cancelled)
             return _Stored(record, settings, results)
 
-        self._job = Job(work, self)
+        self._job = Job(work)
         self._job.succeeded.connect(self._show)
         self._job.failed.connect(self._fail)
         self._job.cancelled.connect(lambda: self._fail(f"{path} was not opened: cancelled"))

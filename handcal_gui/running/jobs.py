@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import Signal
 
 from handcal.errors import CancelledError, HandcalError
 from handcal_gui.running.worker import Worker
@@ -42,8 +42,9 @@ class Job(Worker):
     failed = Signal(str)
     cancelled = Signal()
 
-    def __init__(self, work: Work, parent: QObject | None = None) -> None:
-        super().__init__("handcal job", parent)
+    def __init__(self, work: Work) -> None:
+        # Without a parent: it lives as long as its thread or whoever waits for it, and no longer.
+        super().__init__("handcal job")
         self._work = work
         self._cancelled = threading.Event()
 

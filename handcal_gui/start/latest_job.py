@@ -52,7 +52,6 @@ class LatestJob(QObject):
     def _start(self) -> None:
         question = self._next.pop()
         self._question = question
-        # Without a parent: should this object be destroyed, the job's thread keeps the job alive.
         self._job = Job(lambda _report, _is_cancelled: self._work(question))
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
