@@ -21,7 +21,17 @@ from handcal.link.transport import UdpTransport
 from handcal.resources import resource_path
 from handcal.rig.rig_file import read_rig
 
-_PACKAGES = ("numpy", "scipy", "opencv-python-headless", "protobuf", "scikit-image")
+_PACKAGES = (
+    "numpy",
+    "scipy",
+    "opencv-python-headless",
+    "protobuf",
+    "scikit-image",
+    "onnxruntime",
+    "matplotlib",
+    "PySide6-Essentials",
+    "pyqtgraph",
+)
 _LEAST_FREE_BYTES = 500 * 2**20
 
 
@@ -108,7 +118,7 @@ def _pairing() -> Finding:
     try:
         read_pairing_key()
     except HandcalError as error:
-        advice = f"for a real headset, set {KEY_VARIABLE} to the key that it shows"
+        advice = "only handcal headset needs it; the desktop program has a key of its own"
         return Finding("Pairing key", Health.LIMITED, str(error), advice)
     return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
 

@@ -86,7 +86,10 @@ def list_viewpoints() -> list[int]:
 class _Images(ViewpointCamera):
     def __init__(self, folder: Path) -> None:
         self.name = f"Images in {folder.name}"
-        paths = (path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
+        try:
+            paths = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES]
+        except OSError as error:
+            raise CameraError(f"cannot read {folder}: {error.strerror or error}") from error
         self._remaining: list[Path] | None = sorted(paths, reverse=True)
         if not self._remaining:
             raise CameraError(f"{folder} holds no PNG or JPEG image")
