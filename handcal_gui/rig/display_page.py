@@ -10,7 +10,7 @@ import cv2
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from handcal.doctor import Finding, Health
-from handcal.errors import HandcalError
+from handcal.errors import FileError, HandcalError
 from handcal.files import write_atomic
 from handcal.rig.assemble import screen_of
 from handcal.rig.grid import Grid, draw_grid
@@ -114,12 +114,8 @@ class DisplayPage(StepPage):
             for field in fields:
                 field.setEnabled(distance == entries.distance)
         self._board.look((entries.board_images,), self.draft.work.board, entries.dropped_board)
-        try:
-            board = self._shown().board
-        except HandcalError as error:
-            self._grid.show_trouble(str(error))
-            return
-        self._grid.look((entries.grid_images,), board, entries.dropped_grid)
+        if (grid := self._shown()) is not None:
+            self._grid.look((entries.grid_images,), grid.board, entries.dropped_grid)
 
     def keep(self) -> None:
         """Keep what is entered, and look for grid and board where they are new."""
@@ -155,19 +151,26 @@ class DisplayPage(StepPage):
         self._grid.show_solved(display)
         self._board.show_solved(place)
 
-    def _shown(self) -> Grid:
+    def _shown(self) -> Grid | None:
+        """Return the grid that the display shows; None, and why, if it has no room for it."""
         screen = screen_of(self.draft.rig, self._eye)
-        return grid_of(self._entries, screen.width_px, screen.height_px)
+        try:
+            return grid_of(self._entries, screen.width_px, screen.height_px)
+        except HandcalError as error:
+            self._grid.look(("",), self.draft.work.board, ())
+            self._grid.show_trouble(str(error))
+            return None
 
     def _save_grid(self) -> None:
+        if (grid := self._shown()) is None:
+            return
         name = f"grid-{self._eye}.png"
         path, _ = QFileDialog.getSaveFileName(self, "Save the grid", name, "PNG (*.png)")
         if not path:
             return
         try:
-            grid = self._shown()
             write_atomic(Path(path), cv2.imencode(".png", draw_grid(grid))[1].tobytes())
-        except HandcalError as error:
+        except FileError as error:
             self._grid.show_trouble(str(error))
             return
         columns, rows = grid.squares
@@ -175,10 +178,12 @@ class DisplayPage(StepPage):
         self.box.show_finding(Finding("", Health.GOOD, saved, "show it unscaled"))
 
     def _take_grid(self) -> None:
+        if (grid := self._shown()) is None:
+            return
         folder = self.draft.folder.path / f"grid-{self._eye}"
         self.take_images(
             {"Viewpoint camera": folder},
-            self._shown().board,
+            grid.board,
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
         )

@@ -32,15 +32,12 @@ class Draft(QObject):
         As far as it is calibrated.
     complaint : str
         What could not be read; empty if nothing.
-    entered : Signal()
-        Other entries.
     rig_changed : Signal()
         Another rig, or other intrinsics of the viewpoint camera.
     failed : Signal(str)
         It could not be kept.
     """
 
-    entered = Signal()
     rig_changed = Signal()
     failed = Signal(str)
 
@@ -65,7 +62,6 @@ class Draft(QObject):
         if work != self.work:
             self.work = work
             self._settle.start()
-            self.entered.emit()
 
     def begin_from(self, path: Path) -> None:
         """Begin from a rig file, or raise HandcalError; what was calibrated before is given up."""

@@ -37,6 +37,7 @@ class ImagesPanel(QWidget):
     ----------
     shots : tuple of Shot
     dropped_changed : Signal()
+        Other images are left out, or other images are there.
     again_requested, take_requested : Signal()
         The images are to be looked through again; others are to be taken.
     """
@@ -83,6 +84,9 @@ class ImagesPanel(QWidget):
         question = (paths, board)
         if question == self._question:
             return
+        before = self._question[0] if self._question else ()
+        if before and before != paths:
+            dropped = ()  # those were other images
         self._question = question
         self._show((), ())
         if len(paths) == len(folders):
@@ -116,6 +120,7 @@ class ImagesPanel(QWidget):
         self._view.show_shot(None)
         self._list.show_shots(shots, dropped)
         self._refresh()
+        self.dropped_changed.emit()
 
     def _look_again(self) -> None:
         self.forget()

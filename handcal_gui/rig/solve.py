@@ -170,10 +170,8 @@ def _distance(entries: DisplayEntries) -> DisplaySettings:
 
 
 def _tilts(views: Sequence[View], camera: Intrinsics) -> dict[str, float]:
-    poses: dict[str, tuple[Float64, View]] = {
-        view.name: (board_pose(view.found, camera), view) for view in views if view.found
-    }
-    return {name: tilt(T, view.found) for name, (T, view) in poses.items() if view.found}
+    found = {view.name: view.found for view in views if view.found}
+    return {name: tilt(board_pose(seen, camera), seen) for name, seen in found.items()}
 
 
 def _intrinsics(path: str) -> Intrinsics | None:

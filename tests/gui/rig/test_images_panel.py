@@ -117,3 +117,16 @@ def test_why_there_are_none_is_told(
     assert "No PNG or JPEG" in text(panel, "imagesFound")
     panel.look((str(tmp_path), ""), photographs.work.board, ())
     assert not panel.bar.is_busy
+
+
+def test_what_was_left_out_of_other_images_is_forgotten(
+    qtbot: QtBot, full: ImagesPanel, photographs: Any
+) -> None:
+    item(full, 0).setCheckState(0, Qt.CheckState.Unchecked)
+    before = full.dropped_of(())
+    assert before
+    folders = photographs.work.stereo.headset_images, photographs.work.stereo.depth_images
+    with qtbot.waitSignal(full.dropped_changed):
+        full.look(folders, photographs.work.board, before)
+    qtbot.waitUntil(lambda: not full.bar.is_busy, timeout=20_000)
+    assert full.dropped_of(before) == ()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QLineEdit, QListWidget, QPushButton, QTreeWidget
+from PySide6.QtWidgets import QLabel, QLineEdit, QListWidget, QPushButton, QSpinBox, QTreeWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.board import Board
@@ -17,6 +17,7 @@ from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
 from handcal_gui.rig.job_bar import JobBar
 from handcal_gui.rig.step_page import StepPage
+from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import WorkFolder
 
@@ -159,3 +160,16 @@ def test_back_and_next_lead_through_the_steps(wizard: RigWizard) -> None:
     assert not forth.isEnabled()
     back.click()
     assert wizard.step == RIGHT
+
+
+def test_a_grid_that_has_no_room_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
+    wizard.show_step(LEFT)
+    square = child(wizard, QSpinBox, "gridSquare")
+    square.setValue(700)
+    assert "no room" in child(wizard, QLabel, "imagesFound").text()
+    for name in ("saveGrid", "take"):
+        child(wizard, QPushButton, name).click()
+    assert wizard.findChild(TakeDialog) is None
+    square.setValue(80)
+    wait(qtbot, wizard)
+    assert "2 of 2 used" in child(wizard, QLabel, "count").text()
