@@ -206,10 +206,12 @@ def _read_list(path: Path) -> list[_Listed]:
     try:
         return [_listed(*map(int, line.split(","))) for line in lines]
     except (TypeError, ValueError) as error:
-        raise FileError(f"{path} must hold three whole numbers a line") from error
+        raise FileError(f"{path} must hold three whole numbers a line, of 64 bits") from error
 
 
 def _listed(index: int, t_camera_ns: int, has_color: int) -> _Listed:
+    if max(abs(index), abs(t_camera_ns)) >= 2**63:
+        raise ValueError("more than 64 bits")
     return _Listed(index, t_camera_ns, bool(has_color))
 
 

@@ -117,6 +117,7 @@ def test_nonsense_distortion_is_refused(folder: Path, distortion: Any) -> None:
         "index\n1\n",
         "index,t_camera_ns,has_color\n1,2\n",
         "index,t_camera_ns,has_color\nx,2,1\n",
+        f"index,t_camera_ns,has_color\n1,{2**63},1\n",
     ],
 )
 def test_a_nonsense_list_is_refused(folder: Path, text: str) -> None:
