@@ -62,8 +62,9 @@ def _tower() -> nn.Sequential:
 
 def _share_convolutions(tower: nn.Sequential, other: nn.Sequential) -> None:
     """Let two levels have their convolutions in common, but not what they are normalised by."""
-    for layer, other_layer in zip(tower, other, strict=True):
-        other_layer[0].weight = layer[0].weight
+    for layer, other_layer in zip(tower.children(), other.children(), strict=True):
+        (convolution, *_), (other_convolution, *_) = layer.children(), other_layer.children()
+        other_convolution.weight = convolution.weight
 
 
 class HandNet(nn.Module):
@@ -83,9 +84,10 @@ class HandNet(nn.Module):
         self.stem = nn.Sequential(nn.Conv2d(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
         self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)
         self.lateral = nn.ModuleList(_normalised(_BLOCKS[tap - 1][1], _WIDTH) for tap in _TAPS)
-        self.towers = nn.ModuleList(_tower() for _ in _TAPS)
-        for tower in self.towers[1:]:
-            _share_convolutions(self.towers[0], tower)
+        towers = [_tower() for _ in _TAPS]
+        for tower in towers[1:]:
+            _share_convolutions(towers[0], tower)
+        self.towers = nn.ModuleList(towers)
         self.predict = nn.Conv2d(_WIDTH, 5, 1)
         nn.init.normal_(self.predict.weight, std=0.01)
         # At first a point is rarely a hand, and boxes are four strides wide.

@@ -149,7 +149,8 @@ class Wizard:
         place = STEPS.index(self._free)
         match action:
             case Action.NEXT:
-                self._free = STEPS[place + 1]
+                is_resumed = place == 0 and snapshot.procedure.state is State.APPLIED
+                self._free = Step.VERIFY if is_resumed else STEPS[place + 1]
             case Action.BACK:
                 is_another = snapshot.procedure.state is State.APPLIED
                 to_verify = is_another and self._free is Step.SHOW_HAND
@@ -174,10 +175,10 @@ class Wizard:
         camera, link = snapshot.camera, snapshot.link
         checks = (
             Check(
-                camera.problem or f"Camera: {camera.name}",
+                _sentence(camera.problem or f"camera: {camera.name}"),
                 not camera.problem and camera.rate_hz > 0,
             ),
-            Check(snapshot.link_problem or "Headset connected", link.connected),
+            Check(_sentence(snapshot.link_problem or "headset connected"), link.connected),
             Check(
                 f"Headset tells its pose {link.pose_rate_hz:.0f} times a second"
                 if link.pose_rate_hz
@@ -235,7 +236,7 @@ class Wizard:
     def _solve(self, snapshot: Snapshot) -> View:
         procedure = snapshot.procedure
         count = len(snapshot.record.alignments)
-        aligned = Check(f"Alignment {count} confirmed", True)
+        aligned = Check(f"{count} alignment{'' if count == 1 else 's'} confirmed", True)
         redo = Offer(Action.REDO, "Discard and repeat")
         if procedure.state is State.ALIGNED or procedure.results is None:
             return View(
@@ -281,8 +282,8 @@ class Wizard:
             )
         return View(
             Step.VERIFY,
-            "The wearer looks at the own hand: the outline should lie on it. Add an alignment, or "
-            "fine-tune φ, if it does not.",
+            "The wearer looks at the raised hand: the outline should lie on it. Add an alignment, "
+            "or fine-tune φ, if it does not.",
             checks,
             Offer(Action.NEXT, "It fits"),
             (

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, cast
 
 import pytest
@@ -34,6 +35,10 @@ class FakeStation(Closable):
 
     def close(self) -> None:
         self.is_closed = True
+
+
+def write_notes(station: FakeStation, text: str, _station: Station) -> None:
+    station.notes = text
 
 
 @contextmanager
@@ -106,7 +111,7 @@ def test_what_was_asked_for_just_before_the_end_is_done(qtbot: QtBot) -> None:
     station = FakeStation()
     with streaming(qtbot, station) as stream:
         for text in ("a", "ab", "abc"):
-            stream.ask("notes", lambda _station, text=text: setattr(station, "notes", text))
+            stream.ask("notes", partial(write_notes, station, text))
     assert station.notes == "abc"
 
 

@@ -178,6 +178,16 @@ def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> 
     assert wizard.eyes(applied) == EYES  # the plan again
 
 
+def test_a_resumed_calibration_goes_on_where_it_was_broken_off(
+    snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
+) -> None:
+    wizard = Wizard("each")
+    resumed = snapshot(State.APPLIED, record=aligned(record, alignments[0], ("left",)))
+    assert wizard.step(resumed) is Step.CONNECT
+    wizard.move(Action.NEXT, resumed)
+    assert wizard.view(resumed).main.label == "Align the right eye"
+
+
 def test_a_repeated_eye_stays_when_its_alignment_is_discarded(
     snapshot: Maker, start: Snapshot
 ) -> None:
