@@ -100,6 +100,8 @@ def read_json(path: Path) -> dict[str, Any]:
     data = read_limited(path, MAX_JSON_BYTES)
     try:
         value = json.loads(data, parse_int=_whole_number)
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path} is not valid JSON: it is no text") from error
     except (ValueError, RecursionError) as error:
         raise FileError(f"{path} is not valid JSON: {error}") from error
     if not isinstance(value, dict):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from handcal.camera.folder import FolderCamera
+from handcal.camera.recording import check_recording
 from handcal.camera.sdk_devices import choose_device, connected_devices, librealsense
 from handcal.doctor import Finding, Health, examine_camera, examine_disk
 from handcal.errors import HandcalError, LinkError
@@ -99,6 +100,7 @@ def _recording(name: str) -> Finding:
     if path.suffix not in RECORDING_SUFFIXES:
         return _broken(f"{path.name} is no recording", f"choose {kinds}")
     librealsense()
+    check_recording(path)
     return _good(f"{path.stat().st_size / 2**20:,.1f} MiB, played over and over")
 
 

@@ -208,6 +208,8 @@ class Session(Closable):
             If the folder is not a session, is of an unknown version, or a file in it is missing,
             damaged or too large.
         """
+        if not (path / "journal.jsonl").is_file():
+            raise FileError(f"{path} is no session; give the folder that holds its journal.jsonl")
         journal = read_journal(path / "journal.jsonl")
         history = _replay(path, journal.events)
         if history.rig_sha256 != _sha256(_rig_bytes(path)):

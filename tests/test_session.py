@@ -140,7 +140,7 @@ def test_a_folder_is_never_taken_over(tmp_path: Path, session: Session) -> None:
 
 
 def test_what_is_no_session_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"cannot read .*journal"):
+    with pytest.raises(FileError, match=r"is no session; give the folder that holds its journal"):
         Session.open(tmp_path)
     with pytest.raises(FileError, match="cannot lock"):
         Session(tmp_path / "missing")
@@ -281,7 +281,7 @@ def test_a_missing_file_is_named(tmp_path: Path, finished: SessionRecord, name: 
     path = tmp_path / "session"
     shutil.copytree(finished.path, path)
     (path / name).unlink()
-    with pytest.raises(FileError, match=f"cannot read .*{name}: No such file"):
+    with pytest.raises(FileError, match=name):
         Session.open(path)
 
 

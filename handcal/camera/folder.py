@@ -71,6 +71,8 @@ class FolderCamera(PlayedCamera):
         self.name = f"Recording {folder.name}"
         self._folder = folder
         self._place = 0
+        if not (folder / DESCRIPTION).is_file():
+            raise CameraError(f"{folder} is no recording: there is no {DESCRIPTION} in it")
         try:
             self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
             self._frames = _read_list(folder / LIST)

@@ -19,11 +19,25 @@ from handcal.camera.sdk_frames import (
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.types import Float64, Frame
 
+_BEGINNINGS = (b"SQLite format 3\0", b"#ROSBAG V")  # .db3, .bag
 _POLL_MS = 100
 _COLOR_TIMEOUT_S = 1.0
 _SKIP_TIMEOUT_S = 10.0
 _SETTLE_S = 0.2
 _ROUNDING_MS = 1e-3  # of the SDK's times, kept as floating-point numbers
+
+
+def check_recording(path: Path) -> None:
+    """Raise CameraError unless a file begins as librealsense's recordings do."""
+    if not path.is_file():
+        raise CameraError(f"there is no recording {path}")
+    try:
+        with path.open("rb") as file:
+            begin = file.read(len(_BEGINNINGS[0]))
+    except OSError as error:
+        raise CameraError(f"cannot read {path}: {error.strerror or error}") from error
+    if not begin.startswith(_BEGINNINGS):
+        raise CameraError(f"{path} is no recording; take a .db3 or .bag file of a RealSense")
 
 
 class RecordingCamera(PlayedCamera):
@@ -43,7 +57,8 @@ class RecordingCamera(PlayedCamera):
     Raises
     ------
     CameraError
-        If librealsense is not installed, or the file is missing, damaged or without depth.
+        If librealsense is not installed, or the file is missing, of another kind, damaged or
+        without depth.
     """
 
     def __init__(self, path: Path, settings: PlaybackSettings | None = None) -> None:
@@ -52,8 +67,7 @@ class RecordingCamera(PlayedCamera):
         self._path = path
         self._depth: _Playback | None = None
         self._color: _ColorTrack | None = None
-        if not path.is_file():
-            raise CameraError(f"there is no recording {path}")
+        check_recording(path)
         self._open()
 
     def close(self) -> None:

@@ -191,17 +191,17 @@ def _read(
         if data.lstrip().startswith(b"{"):
             return of_json(read_json(path))
         require(len(data) <= MAX_STORAGE_BYTES, f"a YAML file may hold {MAX_STORAGE_BYTES:,} bytes")
-        return parse_storage(_as_storage(data.decode()), of_yaml)
+        return parse_storage(_as_storage(data), of_yaml)
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
 
 
-def _as_storage(text: str) -> str:
+def _as_storage(data: bytes) -> bytes:
     """Return YAML as others write it in the dialect that OpenCV reads."""
-    if text.startswith("%YAML"):
-        return text
+    if data.startswith(b"%YAML"):
+        return data
     # PyYAML begins a list below its key, where OpenCV wants it further in.
-    return "%YAML 1.2\n---\n" + re.sub(r"(?m)^( *)- ", r"\1  - ", text)
+    return b"%YAML 1.2\n---\n" + re.sub(rb"(?m)^( *)- ", rb"\1  - ", data)
 
 
 def _intrinsics_of_json(values: dict[str, Any]) -> Intrinsics:

@@ -75,7 +75,7 @@ def read_rig(path: Path) -> Rig:
     """
     data = read_limited(path, MAX_RIG_BYTES)
     try:
-        return parse_storage(data.decode(), _parse)
+        return parse_storage(data, _parse)
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
 

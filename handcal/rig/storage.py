@@ -17,19 +17,19 @@ MAX_STORAGE_BYTES = 2**14
 Value = TypeVar("Value")
 
 
-def parse_storage(text: str, convert: Callable[[Fields], Value]) -> Value:
-    """Return what `convert` makes of FileStorage text of at most `MAX_STORAGE_BYTES`.
+def parse_storage(data: bytes, convert: Callable[[Fields], Value]) -> Value:
+    """Return what `convert` makes of FileStorage YAML of at most `MAX_STORAGE_BYTES`.
 
     Raises
     ------
     ValueError
-        If the text is not valid FileStorage YAML, or `convert` refuses a field.
+        If it is not valid FileStorage YAML, or `convert` refuses a field.
     """
-    require(text.startswith("%YAML"), "not a FileStorage YAML file")
+    require(data.startswith(b"%YAML"), "not a YAML file as OpenCV and handcal write it")
     try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        storage = cv2.FileStorage(data.decode(), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         return convert(Fields("", storage.root()))
-    except (cv2.error, SystemError) as error:  # SystemError: how OpenCV reports unparsable text
+    except (UnicodeDecodeError, cv2.error, SystemError) as error:  # SystemError: not parsable
         raise ValueError("not valid FileStorage YAML") from error
 
 

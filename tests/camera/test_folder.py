@@ -138,5 +138,5 @@ def test_a_missing_or_foreign_image_is_named(folder: Path) -> None:
 
 
 def test_no_folder_is_no_recording(tmp_path: Path) -> None:
-    with pytest.raises(CameraError, match=r"cannot read .*recording\.json"):
+    with pytest.raises(CameraError, match=r"is no recording: there is no recording\.json"):
         FolderCamera(tmp_path)

@@ -18,6 +18,7 @@ if sys.platform == "darwin":
     pytest.skip("pyrealsense2 has no package for macOS", allow_module_level=True)
 
 MakeFrames = Callable[..., Iterator[Frame]]
+SQLITE = b"SQLite format 3\0"
 
 
 def read_all(camera: RecordingCamera) -> Iterator[Frame]:
@@ -68,6 +69,9 @@ def test_missing_and_damaged_recordings_are_refused(tmp_path: Path) -> None:
         RecordingCamera(tmp_path / "absent.db3")
     damaged = tmp_path / "damaged.db3"
     damaged.write_bytes(b"not a data base" * 100)
+    with pytest.raises(CameraError, match="is no recording; take"):
+        RecordingCamera(damaged)
+    damaged.write_bytes(SQLITE + b"not a data base" * 100)
     with pytest.raises(CameraError, match="cannot be played"):
         RecordingCamera(damaged)
 
@@ -76,7 +80,7 @@ def test_missing_librealsense_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
-    (tmp_path / "hand.db3").touch()
+    (tmp_path / "hand.db3").write_bytes(SQLITE)
     with pytest.raises(CameraError, match="pip install pyrealsense2"):
         RecordingCamera(tmp_path / "hand.db3")
 

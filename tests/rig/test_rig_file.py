@@ -105,7 +105,7 @@ def test_opencv_itself_reads_the_file(path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("%YAML", "#", "not a FileStorage YAML file"),
+        ("%YAML", "#", "not a YAML file as OpenCV and handcal write it"),
         ("handcal_rig: 2", "handcal_rig: 3", "rig version 3 is unknown; versions 1 to 2"),
         ("handcal_rig: 2", "other: 2", "handcal_rig must be a whole number"),
         ("name: ", "label: ", "name must be a text"),
