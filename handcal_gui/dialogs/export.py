@@ -118,6 +118,7 @@ class ExportDialog(QDialog):
             self.reject()
         else:
             self._job.cancel()
+            self._progress.show_cancelling()
             self._close.setEnabled(False)
 
     def _succeed(self, files: tuple[Path, ...]) -> None:

@@ -67,6 +67,10 @@ class ExportProgress(QWidget):
         self._end.show_finding(Finding("", Health.BROKEN, why, _UNCHANGED))
         self._end.show()
 
+    def show_cancelling(self) -> None:
+        """Show that the file being made is the last."""
+        self._doing.setText("Cancelling…")
+
     def show_cancelled(self) -> None:
         """Show that nothing was made because it was cancelled."""
         self._doing.setText("Nothing was exported.")
