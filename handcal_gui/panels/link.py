@@ -106,7 +106,7 @@ class LinkPanel(QWidget):
             self._is_connected = is_connected
             self._draw_sign(is_connected)
         word = "Connected" if is_connected else "Not connected"
-        self._state.setText(f"{word}. {problem}" if problem else word)
+        self._state.setText(f"{word}. {problem[:1].upper()}{problem[1:]}" if problem else word)
 
     def _draw_sign(self, is_connected: bool) -> None:
         drawn = icon("link", colors().good) if is_connected else icon("link-off", colors().warning)

@@ -175,10 +175,10 @@ class Wizard:
         camera, link = snapshot.camera, snapshot.link
         checks = (
             Check(
-                _sentence(camera.problem or f"camera: {camera.name}"),
+                _sentence(camera.problem) or f"Camera: {camera.name}",
                 not camera.problem and camera.rate_hz > 0,
             ),
-            Check(_sentence(snapshot.link_problem or "headset connected"), link.connected),
+            Check(_sentence(snapshot.link_problem) or "Headset connected", link.connected),
             Check(
                 f"Headset tells its pose {link.pose_rate_hz:.0f} times a second"
                 if link.pose_rate_hz

@@ -108,8 +108,8 @@ def test_the_whole_way_of_one_eye_after_the_other(
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"camera": {"problem": "no camera is connected; plug one in"}}, "no camera is connected"),
-        ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "no headset"),
+        ({"camera": {"problem": "no camera is connected; plug one in"}}, "No camera is connected"),
+        ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "No headset"),
         ({"link": {"pose_rate_hz": 0.0}}, "No pose"),
     ],
 )
