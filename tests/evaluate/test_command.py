@@ -6,6 +6,18 @@ import numpy as np
 import pytest
 
 from handcal.__main__ import main
+from handcal.hand.detect import Detections
+from handcal.types import UInt8
+
+
+class Seer:
+    """A detector that sees the hand, and another that is not there."""
+
+    def detect(self, color: UInt8) -> Detections:
+        assert color.shape == (96, 128, 3)
+        return Detections(
+            np.array([[10.0, 10.0, 60.0, 60.0], [70.0, 70.0, 90.0, 90.0]]), np.array([0.9, 0.8])
+        )
 
 
 def evaluate(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
@@ -24,10 +36,11 @@ def test_writes_the_figures_and_the_failures(
     annotations.write_text(json.dumps({"a.png": {"width": 128, "height": 96, "hands": hands}}))
     figures, sheet = tmp_path / "out" / "figures.json", tmp_path / "out" / "sheet.png"
     files = ("--images", tmp_path, "--annotations", annotations)
+    monkeypatch.setattr("handcal.detector.load_detector", lambda settings: Seer())
     evaluate(monkeypatch, *files, "--json", figures, "--sheet", sheet)
     result = json.loads(figures.read_text())
-    # No hand is in the gray picture, whatever the annotations say.
-    assert result["ap50"] == result["ap50_large"] == result["ap50_rel15"] == 0.0
+    assert result["ap50"] == result["ap50_large"] == result["ap50_rel15"] == 1.0
+    assert result["curve"]["precision"] == [1.0]
     assert (result["images"], result["hands"]) == (1, 1)
     assert cv2.imread(str(sheet)) is not None
 
