@@ -1,107 +1,55 @@
-"""The command ``handcal-gui``: its arguments, and what becomes of them."""
+"""The command ``handcal-gui``: its arguments, and a window at once.
+
+Everything heavy is imported behind that window, which the program then takes over.
+"""
 
 from __future__ import annotations
 
 import argparse
-import logging
 import os
 import re
-import signal
 import sys
-from contextlib import suppress
-from dataclasses import replace
-from logging.handlers import RotatingFileHandler
 from pathlib import Path
-from types import TracebackType
 from typing import NoReturn
 
-from PySide6.QtCore import QSize, QTimer
-from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QApplication, QLabel
 
-from handcal.errors import HandcalError
-from handcal.files import make_folder
-from handcal.resources import resource_path
-from handcal.station_settings import StationSettings
-from handcal_gui.demonstration.demonstration import Demonstration
-from handcal_gui.preferences import PreferencesFile
-from handcal_gui.program import Program
-
-_LOG_BYTES = 2**20
+FIRST_SIZE = QSize(1600, 1000)
 
 
 def main() -> NoReturn:
     """Run the program; the exit status is 0, 1 if the autopilot fails, 2 for wrong arguments."""
     arguments = _parser().parse_args()
     _require_display()
+    keep_window_quick()
     app = QApplication(sys.argv[:1])
     app.setApplicationName("handcal")
-    app.setApplicationDisplayName("handcal")
     app.setDesktopFileName("handcal")
     app.setStyle("Fusion")
-    app.setWindowIcon(QIcon(str(resource_path("icons/handcal.svg"))))
-    file = PreferencesFile(arguments.preferences)
-    _log_to(file.path.with_name("handcal.log"))
+    first = first_window(arguments.size)
+    from handcal_gui.launch import LaunchError, launch
+
     try:
-        program = Program(file, remembers=not _is_demonstration(arguments))
-    except HandcalError as error:
-        _fail(str(error), 1)
-    sys.excepthook = lambda *error: _tell(program, *error)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # By the event loop, which may have yet to begin.
-        signal.signal(number, lambda *_: QTimer.singleShot(0, program.window.close))
-    awake = QTimer()  # lets Python see the signal
-    awake.start(200)
-    if arguments.size:
-        program.window.resize(arguments.size)
-    program.window.show()
-    try:
-        demonstration = _begin(program, arguments)
-    except HandcalError as error:
-        program.close()
-        _fail(str(error), 2)
-    app.exec()
-    program.close()
-    if demonstration is not None and demonstration.complaint is not None:
-        _fail(demonstration.complaint, 1)
+        launch(app, arguments, first)
+    except LaunchError as error:
+        _fail(str(error), error.code)
     sys.exit(0)
 
 
-def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | None:
-    """Do at once what the arguments ask for."""
-    settings = _station(program.preferences.station, arguments)
-    if _is_demonstration(arguments):
-        demonstration = Demonstration(program, arguments.output, arguments.screenshots)
-        demonstration.start(settings)
-        return demonstration
-    if arguments.session:
-        program.open_session(arguments.session)
-    else:
-        program.start.show_preferences(replace(program.preferences, station=settings))
-    return None
+def keep_window_quick() -> None:
+    """Let the window's thread wait for the engine's by a millisecond instead of five."""
+    sys.setswitchinterval(0.001)
 
 
-def _station(settings: StationSettings, arguments: argparse.Namespace) -> StationSettings:
-    """Return the station that the arguments ask for."""
-    match arguments.source or ("simulator" if _is_demonstration(arguments) else None):
-        case None:
-            pass
-        case "simulator":
-            settings = replace(settings, source="simulator", headset="virtual")
-        case "realsense":
-            settings = replace(settings, source="realsense", headset="network")
-        case path:
-            recording = str(Path(path).absolute())  # remembered, to be found from any folder
-            settings = replace(settings, source="recording", recording=recording, headset="virtual")
-    if arguments.rig:
-        settings = replace(settings, rig=str(arguments.rig.absolute()))
-    if arguments.seed is not None:
-        settings = replace(settings, seed=arguments.seed)
-    return settings
-
-
-def _is_demonstration(arguments: argparse.Namespace) -> bool:
-    return bool(arguments.autopilot or arguments.screenshots)
+def first_window(size: QSize | None) -> QLabel:
+    """Show at once that the program starts, where it will appear."""
+    window = QLabel("Starting handcal…", alignment=Qt.AlignmentFlag.AlignCenter)
+    window.setWindowTitle("Starting…")
+    window.resize(size or QApplication.primaryScreen().availableSize().boundedTo(FIRST_SIZE))
+    window.show()
+    QApplication.processEvents()
+    return window
 
 
 class _Parser(argparse.ArgumentParser):
@@ -165,27 +113,6 @@ def _require_display() -> None:
     wanted = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}
     if sys.platform.startswith("linux") and not wanted & set(os.environ):
         _fail("there is no display; `handcal demo` does the same without one", 2)
-
-
-def _log_to(path: Path) -> None:
-    handlers: list[logging.Handler] = [logging.StreamHandler()]
-    with suppress(HandcalError, OSError):
-        make_folder(path.parent)
-        handlers.append(RotatingFileHandler(path, maxBytes=_LOG_BYTES, backupCount=1))
-    logging.basicConfig(
-        level=logging.WARNING, format="%(asctime)s %(name)s: %(message)s", handlers=handlers
-    )
-
-
-def _tell(
-    program: Program, kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
-    """Log an error that nobody expected, and say so; what was captured is on the disk already."""
-    logging.getLogger(__name__).error("broke down", exc_info=(kind, error, trace))
-    program.window.banner.show_message(
-        f"handcal broke down ({kind.__name__}: {error}). Everything captured is saved; "
-        "restart the program if it does not go on."
-    )
 
 
 def _fail(message: str, code: int) -> NoReturn:

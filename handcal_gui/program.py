@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QObject, QSize, Qt
+from PySide6.QtCore import QByteArray, QObject, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
@@ -16,6 +16,7 @@ from handcal.export.export import ExportSettings
 from handcal.session import SessionRecord
 from handcal.station import Station
 from handcal.station_settings import StationSettings
+from handcal_gui.app import FIRST_SIZE
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.panels.camera import CameraPanel
@@ -39,7 +40,6 @@ from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.wizard.wizard import WizardPanel
 
-_FIRST_SIZE = QSize(1600, 1000)
 _KEYS = (
     ("Space", "What the wizard's large button says"),
     ("Esc", "Close the message at the top"),
@@ -234,7 +234,7 @@ class Program(QObject):
             self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
         else:
             screen = QGuiApplication.primaryScreen().availableSize()
-            self.window.resize(screen.boundedTo(_FIRST_SIZE))
+            self.window.resize(screen.boundedTo(FIRST_SIZE))
         layouts: dict[Page, str] = {
             "live": preferences.live_layout,
             "review": preferences.review_layout,

@@ -19,7 +19,7 @@ from handcal_gui.window import MainWindow, Panel
 from handcal_gui.wizard.steps import Action, EyePlan, Step, Wizard
 from handcal_gui.wizard.wizard import WizardPanel
 
-_POLL_MS = 33
+_POLL_MS = 10
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
     Step.SOLVE: "results",
@@ -65,7 +65,7 @@ class Live(QObject):
         self._solve_settings = SolveSettings()
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
-        self._is_watching = False
+        self._is_watching = self._turn = False
         self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
         self._complained_of = ""
         self._timer = QTimer(self)
@@ -212,8 +212,11 @@ class Live(QObject):
         panels = self._window.panels
         # Out of sight, too: they may be used before another snapshot comes.
         always = panels.fine_tune, panels.trials
+        # What takes long to paint takes turns, lest the window wait for all of it at once.
+        self._turn = not self._turn
+        waiting = (panels.cloud,) if self._turn else (panels.rotation, panels.wearer_view)
         for panel in panels.all():
-            if panel in always or not panel.visibleRegion().isEmpty():
+            if panel in always or not (panel in waiting or panel.visibleRegion().isEmpty()):
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(

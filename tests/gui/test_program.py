@@ -18,7 +18,7 @@ from pytestqt.qtbot import QtBot
 from handcal.calibrate import State
 from handcal.session import Session, SessionRecord
 from handcal.snapshot import Snapshot
-from handcal_gui import app
+from handcal_gui import launch
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.theme import use_theme
@@ -423,7 +423,7 @@ def test_an_error_that_nobody_expected_is_logged_and_told(
     technician: Technician, caplog: pytest.LogCaptureFixture
 ) -> None:
     error = ZeroDivisionError("oh")
-    app._tell(technician.program, type(error), error, error.__traceback__)
+    launch._tell(technician.program, type(error), error, error.__traceback__)
     assert "ZeroDivisionError: oh" in technician.banner
     assert "broke down" in caplog.text
     technician.program.show_start()

@@ -1,0 +1,306 @@
+"""How quick the window is: ``python -m handcal_gui.benchmark``, which ``handcal bench --gui`` runs.
+
+A camera of rendered frames streams 1280x720 at 30 a second through a real station. A process of
+its own tells poses in a headset's place, and never confirms, so that every frame is segmented,
+guarded and shown in all panels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtWidgets import QApplication
+
+from handcal.bench.figure import Figure
+from handcal.calibrate import State
+from handcal.camera.camera import Camera
+from handcal.closable import Closable
+from handcal.geometry import rigid
+from handcal.link.pairing import new_pairing_key
+from handcal.link.settings import DEFAULT_SETTINGS
+from handcal.link.transport import UdpTransport
+from handcal.rig.example import example_rig
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World, render
+from handcal.sim.room import make_room
+from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.snapshot import Snapshot
+from handcal.station import Station
+from handcal.station_settings import StationSettings
+from handcal.types import Float64, Frame
+from handcal_gui.app import keep_window_quick
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.wizard.steps import Action
+
+_RATE_HZ = 30.0
+_HEARTBEAT_MS = 5
+_NOISES = 8
+_WARM_UP = 150
+_STARTS = 5
+_KEY = new_pairing_key()
+_T_D_CURSOR = rigid([-0.2, 0.0, 0.0], [-0.01, 0.01, 0.50])
+_TURN = rigid([0.0, 0.0, 0.1])
+_HEADSET = """
+import sys, time
+import numpy as np
+from handcal.link.client import HeadsetClient
+pc, key = ("127.0.0.1", int(sys.argv[1])), sys.stdin.readline().strip().encode()
+with HeadsetClient(pc, key) as headset:
+    while not headset.dismissed:
+        headset.send_pose(np.eye(4), time.monotonic_ns())
+        time.sleep(1 / 60)
+"""
+_FIRST_WINDOW = (
+    "from handcal_gui.app import first_window as show; from PySide6.QtCore import QSize; "
+    "from PySide6.QtWidgets import QApplication; a = QApplication([]); a.setStyle('Fusion'); "
+    "w = show(QSize(1280, 800))"
+)
+_BARE_WINDOW = (
+    "from PySide6.QtWidgets import QApplication, QWidget; a = QApplication([]); "
+    "a.setStyle('Fusion'); w = QWidget(); w.resize(1280, 800); w.show(); a.processEvents()"
+)
+
+
+class _FilmCamera(Closable):
+    """Plays frames from memory at the camera's rate, as its SDK would deliver them."""
+
+    name = "Film"
+
+    def __init__(self, film: _Film) -> None:
+        self._film = film
+        self.depth_intrinsics = film.frames[0][0].depth_intrinsics
+        self._index = 0
+        self._next_s = time.monotonic()
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        time.sleep(max(0.0, self._next_s - time.monotonic()))
+        self._next_s = max(self._next_s + 1.0 / _RATE_HZ, time.monotonic() - timeout_s)
+        self._index += 1
+        now_ns = time.monotonic_ns()
+        frame = self._film.frames[self._film.is_turned][self._index % _NOISES]
+        return replace(frame, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns)
+
+    def close(self) -> None:
+        pass
+
+
+class _Film:
+    """The hand as the cursor's, and turned, with noise of its own in every frame."""
+
+    def __init__(self) -> None:
+        self.is_turned = False
+        world = World(make_hand(1), make_room(1))
+        self.frames = [_shoot(world, T) for T in (_T_D_CURSOR, _T_D_CURSOR @ _TURN)]
+
+
+def _shoot(world: World, T_D_hand: Float64) -> list[Frame]:
+    camera, sensor = example_rig().depth_intrinsics, SensorSettings()
+    depth_m, color = render(world, np.eye(4), T_D_hand, camera)
+    return [
+        Frame(
+            index=0,
+            t_camera_ns=0,
+            t_host_ns=0,
+            depth=sense_depth(depth_m, camera.fx, np.random.default_rng(seed), sensor),
+            depth_scale_m=sensor.depth_scale_m,
+            depth_intrinsics=camera,
+            color=color,
+            color_intrinsics=camera,
+        )
+        for seed in range(_NOISES)
+    ]
+
+
+class _FilmStation(Station):
+    """A station that films instead of opening a camera."""
+
+    def __init__(self, film: _Film, settings: StationSettings) -> None:
+        self._film = film
+        super().__init__(settings, "Benchmark", pairing_key=_KEY)
+
+    def _open_camera(self) -> Camera:
+        return _FilmCamera(self._film)
+
+
+class _Measurement(QObject):
+    """Watches the window for so many frames, then ends the program.
+
+    Attributes
+    ----------
+    delays_ms, ages_ms, memory_mb : list of float
+        Of every heartbeat beyond its period, of every frame when it is on the screen, and of the
+        process every hundred frames.
+    """
+
+    def __init__(self, program: Program, film: _Film, frames: int) -> None:
+        super().__init__()
+        self.delays_ms: list[float] = []
+        self.ages_ms: list[float] = []
+        self.memory_mb: list[float] = []
+        self.started_s = self.ended_s = 0.0
+        self._program = program
+        self._film = film
+        self._frames = frames
+        self._seen = 0
+        self._shown_ns = 0
+        self._beat_s = time.perf_counter()
+        self._heart = QTimer(timerType=Qt.TimerType.PreciseTimer, interval=_HEARTBEAT_MS)
+        self._heart.timeout.connect(self._beat)
+        program.live.polled.connect(self._take)
+        program.window.installEventFilter(self)
+        self._heart.start()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Look at the clock when what the window paints now is painted."""
+        if event.type() == QEvent.Type.UpdateRequest and self._shown_ns:
+            shown_ns, self._shown_ns = self._shown_ns, 0
+            QTimer.singleShot(0, lambda: self._painted(shown_ns))
+        return super().eventFilter(watched, event)
+
+    def _beat(self) -> None:
+        now_s = time.perf_counter()
+        if self._seen > _WARM_UP:
+            self.delays_ms.append(max(0.0, 1e3 * (now_s - self._beat_s) - _HEARTBEAT_MS))
+        self._beat_s = now_s
+
+    def _painted(self, shown_ns: int) -> None:
+        if self._seen > _WARM_UP:
+            self.ages_ms.append((time.monotonic_ns() - shown_ns) / 1e6)
+
+    def _take(self, snapshot: Snapshot) -> None:
+        seen = snapshot.observation
+        if seen is None or snapshot.frame is None:
+            return
+        if snapshot.procedure.state is State.SHOW_HAND and seen.is_steady:
+            self._program.live.do(Action.MAKE_CURSOR)
+        self._film.is_turned = snapshot.procedure.state is State.ALIGN
+        self._shown_ns = snapshot.frame.t_host_ns
+        self._seen = snapshot.frame.index
+        if self._seen > _WARM_UP and not self.started_s:
+            self.started_s = time.perf_counter()
+        if self._seen > _WARM_UP + 100 * len(self.memory_mb):
+            self.memory_mb.append(_resident_mb())
+        if self._seen > _WARM_UP + self._frames:
+            self.ended_s = time.perf_counter()
+            QApplication.quit()
+
+
+def measure(frames: int) -> list[Figure]:
+    """Return the figures of so many frames after a warm-up.
+
+    Parameters
+    ----------
+    frames : int
+    """
+    app = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(app, QApplication)
+    keep_window_quick()
+    app.setStyle("Fusion")
+    film = _Film()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        program = Program(PreferencesFile(folder / "preferences.json"))
+        program.window.resize(1920, 1080)
+        program.window.show()
+        # No camera is opened for a recording whose frames lie in memory.
+        settings = StationSettings(
+            source="recording",
+            headset="network",
+            host="127.0.0.1",
+            port=_free_port(),
+            sessions=str(folder / "sessions"),
+        )
+        program.live.opened.connect(lambda _path: _show_every_panel(program))
+        program.live.start(lambda: _FilmStation(film, settings), "both")
+        watch = _Measurement(program, film, frames)
+        with _headset(settings.port):
+            app.exec()
+        program.close()
+    rate_hz = frames / (watch.ended_s - watch.started_s)
+    grown = watch.memory_mb[-1] / watch.memory_mb[len(watch.memory_mb) // 4]
+    bare_s, first_s = (_start_s(code) for code in (_BARE_WINDOW, _FIRST_WINDOW))
+    return [
+        Figure("camera frames taken", rate_hz, "Hz"),
+        Figure("event loop's delay, p99", _percentile(watch.delays_ms, 99), "ms", at_most=30.0),
+        Figure("frame to screen, p95", _percentile(watch.ages_ms, 95), "ms", at_most=80.0),
+        Figure("first window / bare window", first_s / bare_s, "", at_most=1.5),
+        Figure(
+            f"memory at the end of {frames:,} frames / after a quarter", grown, "", at_most=1.05
+        ),
+        Figure("memory at the end", watch.memory_mb[-1], "MB"),
+    ]
+
+
+def main() -> None:
+    """Measure, and print the figures as JSON."""
+    parser = argparse.ArgumentParser(prog="handcal_gui.benchmark", description=__doc__)
+    parser.add_argument("--frames", type=int, default=20_000)
+    arguments = parser.parse_args()
+    figures: list[dict[str, Any]] = [figure.to_json() for figure in measure(arguments.frames)]
+    print(json.dumps({"figures": figures}))  # noqa: T201 (this is what it is for)
+
+
+def _show_every_panel(program: Program) -> None:
+    """Give the panels behind others windows of their own."""
+    for i, name in enumerate(("fine_tune", "trials", "session", "link")):
+        dock = program.window.docks[name]
+        dock.setFloating(True)
+        dock.move(100 + 420 * i, 500)
+        dock.show()
+
+
+@contextmanager
+def _headset(port: int) -> Iterator[None]:
+    """Run what stands for the headset, which really is another computer."""
+    command = [sys.executable, "-c", _HEADSET, str(port)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True)  # noqa: S603
+    assert process.stdin is not None
+    process.stdin.write(f"{_KEY}\n")
+    process.stdin.flush()
+    yield
+    process.kill()
+    process.communicate()
+
+
+def _free_port() -> int:
+    transport = UdpTransport(("127.0.0.1", 0), DEFAULT_SETTINGS.receive_buffer_bytes)
+    transport.close()
+    return transport.address[1]
+
+
+def _start_s(code: str) -> float:
+    """Return the median time of a process that ends with its first window on the screen."""
+    took_s = []
+    for _ in range(_STARTS):
+        started_s = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True)  # noqa: S603 (our own code)
+        took_s.append(time.perf_counter() - started_s)
+    return float(np.median(took_s))
+
+
+def _percentile(values: list[float], percent: float) -> float:
+    return float(np.percentile(values, percent)) if values else float("nan")
+
+
+def _resident_mb() -> float:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) / 1024
+    raise OSError("the memory in use is known on Linux only")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""What the command line asks for, once everything is imported."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import signal
+import sys
+from contextlib import suppress
+from dataclasses import replace
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from types import TracebackType
+
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import QApplication, QWidget
+
+from handcal.errors import HandcalError
+from handcal.files import make_folder
+from handcal.resources import resource_path
+from handcal.station_settings import StationSettings
+from handcal_gui.demonstration.demonstration import Demonstration
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+
+_LOG_BYTES = 2**20
+
+
+class LaunchError(Exception):
+    """Why the program cannot begin or did not succeed, and the exit status."""
+
+    def __init__(self, why: object, code: int) -> None:
+        super().__init__(str(why))
+        self.code = code
+
+
+def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> None:
+    """Run the program until its window is closed.
+
+    Parameters
+    ----------
+    app : QApplication
+    arguments : Namespace
+        Of the command line.
+    first : QWidget
+        The window that stands in its place until then.
+
+    Raises
+    ------
+    LaunchError
+        If it cannot begin, or the autopilot fails.
+    """
+    app.setApplicationDisplayName("handcal")
+    app.setWindowIcon(QIcon(str(resource_path("icons/handcal.svg"))))
+    file = PreferencesFile(arguments.preferences)
+    _log_to(file.path.with_name("handcal.log"))
+    try:
+        program = Program(file, remembers=not _is_demonstration(arguments))
+    except HandcalError as error:
+        raise LaunchError(error, 1) from error
+    sys.excepthook = lambda *error: _tell(program, *error)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # By the event loop, which may have yet to begin.
+        signal.signal(number, lambda *_: QTimer.singleShot(0, program.window.close))
+    awake = QTimer()  # lets Python see the signal
+    awake.start(200)
+    if arguments.size:
+        program.window.resize(arguments.size)
+    program.window.show()
+    first.close()
+    try:
+        demonstration = _begin(program, arguments)
+    except HandcalError as error:
+        program.close()
+        raise LaunchError(error, 2) from error
+    app.exec()
+    program.close()
+    if demonstration is not None and demonstration.complaint is not None:
+        raise LaunchError(demonstration.complaint, 1)
+
+
+def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | None:
+    """Do at once what the arguments ask for."""
+    settings = _station(program.preferences.station, arguments)
+    if _is_demonstration(arguments):
+        demonstration = Demonstration(program, arguments.output, arguments.screenshots)
+        demonstration.start(settings)
+        return demonstration
+    if arguments.session:
+        program.open_session(arguments.session)
+    else:
+        program.start.show_preferences(replace(program.preferences, station=settings))
+    return None
+
+
+def _station(settings: StationSettings, arguments: argparse.Namespace) -> StationSettings:
+    """Return the station that the arguments ask for."""
+    match arguments.source or ("simulator" if _is_demonstration(arguments) else None):
+        case None:
+            pass
+        case "simulator":
+            settings = replace(settings, source="simulator", headset="virtual")
+        case "realsense":
+            settings = replace(settings, source="realsense", headset="network")
+        case path:
+            recording = str(Path(path).absolute())  # remembered, to be found from any folder
+            settings = replace(settings, source="recording", recording=recording, headset="virtual")
+    if arguments.rig:
+        settings = replace(settings, rig=str(arguments.rig.absolute()))
+    if arguments.seed is not None:
+        settings = replace(settings, seed=arguments.seed)
+    return settings
+
+
+def _is_demonstration(arguments: argparse.Namespace) -> bool:
+    return bool(arguments.autopilot or arguments.screenshots)
+
+
+def _log_to(path: Path) -> None:
+    handlers: list[logging.Handler] = [logging.StreamHandler()]
+    with suppress(HandcalError, OSError):
+        make_folder(path.parent)
+        handlers.append(RotatingFileHandler(path, maxBytes=_LOG_BYTES, backupCount=1))
+    logging.basicConfig(
+        level=logging.WARNING, format="%(asctime)s %(name)s: %(message)s", handlers=handlers
+    )
+
+
+def _tell(
+    program: Program, kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Log an error that nobody expected, and say so; what was captured is on the disk already."""
+    logging.getLogger(__name__).error("broke down", exc_info=(kind, error, trace))
+    program.window.banner.show_message(
+        f"handcal broke down ({kind.__name__}: {error}). Everything captured is saved; "
+        "restart the program if it does not go on."
+    )
