@@ -21,6 +21,7 @@ PLANS: dict[EyePlan, str] = {
     "right": "Right eye only",
 }
 _DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
+_LEAST_ALIGN_NS = 1_500_000_000
 
 
 class Step(StrEnum):
@@ -221,6 +222,9 @@ class Wizard:
         hand = _hand_check(snapshot)
         is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_red
         limit_deg = np.degrees(procedure.guard_limit_rad)
+        cursor = procedure.cursor
+        # A second press of what made the cursor must not confirm a hand that has not moved.
+        is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_ALIGN_NS
         close = ""
         if len(procedure.eyes) == 1:
             close = f"Close the {'right' if procedure.eyes[0] == 'left' else 'left'} eye. "
@@ -228,7 +232,7 @@ class Wizard:
             Step.ALIGN,
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
             (hand, Check(f"Hand turned by less than {limit_deg:.0f}°", is_straight)),
-            Offer(Action.CONFIRM, "Confirm for the wearer", hand.holds),
+            Offer(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
             (Offer(Action.REDO, "Make another cursor"),),
             procedure.refusal,
         )

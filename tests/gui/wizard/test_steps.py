@@ -153,6 +153,13 @@ def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) 
     assert Wizard().view(snapshot()).checks[1].holds
 
 
+def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot: Maker) -> None:
+    now = snapshot()
+    assert not Wizard().view(now).main.is_enabled
+    later = replace(now, t_host_ns=now.t_host_ns + 2_000_000_000)
+    assert Wizard().view(later).main.is_enabled
+
+
 def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
     view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
     assert [check.text.split(":")[0] for check in view.checks[1:]] == ["Left eye", "Right eye"]
