@@ -20,7 +20,7 @@ LINES = {
 }
 """Colour of each outline, and width in pixels and style of its line."""
 _HALO_PX = 4.5
-_MOST_POINTS = 250
+_MOST_POINTS = 180
 """Of each outline, since Qt takes a microsecond and more for each."""
 _MARGIN = 0.12
 _WIDEST_CROP = 1.8
@@ -109,8 +109,7 @@ class EyeCanvas(QWidget):
         outlines["drawn"] = view.drawn.outline_px
         to_widget = self._to_widget()
         painter.setClipRect(to_widget.mapRect(_display(view)))
-        # Every third point is still closer to the next than the eye can tell.
-        lines = {what: to_widget.map(_closed(px[::3])) for what, px in outlines.items() if len(px)}
+        lines = {what: to_widget.map(_closed(px)) for what, px in outlines.items() if len(px)}
         painter.setPen(_pen(colors().canvas, _HALO_PX))
         for line in lines.values():
             painter.drawPolyline(line)
