@@ -32,7 +32,7 @@ def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
         (SessionEvent.ALIGNMENT_SAVED, {"number": 2, "sha256": "x"}, "alignment 2 is not the next"),
         (SessionEvent.ALIGNMENT_DELETED, {"number": 1}, "there is no alignment 1"),
         (SessionEvent.TRIAL_RESTORED, {"number": 1}, "there is no deleted trial 1"),
-        (SessionEvent.TRIAL_SAVED, {"number": 1, "trial": {}}, "the trial has no 'eye'"),
+        (SessionEvent.TRIAL_SAVED, {"number": 1, "trial": {}}, "the trial has no 'target_depth_m'"),
         (SessionEvent.FINE_TUNED, {}, "fine_tuned lacks 'shift_m'"),
         (SessionEvent.CREATED, {"rig_sha256": "x", "wearer": 3}, "holds something wrong"),
     ):
