@@ -26,8 +26,8 @@ class Autopilot(QObject):
     live : Live
     wizard_panel : WizardPanel
     look : callable, optional
-        Called with every view that stays a moment, before its button is pressed; may take its
-        time, or pause.
+        Called with every view before its button is pressed, and while the wearer aligns; may
+        take its time, or pause.
 
     Attributes
     ----------
@@ -74,7 +74,9 @@ class Autopilot(QObject):
             self._view, self._since_s = view, now_s
         if now_s - self._moved_s > _PATIENCE_S:
             self._end(lambda: self.stuck.emit(self._complaint(view)))
-        elif now_s - self._since_s > _LOOK_S:
+        elif now_s - self._since_s > _LOOK_S and (
+            view.main.is_enabled or view.main.action is Action.CONFIRM
+        ):
             self._act(view)
 
     def _act(self, view: View) -> None:
@@ -84,7 +86,7 @@ class Autopilot(QObject):
             return
         if view.main.action is Action.NEXT_WEARER:
             self._end(self.finished.emit)
-        elif view.main.is_enabled and view.main.action is not Action.CONFIRM:
+        elif view.main.action is not Action.CONFIRM:
             self._wizard_panel.press_main()
 
     def _end(self, tell: Callable[[], None]) -> None:
