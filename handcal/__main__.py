@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.errors import FileError, HandcalError
+from handcal.evaluate_commands import add_evaluate_commands
 from handcal.export.formats import FORMATS
 from handcal.files import make_folder
 from handcal.rig_commands import add_rig_commands
@@ -200,37 +201,6 @@ def headset(arguments: argparse.Namespace) -> None:
     run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())
 
 
-def evaluate(arguments: argparse.Namespace) -> None:
-    """Measure on annotated photographs how well hands are found."""
-    from handcal.detector import load_detector
-    from handcal.evaluate.annotations import read_annotations
-    from handcal.evaluate.contact_sheet import write_contact_sheet
-    from handcal.evaluate.detector import SCORE_MIN, detect_all, evaluation
-    from handcal.hand.detect import DetectSettings, HandDetector
-
-    settings = DetectSettings(score_min=SCORE_MIN)
-    model = arguments.model
-    detector = load_detector(settings) if model is None else HandDetector(model, settings)
-    photos = read_annotations(arguments.images, arguments.annotations)
-    with progress() as report:
-        results = detect_all(photos, detector, lambda share: report("Looking for hands", share))
-    result = evaluation(photos, results)
-    save(arguments.json, result)
-    if arguments.sheet is not None:
-        make_folder(arguments.sheet.parent)
-        write_contact_sheet(arguments.sheet, photos, results)
-    shown_table = table("hands", "AP at IoU 0.5")
-    for key, name in (
-        ("ap50", "all"),
-        ("ap50_large", "large, by the data set's rule"),
-        ("ap50_rel15", "15 % of the image's side or more"),
-        ("ap50_rel25", "25 % of the image's side or more"),
-    ):
-        shown_table.add_row(name, _cell(result[key]))
-    console.print(shown_table)
-    console.print(f"{result['hands']} hands in {result['images']} photographs")
-
-
 def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, each beside its target and a baseline of the same run."""
     from handcal.bench import QUICK, BenchSettings, bench_table, run_bench
@@ -328,13 +298,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     one.add_argument("--output", type=Path, required=True, help="folder for the results")
 
-    one = add(evaluate)
-    one.add_argument("what", choices=("detector",), help="what to evaluate")
-    one.add_argument("--images", type=Path, required=True, help="folder of photographs")
-    one.add_argument("--annotations", type=Path, required=True, help="JSON: the hands in them")
-    one.add_argument("--sheet", type=Path, metavar="FILE", help="picture of the worst failures")
-    one.add_argument("--model", type=Path, metavar="FILE", help="ONNX; the shipped one if absent")
-
     one = add(solve)
     one.add_argument("session", type=Path, help="a session's folder")
     one.add_argument("--method", choices=METHODS, help="solver; the session's own if absent")
@@ -402,6 +365,10 @@ def _parser() -> argparse.ArgumentParser:
         help="the desktop program instead: needs a display, 12 minutes",
     )
     add(doctor, json=False)
+
+    text = "How well handcal does on given data."
+    judged = commands.add_parser("evaluate", help=text, description=text)
+    add_evaluate_commands(judged.add_subparsers(metavar="WHAT", required=True, parser_class=Parser))
 
     text = "The offline calibration: boards, cameras, displays, and the rig file made of them."
     rig = commands.add_parser("rig", help=text, description=text)
