@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from handcal.export import figures
 from handcal.export.definitions import DEFINITIONS
 from handcal.export.outcome import Origin, Outcome
-from handcal.export.page import Column, Document, plain
 from handcal.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
+from handcal.report.page import Column, Document, plain
 from handcal.results import Results
 from handcal.trial import ErrorStatistics, summarise
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from handcal.export.page import CONTENT_MM, WIDTH_MM, Column, Document, plain
+from handcal.report.page import CONTENT_MM, WIDTH_MM, Column, Document, plain
 
 LOREM = "When the wearer confirmed, the hand covered the cursor; $x_1$ is no formula. " * 12
 

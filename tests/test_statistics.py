@@ -1,0 +1,157 @@
+"""Spread and intervals; the intervals' coverage is measured in 1,000 studies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.random import Generator
+
+from handcal.statistics import mean_interval, summarise, variance_components
+from handcal.types import Float64
+
+STUDIES = 1000
+# Three standard deviations of a share of 1,000 about 0.95 are 0.021.
+NOMINAL = 0.95, 0.021
+TRUE_MEAN = 10.0
+
+Wearers = Callable[[Generator, int], Float64]
+
+
+def even(random: Generator, count: int) -> Float64:
+    return random.normal(TRUE_MEAN, 2.0, count)
+
+
+def skewed(random: Generator, count: int) -> Float64:
+    return random.gamma(4.0, TRUE_MEAN / 4.0, count)
+
+
+def coverage(wearers: Wearers, count: int, trials: int, seed: int) -> float:
+    """Return the share of studies whose interval covers the true mean error.
+
+    In a study, wearers' errors differ, each trial's differ from the wearer's, and each trial's four
+    corners are much alike.
+    """
+    random = np.random.default_rng(seed)
+    clusters = np.repeat(np.arange(count), 4 * trials)
+    covered = 0
+    for _ in range(STUDIES):
+        of_trials = np.repeat(wearers(random, count), trials) * random.gamma(
+            9, 1 / 9, count * trials
+        )
+        of_corners = np.repeat(of_trials, 4) * random.uniform(0.9, 1.1, 4 * count * trials)
+        found = mean_interval(of_corners, clusters.tolist())
+        covered += found.low <= TRUE_MEAN <= found.high
+    return covered / STUDIES
+
+
+@pytest.mark.parametrize(("count", "trials"), [(3, 10), (10, 3), (30, 1)])
+def test_of_1000_studies_of_wearers_as_many_intervals_cover_the_truth_as_they_say(
+    count: int, trials: int
+) -> None:
+    nominal, tolerance = NOMINAL
+    assert abs(coverage(even, count, trials, seed=count) - nominal) <= tolerance
+
+
+def test_so_they_do_if_wearers_errors_are_skewed() -> None:
+    nominal, tolerance = NOMINAL
+    assert abs(coverage(skewed, 10, 3, seed=1) - nominal) <= tolerance
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.99])
+def test_any_level_is_kept_by_independent_skewed_errors(level: float) -> None:
+    random = np.random.default_rng(2)
+    errors = random.rayleigh(1.0, (STUDIES, 20))
+    found = [mean_interval(row, level=level) for row in errors]
+    covered = np.mean([one.low <= np.sqrt(np.pi / 2) <= one.high for one in found])
+    assert abs(covered - level) < 3.0 * np.sqrt(level * (1.0 - level) / STUDIES)
+
+
+def test_taking_corners_for_independent_would_promise_too_much() -> None:
+    random = np.random.default_rng(3)
+    wearer = np.arange(10).repeat(40)
+    errors = even(random, 10).repeat(40) + random.normal(0.0, 0.5, 400)
+    honest, bold = mean_interval(errors, wearer.tolist()), mean_interval(errors)
+    assert (honest.clusters, bold.clusters) == (10, 400)
+    assert honest.mean == pytest.approx(bold.mean)
+    assert honest.high - honest.low > 4.0 * (bold.high - bold.low)
+
+
+def test_without_skewness_it_is_students_interval() -> None:
+    found = mean_interval([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert (found.mean, found.level, found.clusters) == (3.0, 0.95, 5)
+    half = 2.7764451 * np.sqrt(2.5 / 5.0)  # t of 4 degrees of freedom
+    assert [found.low, found.high] == pytest.approx([3.0 - half, 3.0 + half])
+
+
+def test_a_long_tail_widens_its_side() -> None:
+    found = mean_interval([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 6.0])
+    assert found.high - found.mean > 1.5 * (found.mean - found.low) > 0.0
+
+
+def test_each_wearer_counts_once() -> None:
+    found = mean_interval([1.0, 1.0, 1.0, 4.0], ["a", "a", "a", "b"])
+    assert found.mean == 2.5
+
+
+@given(
+    st.lists(st.floats(-100, 100), min_size=5, max_size=30),
+    st.floats(0.1, 10.0),
+    st.floats(-100, 100),
+)
+def test_the_interval_holds_the_mean_and_moves_with_the_unit(
+    values: list[float], scale: float, shift: float
+) -> None:
+    one = mean_interval(values)
+    other = mean_interval(scale * np.array(values) + shift)
+    assert one.low <= one.mean <= one.high or np.ptp(values) < 1e-9
+    assert [other.low, other.high] == pytest.approx(
+        [scale * one.low + shift, scale * one.high + shift], rel=1e-3, abs=1e-3
+    )
+
+
+def test_equal_values_leave_no_doubt() -> None:
+    found = mean_interval([2.0] * 6)
+    assert (found.low, found.mean, found.high) == (2.0, 2.0, 2.0)
+
+
+def test_the_spread_is_as_by_hand() -> None:
+    found = summarise([4.0, 1.0, 3.0, 2.0, 5.0])
+    assert (found.count, found.mean, found.median) == (5, 3.0, 3.0)
+    assert (found.q1, found.q3, found.min, found.max) == (2.0, 4.0, 1.0, 5.0)
+    assert found.sd == pytest.approx(np.sqrt(2.5))
+    assert summarise([7.0]).sd == 0.0
+
+
+def test_variance_components_are_recovered() -> None:
+    random = np.random.default_rng(4)
+    wearers = random.integers(0, 400, 6000)  # of unequal numbers
+    errors = random.normal(10.0, 2.0, 400)[wearers] + random.normal(0.0, 3.0, 6000)
+    found = variance_components(errors, wearers.tolist())
+    assert found.between == pytest.approx(2.0, rel=0.1)
+    assert found.within == pytest.approx(3.0, rel=0.05)
+
+
+def test_wearers_who_do_not_differ_have_no_variance_between_them() -> None:
+    assert variance_components([1.0, 2.0, 1.0, 2.0], "aabb").between == 0.0
+
+
+@pytest.mark.parametrize("values", [[], [1.0, np.nan], [[1.0], [2.0]]])
+def test_what_is_no_row_of_numbers_is_refused(values: list[float]) -> None:
+    for of in (summarise, mean_interval):
+        with pytest.raises(ValueError, match="finite numbers"):
+            of(values)
+
+
+def test_too_little_is_refused() -> None:
+    with pytest.raises(ValueError, match="two independent values"):
+        mean_interval([1.0, 2.0], ["a", "a"])
+    with pytest.raises(ValueError, match="as many clusters"):
+        mean_interval([1.0, 2.0], ["a"])
+    with pytest.raises(ValueError, match="between 0 and 1, not 95"):
+        mean_interval([1.0, 2.0], level=95)
+    with pytest.raises(ValueError, match="two clusters"):
+        variance_components([1.0, 2.0], ["a", "b"])
