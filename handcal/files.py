@@ -51,6 +51,12 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
         raise FileError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+def require_suffix(path: Path, suffix: str) -> None:
+    """Raise FileError unless a file to be written is called as what it will be: ``.png``."""
+    if path.suffix.lower() != suffix:
+        raise FileError(f"{path} must end in {suffix}, as that is what is written")
+
+
 def read_limited(path: Path, max_bytes: int) -> bytes:
     """Return the content of `path`.
 

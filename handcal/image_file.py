@@ -1,4 +1,4 @@
-"""Image files that may be hostile: their size is known before any memory is given to them."""
+"""Image files: read though they may be hostile, their size known before any memory is given."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import FileError
-from handcal.files import read_limited
+from handcal.files import read_limited, require_suffix, write_atomic
+from handcal.types import UInt8
 
 _MAX_FILE_BYTES = 64 * 2**20
 MAX_SIDE_PX = 8192
@@ -40,6 +41,19 @@ def read_image(path: Path, flags: int) -> NDArray[Any]:
     if image is None:
         raise FileError(f"{path} is damaged")
     return image
+
+
+def write_png(path: Path, image: UInt8) -> None:
+    """Write an image, (H, W) grey or (H, W, 3) RGB, atomically.
+
+    Raises
+    ------
+    FileError
+        If `path` does not end in ``.png``, or cannot be written.
+    """
+    require_suffix(path, ".png")
+    stored = image[..., ::-1] if image.ndim == 3 else image
+    write_atomic(path, cv2.imencode(".png", stored)[1].tobytes())
 
 
 def _image_size(data: bytes, path: Path) -> tuple[int, int]:

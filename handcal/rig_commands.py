@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.errors import FileError, HandcalError
 from handcal.files import make_folder, write_json
-from handcal.terminal import Commands, Parser, add_command, console, number, progress, table
+from handcal.terminal import Commands, Parser, add_command, console, fail, number, progress, table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,13 +25,11 @@ if TYPE_CHECKING:
 
 def board(arguments: argparse.Namespace) -> None:
     """Make a board to put up: a PDF at true size, or a PNG for a screen."""
-    import cv2
-
-    from handcal.files import write_atomic
+    from handcal.image_file import write_png
     from handcal.rig.board_print import draw_board, write_board_pdf
 
     if arguments.pdf is None and arguments.png is None:
-        raise HandcalError("say where the board goes: --pdf FILE, --png FILE or both")
+        fail("say where the board goes: --pdf FILE, --png FILE or both", 2)
     made = board_of(arguments)
     try:
         if arguments.pdf:
@@ -41,7 +39,7 @@ def board(arguments: argparse.Namespace) -> None:
         if arguments.png:
             image = draw_board(made, arguments.square_px)
             make_folder(arguments.png.parent)
-            write_atomic(arguments.png, cv2.imencode(".png", image)[1].tobytes())
+            write_png(arguments.png, image)
             console.print(f"{arguments.png}: {image.shape[1]}x{image.shape[0]} pixels")
     except ValueError as error:
         raise HandcalError(str(error)) from error

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.errors import FileError, HandcalError
-from handcal.files import make_folder, write_atomic
+from handcal.errors import HandcalError
+from handcal.files import make_folder
 from handcal.rig_commands import add_board_options, board_of, show_views
 from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
 
@@ -22,13 +21,12 @@ if TYPE_CHECKING:
 
 def grid(arguments: argparse.Namespace) -> None:
     """Make the image that a display shows to the viewpoint camera, pixel for pixel."""
-    import cv2
-
+    from handcal.image_file import write_png
     from handcal.rig.grid import draw_grid
 
     made = _grid(arguments, *arguments.display)
     make_folder(arguments.png.parent)
-    write_atomic(arguments.png, cv2.imencode(".png", draw_grid(made))[1].tobytes())
+    write_png(arguments.png, draw_grid(made))
     columns, rows = made.squares
     console.print(
         f"{arguments.png}: {columns}×{rows} squares of {made.square_px} px; show it unscaled"
@@ -63,7 +61,7 @@ def display(arguments: argparse.Namespace) -> None:
         f"by {np.degrees(result.turn_rad):.2f}° against V; RMS {homography.rms_px:.3f} px"
     )
     console.print(f"{result.verdict.name}: {result.verdict.reason}")
-    _write(arguments.output, with_display(rig, eye, result, _now()))
+    _write(arguments.output, with_display(rig, eye, result))
 
 
 def make(arguments: argparse.Namespace) -> None:
@@ -74,7 +72,6 @@ def make(arguments: argparse.Namespace) -> None:
     rig = with_stereo(
         _read_rig(arguments.rig),
         read_stereo(arguments.stereo),
-        _now(),
         depth_intrinsics=read_intrinsics(arguments.depth_intrinsics)
         if arguments.depth_intrinsics
         else None,
@@ -217,21 +214,15 @@ def _grid(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:
     from handcal.rig.formats import read_stereo
     from handcal.rig.tracked_file import read_tracked
-    from handcal.rig.viewpoint import TrackedView, locate_viewpoint, viewpoint_from_stereo
-    from handcal.rig.views import image_files, read_views, used
+    from handcal.rig.viewpoint import viewpoint_from_stereo, viewpoint_from_tracked
+    from handcal.rig.views import image_files, read_views
 
     if arguments.stereo:
         return viewpoint_from_stereo(read_stereo(arguments.stereo))
     poses = read_tracked(arguments.tracked)
     with progress() as report:
         views = read_views(image_files(arguments.board_images), board_of(arguments), report)
-    found = used(views, 1)
-    missing = sorted(set(found) - set(poses))
-    if missing:
-        raise FileError(f"{arguments.tracked} holds no pose for {', '.join(missing)}")
-    viewpoint = locate_viewpoint(
-        {name: TrackedView(one, poses[name]) for name, one in found.items()}, camera
-    )
+    viewpoint = viewpoint_from_tracked(views, poses, camera)
     show_views(views, viewpoint.residuals_px)
     return viewpoint
 
@@ -268,7 +259,3 @@ def _write(path: Path, rig: Rig) -> None:
     except ValueError as error:
         raise HandcalError(f"this is no plausible rig: {error}") from error
     console.print(f"{path}")
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -100,10 +100,20 @@ def test_camera_then_stereo_then_conversion(
     np.testing.assert_allclose(read_pose(tmp_path / "converted"), found, atol=1e-12)
 
 
+def test_a_board_without_a_file_is_misuse(
+    rig: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        rig("board")
+    assert ended.value.code == 2
+    assert "say where the board goes" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("board",), "say where the board goes"),
+        (("board", "--png", "b.txt"), "b.txt must end in .png"),
+        (("board", "--pdf", "b.png"), "b.png must end in .pdf"),
         (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
         (("camera", "nowhere"), "no PNG or JPEG images"),
         (("camera", "{depth}", "--drop", "x.png"), "there is no image x.png to drop"),

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from handcal.display import view_of_eye
-from handcal.errors import FileError, HandcalError
+from handcal.errors import HandcalError
 from handcal.geometry import invert, rigid
 from handcal.rig.board import Board
 from handcal.rig.example import FOCAL_PX, example_rig
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.tracked_file import write_tracked
+from handcal.rig.views import ViewsError
 from handcal.rig_file_commands import add_rig_file_commands
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
@@ -87,7 +88,7 @@ def test_a_display_is_calibrated_from_photographs(
 def test_a_missing_pose_is_named(folder: Path, tmp_path: Path) -> None:
     poses = tmp_path / "poses.json"
     write_tracked(poses, {"0.png": np.eye(4)})
-    with pytest.raises(FileError, match=r"no pose for 1\.png, 2\.png, 3\.png"):
+    with pytest.raises(ViewsError, match=r"no tracked pose for 1\.png, 2\.png, 3\.png"):
         calibrate(folder, tmp_path / "rig.yaml", "--distance-m", 2, "--tracked", poses)
 
 

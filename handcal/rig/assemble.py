@@ -7,6 +7,7 @@ displays' sizes and T_V_H. So can one part of a finished rig be calibrated again
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from textwrap import shorten
 
 import numpy as np
@@ -28,7 +29,9 @@ def screen_of(rig: Rig, eye: Eye) -> Screen:
     return Screen(display.width_px, display.height_px, display.T_V_H)
 
 
-def with_display(rig: Rig, eye: Eye, calibration: DisplayCalibration, made: str) -> Rig:
+def with_display(
+    rig: Rig, eye: Eye, calibration: DisplayCalibration, made: str | None = None
+) -> Rig:
     """Return `rig` with one eye's display calibrated.
 
     Parameters
@@ -36,8 +39,8 @@ def with_display(rig: Rig, eye: Eye, calibration: DisplayCalibration, made: str)
     rig : Rig
     eye : {"left", "right"}
     calibration : DisplayCalibration
-    made : str
-        When: ISO 8601.
+    made : str, optional
+        When, ISO 8601; now if not given.
     """
     homography = calibration.homography
     origin = _origin(
@@ -56,7 +59,7 @@ def with_display(rig: Rig, eye: Eye, calibration: DisplayCalibration, made: str)
 def with_stereo(
     rig: Rig,
     stereo: StereoCalibration,
-    made: str,
+    made: str | None = None,
     *,
     depth_intrinsics: Intrinsics | None = None,
     T_C_D: Float64 | None = None,
@@ -67,8 +70,8 @@ def with_stereo(
     ----------
     rig : Rig
     stereo : StereoCalibration
-    made : str
-        When: ISO 8601.
+    made : str, optional
+        When, ISO 8601; now if not given.
     depth_intrinsics, T_C_D : Intrinsics, (4, 4) float64, optional
         If the stereo calibration is of the depth camera's colour imager and depth is not aligned
         to it: the depth imager's own, and from the depth to the colour imager, as the device
@@ -97,7 +100,7 @@ def with_stereo(
 
 def _origin(
     method: str,
-    made: str,
+    made: str | None,
     views: int,
     rms_px: float,
     verdict: CalibrationVerdict,
@@ -106,7 +109,7 @@ def _origin(
 ) -> Origin:
     return Origin(
         method=method,
-        made=made,
+        made=made or datetime.now(UTC).isoformat(timespec="seconds"),
         views=views,
         rms_px=rms_px,
         verdict=verdict.name,

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import cv2
 import numpy as np
 
-from handcal.files import write_atomic
+from handcal.files import require_suffix, write_atomic
 from handcal.rig.board import Board, charuco
 from handcal.types import Float64, UInt8
 
@@ -64,8 +64,9 @@ def write_board_pdf(path: Path, board: Board, paper: Paper = "a4") -> None:
     ValueError
         If the board does not fit on the paper.
     FileError
-        If the file cannot be written.
+        If `path` does not end in ``.pdf``, or cannot be written.
     """
+    require_suffix(path, ".pdf")
     page_m = _page(board, paper)
     origin_m = (page_m - _size_m(board) - [0.0, _CAPTION_M]) / 2
     rectangles = [*(black_rectangles_m(board) + np.tile(origin_m, 2)), *_ruler(page_m)]

@@ -42,14 +42,22 @@ def why_not_found(gray: UInt8, board: Board, find: FindCorners) -> str:
     find : callable
         `handcal.rig.board.find_corners`.
     """
-    shades = np.percentile(gray, (2, 98))
-    if shades[1] - shades[0] < 25:
-        if shades[1] < 60:
-            return "the image is too dark"
-        return "the image is too bright" if shades[0] > 195 else "the image has no contrast"
+    light = light_trouble(gray)
+    if light:
+        return light
     if board.kind == "checkerboard":
         return _why_no_checkerboard(gray, board)
     return _why_no_charuco(gray, board, find)
+
+
+def light_trouble(gray: UInt8) -> str:
+    """Return what is wrong with an image's light; an empty text if nothing is."""
+    low, high = np.percentile(gray, (2, 98))
+    if high - low >= 25:
+        return ""
+    if high < 60:
+        return "the image is too dark"
+    return "the image is too bright" if low > 195 else "the image has no contrast"
 
 
 def _why_no_checkerboard(gray: UInt8, board: Board) -> str:

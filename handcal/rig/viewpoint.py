@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -15,7 +15,7 @@ from handcal.rig.board import BoardView
 from handcal.rig.covariance import clustered_covariance
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import ViewsError
+from handcal.rig.views import View, ViewsError, used
 from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, freeze
 
@@ -132,6 +132,25 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
         residuals_px=residuals_px,
         rms_px=rms(off),
         verdict=_judge(residuals_px, rms(off), float(np.sqrt(np.trace(covariance[3:, 3:])))),
+    )
+
+
+def viewpoint_from_tracked(
+    views: Iterable[View], T_H_B: Mapping[str, Float64], camera: Intrinsics
+) -> ViewpointPose:
+    """Take the place from views of a board, not those left out, and its tracked poses by name.
+
+    Raises
+    ------
+    ViewsError
+        If the board is seen in too few, or one in which it is seen has no pose.
+    """
+    found = used(views, 1)
+    missing = sorted(set(found) - set(T_H_B))
+    if missing:
+        raise ViewsError(f"there is no tracked pose for {', '.join(missing)}: add it, or drop it")
+    return locate_viewpoint(
+        {name: TrackedView(seen, T_H_B[name]) for name, seen in found.items()}, camera
     )
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from handcal.display import view_of_eye
-from handcal.files import make_folder, write_atomic
+from handcal.files import make_folder
 from handcal.geometry import invert, rigid
+from handcal.image_file import write_png
 from handcal.rig.board import Board
 from handcal.rig.grid import Grid, draw_grid
 from handcal.rig.tracked_file import write_tracked
@@ -75,5 +75,5 @@ def write_photographs(
 def _write(folder: Path, number: int, image: UInt8) -> str:
     """Write an image; return the name of its file."""
     name = f"{folder.name}-{number:03}.png"
-    write_atomic(make_folder(folder) / name, cv2.imencode(".png", image)[1].tobytes())
+    write_png(make_folder(folder) / name, image)
     return name

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import get_args
 
-import cv2
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
@@ -20,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
-from handcal.files import write_atomic
+from handcal.image_file import write_png
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import Paper, draw_board, write_board_pdf
 from handcal.types import UInt8
@@ -223,4 +222,4 @@ def _draw(board: Board) -> UInt8:
 
 
 def _write_picture(path: Path, board: Board) -> None:
-    write_atomic(path, cv2.imencode(".png", draw_board(board, _PICTURE_PX))[1].tobytes())
+    write_png(path, draw_board(board, _PICTURE_PX))

@@ -6,12 +6,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import cv2
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
-from handcal.files import write_atomic
+from handcal.image_file import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.grid import Grid, draw_grid
 from handcal.types import Eye
@@ -169,7 +168,7 @@ class DisplayPage(StepPage):
         if not path:
             return
         try:
-            write_atomic(Path(path), cv2.imencode(".png", draw_grid(grid))[1].tobytes())
+            write_png(Path(path), draw_grid(grid))
         except FileError as error:
             self._grid.show_trouble(str(error))
             return

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
@@ -81,6 +82,11 @@ class ResultPage(QWidget):
         self._saved = None
         self._use.setEnabled(False)
         self._compare()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Take the name that is being typed: a button may be clicked without taking the focus."""
+        self._take_name()
+        super().hideEvent(event)
 
     def save(self) -> None:
         """Ask where to, and save the rig file."""

@@ -13,6 +13,7 @@ from handcal.types import UInt8
 from handcal_gui.rig.shots import Shot
 from handcal_gui.theme import SPACING_PX, icon, number_font, quiet
 from handcal_gui.widgets.number_label import UNKNOWN
+from handcal_gui.widgets.sentence import sentence
 
 _COLUMNS = {
     "Image": "Unticked images are left out; tick them again to take them in.",
@@ -149,7 +150,7 @@ def _name(item: QTreeWidgetItem) -> str:
 
 def _note(item: QTreeWidgetItem, note: str) -> None:
     """Show the image's name, and below it what there is to say about it."""
-    text = "\n".join(filter(None, (_name(item), f"{note[:1].upper()}{note[1:]}")))
+    text = "\n".join(filter(None, (_name(item), sentence(note))))
     item.setText(_IMAGE, text)
     item.setToolTip(_IMAGE, text)
 

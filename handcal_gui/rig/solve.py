@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from handcal.errors import FileError, HandcalError
+from handcal.errors import HandcalError
 from handcal.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
@@ -27,11 +26,10 @@ from handcal.rig.stereo import StereoSettings, calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import (
-    TrackedView,
     ViewpointPose,
     board_pose,
-    locate_viewpoint,
     viewpoint_from_stereo,
+    viewpoint_from_tracked,
 )
 from handcal.rig.views import View, used
 from handcal.rig.worst import WorstView
@@ -78,7 +76,6 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
     put = partial(
         with_stereo,
         stereo=result,
-        made=_now(),
         depth_intrinsics=_intrinsics(entries.imager_intrinsics),
         T_C_D=_pose(entries.depth_to_color),
     )
@@ -125,7 +122,7 @@ def solve_display(
     seen = {name: on_display(found, grid) for name, found in used(views, 1).items()}
     homography = fit_homography(seen, camera, screen.width_px, screen.height_px)
     result = calibrate_display(homography, camera, place, screen, _distance(entries))
-    put = partial(with_display, eye=eye, calibration=result, made=_now())
+    put = partial(with_display, eye=eye, calibration=result)
     solved = Solved(
         result.verdict,
         display_rows(result),
@@ -153,12 +150,7 @@ def _place(
         raise HandcalError("say where the board was tracked: the file of its poses is missing")
     poses = read_tracked(Path(entries.tracked).expanduser())
     views = [view for (view,) in without(shots, entries.dropped_board)]
-    found = used(views, 1)
-    missing = sorted(set(found) - set(poses))
-    if missing:
-        raise FileError(f"{entries.tracked} holds no pose for {', '.join(missing)}")
-    tracked = {name: TrackedView(one, poses[name]) for name, one in found.items()}
-    place = locate_viewpoint(tracked, camera)
+    place = viewpoint_from_tracked(views, poses, camera)
     return place, Solved(place.verdict, (), place.residuals_px, _tilts(views, camera))
 
 
@@ -180,7 +172,3 @@ def _intrinsics(path: str) -> Intrinsics | None:
 
 def _pose(path: str) -> Float64 | None:
     return read_pose(Path(path).expanduser()) if path else None
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")

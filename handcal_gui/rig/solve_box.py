@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
 from typing import Any
 
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
@@ -19,6 +18,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import main_button
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.times import local_time
 
 HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
 
@@ -64,7 +64,7 @@ class SolveBox(QWidget):
         if origin is None:
             self.show_finding(Finding("", Health.LIMITED, "Not solved yet"))
             return
-        text = f"Solved {_local(origin.made)}: {origin.verdict}; {origin.reason}"
+        text = f"Solved {local_time(origin.made)}: {origin.verdict}; {origin.reason}"
         self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
 
     def show_finding(self, finding: Finding) -> None:
@@ -104,10 +104,3 @@ class SolveBox(QWidget):
         layout.setSpacing(2 * SPACING_PX)
         layout.addLayout(left, 1)
         layout.addWidget(self._table)
-
-
-def _local(made: str) -> str:
-    try:
-        return f"{datetime.fromisoformat(made).astimezone():%d %b %Y, %H:%M}"
-    except ValueError:
-        return made

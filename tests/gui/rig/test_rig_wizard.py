@@ -162,6 +162,15 @@ def test_back_and_next_lead_through_the_steps(wizard: RigWizard) -> None:
     assert wizard.step == RIGHT
 
 
+def test_a_name_being_typed_is_kept_when_another_step_is_shown(wizard: RigWizard) -> None:
+    wizard.show_step(RESULT)
+    child(wizard, QLineEdit, "rigName").setText("Our headset")
+    wizard.show_step(BOARDS)
+    wizard.show_step(RESULT)
+    assert child(wizard, QLineEdit, "rigName").text() == "Our headset"
+    assert wizard.draft.rig.name == "Our headset"
+
+
 def test_a_grid_that_has_no_room_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
     wizard.show_step(LEFT)
     square = child(wizard, QSpinBox, "gridSquare")

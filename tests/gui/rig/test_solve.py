@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from handcal.display import view_of_eye
-from handcal.errors import FileError, HandcalError
+from handcal.errors import HandcalError
 from handcal.files import write_json
 from handcal.geometry import invert, rigid
 from handcal.rig.assemble import screen_of
@@ -19,6 +19,7 @@ from handcal.rig.formats import read_intrinsics, stereo_json, write_intrinsics
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.tracked_file import read_tracked, write_tracked
 from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.views import ViewsError
 from handcal.rig.worst import WorstView
 from handcal_gui.rig.shots import Shot, look
 from handcal_gui.rig.solve import Solved, grid_of, solve_display, solve_stereo, solve_viewpoint
@@ -111,7 +112,7 @@ def test_what_is_missing_is_named(photographs: Any, display_shots: Any, tmp_path
     del poses["board-left-002.png"]
     write_tracked(tmp_path / "some.json", poses)
     some = replace(entries, tracked=str(tmp_path / "some.json"))
-    with pytest.raises(FileError, match=r"no pose for board-left-002\.png"):
+    with pytest.raises(ViewsError, match=r"no tracked pose for board-left-002\.png"):
         solve_left(photographs, display_shots, tmp_path, some)
 
 

@@ -1,0 +1,170 @@
+"""A cube with an ArUco marker on every face: its description, and where it is in an image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+
+from handcal.errors import HandcalError
+from handcal.geometry import camera_matrix, image_points, rigid, transform
+from handcal.rig.board import DICTIONARIES
+from handcal.rig.board_trouble import light_trouble
+from handcal.rig.worst import rms
+from handcal.types import Float64, Intrinsics, UInt8
+
+FACES = ("front", "right", "back", "left", "top", "bottom")
+MIN_FACES = 2
+# x to the right and y down along each face's print, in the cube's frame.
+_AXES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
+    "front": ((1, 0, 0), (0, 1, 0)),
+    "right": ((0, 0, 1), (0, 1, 0)),
+    "back": ((-1, 0, 0), (0, 1, 0)),
+    "left": ((0, 0, -1), (0, 1, 0)),
+    "top": ((1, 0, 0), (0, 0, -1)),
+    "bottom": ((1, 0, 0), (0, 0, 1)),
+}
+# From the middle of a face to the corners of its marker, as OpenCV orders them.
+_AROUND = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+# Corners farther from where the pose puts them belong to another cube, in markers' sides.
+_MISFIT_SIDES = 0.05
+
+
+class CubeError(HandcalError):
+    """The cube was not found in an image; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cube:
+    """A cube with one marker in the middle of each face, upright in the printed net.
+
+    Its frame has the origin in the cube's middle. Who looks at the front has x to the right, y
+    down and z into the cube. The net is left, front, right and back side by side, top above the
+    front, bottom below it.
+
+    Attributes
+    ----------
+    side_m, marker_m : float
+        Sides of a face and of a marker, as measured on the cube.
+    dictionary : str
+        Of the markers, as OpenCV calls it.
+    ids : tuple of 6 int
+        The markers on front, right, back, left, top and bottom.
+    """
+
+    side_m: float = 0.060
+    marker_m: float = 0.045
+    dictionary: str = "DICT_4X4_50"
+    ids: tuple[int, int, int, int, int, int] = (0, 1, 2, 3, 4, 5)
+
+    def __post_init__(self) -> None:
+        if not 0.01 <= self.side_m <= 1.0:
+            raise ValueError("the side of the cube must lie between 10 mm and 1 m")
+        if not 0.3 * self.side_m <= self.marker_m <= 0.9 * self.side_m:
+            raise ValueError("the markers' side must be 0.3 to 0.9 of the cube's")
+        if self.dictionary not in DICTIONARIES:
+            raise ValueError(f"no dictionary {self.dictionary}; DICT_4X4_50 is one")
+        markers = len(self.marker_dictionary.bytesList)
+        if len(set(self.ids)) != len(FACES) or not all(0 <= i < markers for i in self.ids):
+            raise ValueError(
+                f"the ids must be six different ones of the {markers} in {self.dictionary}"
+            )
+
+    @property
+    def marker_dictionary(self) -> cv2.aruco.Dictionary:
+        """The markers that `dictionary` names."""
+        return cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary])
+
+
+def face_pose(cube: Cube, marker: int) -> Float64:
+    """Return ``T_cube_face`` (4, 4): the face's middle, x right and y down along its print."""
+    x, y = np.array(_AXES[FACES[cube.ids.index(marker)]], dtype=np.float64)
+    inwards = np.cross(x, y)
+    return rigid(np.column_stack([x, y, inwards]), -0.5 * cube.side_m * inwards)
+
+
+def corners_m(cube: Cube, markers: Iterable[int]) -> Float64:
+    """Return the corners of markers in the cube's frame, (4 * markers, 3), as OpenCV orders them."""
+    flat = np.column_stack([cube.marker_m * _AROUND, np.zeros(4)])
+    return np.concatenate([transform(face_pose(cube, marker), flat) for marker in markers])
+
+
+def find_cube(image: UInt8, cube: Cube) -> Mapping[int, Float64]:
+    """Find the cube's markers in an image.
+
+    Parameters
+    ----------
+    image : (H, W) uint8
+        Grey, not mirrored.
+    cube : Cube
+
+    Returns
+    -------
+    mapping of int to (4, 2) float64
+        The corners of each marker seen, in pixels, by its number, in order.
+
+    Raises
+    ------
+    CubeError
+        If fewer than `MIN_FACES` are seen, or one twice.
+    """
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    found, numbers, _ = cv2.aruco.ArucoDetector(cube.marker_dictionary, parameters).detectMarkers(
+        image
+    )
+    ids = [] if numbers is None else [int(number) for number in numbers.ravel()]
+    seen = sorted(set(ids) & set(cube.ids))
+    if len(seen) < MIN_FACES:
+        raise CubeError(_why_not_found(image, cube, ids))
+    twice = [marker for marker in seen if ids.count(marker) > 1]
+    if twice:
+        raise CubeError(f"marker {twice[0]} is seen twice: take other cubes and prints away")
+    return MappingProxyType(
+        {marker: found[ids.index(marker)].reshape(4, 2).astype(np.float64) for marker in seen}
+    )
+
+
+def cube_pose(corners_px: Mapping[int, Float64], cube: Cube, camera: Intrinsics) -> Float64:
+    """Return ``T_camera_cube`` (4, 4), by PnP from the corners of at least two markers.
+
+    Raises
+    ------
+    CubeError
+        If the corners do not lie as on this cube.
+    """
+    points_m, pixels = corners_m(cube, corners_px), np.concatenate([*corners_px.values()])
+    K, distortion = camera_matrix(camera), np.array(camera.distortion)
+    _, rotation, translation = cv2.solvePnP(
+        points_m, pixels, K, distortion, flags=cv2.SOLVEPNP_SQPNP
+    )
+    rotation, translation = cv2.solvePnPRefineLM(
+        points_m, pixels, K, distortion, rotation, translation
+    )
+    T = rigid(rotation.ravel(), translation.ravel())
+    side_px = np.linalg.norm(np.diff(pixels.reshape(-1, 4, 2), axis=1), axis=2).max()
+    off_px = rms(image_points(transform(T, points_m), camera) - pixels)
+    if not off_px < _MISFIT_SIDES * side_px:
+        raise CubeError(
+            f"the corners lie {off_px:.1f} px from where this cube has them: check its sides and "
+            "which marker is on which face"
+        )
+    return T
+
+
+def _why_not_found(image: UInt8, cube: Cube, ids: list[int]) -> str:
+    light = light_trouble(image)
+    if light:
+        return light
+    seen = sorted(set(ids) & set(cube.ids))
+    if seen:
+        return (
+            f"only one face (marker {seen[0]}) is seen: turn the cube until two or three of its "
+            "faces show, sharp and evenly lit"
+        )
+    if ids:
+        return f"marker {ids[0]} is seen, which is not on this cube"
+    return "no marker of the cube is seen: it must be in the image, sharp and evenly lit"
