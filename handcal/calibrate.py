@@ -52,6 +52,7 @@ MAX_HAND_SET_SHIFT_M = 0.030
 """Each component of a φ set by hand: beyond the eye box, whose size it is."""
 
 _LATEST_CONFIRMATION_S = 1.0
+_MIDDLE_OF_EVERY = 8  # points; a median of all takes half a millisecond
 """Hands are kept for so long, lest a confirmation sent again finds its frame gone."""
 
 
@@ -112,7 +113,7 @@ class PlacedHand:
     points_W_m : (N, 3) float64
         The cloud's surface.
     middle_W_m : (3,) float64
-        Its median.
+        Its median, to a millimetre.
     """
 
     cloud: HandCloud
@@ -556,7 +557,8 @@ class Calibration:
                 problem = str(error)
             else:
                 points_W_m = transform(T_W_D, cloud.points_m)
-                hand = PlacedHand(cloud, t_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0))
+                middle_W_m = np.median(points_W_m[::_MIDDLE_OF_EVERY], axis=0)
+                hand = PlacedHand(cloud, t_ns, T_W_D, points_W_m, middle_W_m)
                 self._hands.append(hand)
             self._unplaced.popleft()
         return hand, problem
@@ -596,8 +598,9 @@ class Calibration:
 
     def _show_live(self, observation: Observation, hand: PlacedHand) -> Observation:
         started_s = time.perf_counter()
+        assert self._guard is not None
         try:
-            rotation_W = self._rotation(hand)
+            rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
         except HandError as error:
             return replace(observation, hand=None, problem=str(error))
         is_red = self._is_over(rotation_W)
@@ -612,9 +615,10 @@ class Calibration:
     def _take(self, confirmation: Confirmation) -> None:
         """Accept or refuse a confirmation."""
         assert self._cursor is not None
+        assert self._guard is not None
         try:
             hand = self._hand_at(confirmation.t_host_ns)
-            rotation_W = self._rotation(hand)
+            rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
         except HandError as error:
             self._refuse(f"{error}. Align and confirm again.", "no hand")
             return
@@ -660,10 +664,6 @@ class Calibration:
         self._link.send_prompt(prompt, self.eyes)
         refused = {"reason": reason, "angle_deg": angle_deg, "cursor_id": self._cursor_id}
         self._store(lambda session: session.record("refused", **refused))
-
-    def _rotation(self, hand: PlacedHand) -> Float64:
-        assert self._guard is not None
-        return self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
 
     def _is_over(self, rotation: Float64) -> bool:
         return float(np.linalg.norm(rotation)) > self._settings.guard.limit_rad

@@ -2,11 +2,16 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
 from handcal.geometry import rigid
 from handcal.types import Alignment
+
+# A busy machine fails no test.
+hypothesis.settings.register_profile("handcal", deadline=None)
+hypothesis.settings.load_profile("handcal")
 
 
 @pytest.fixture(scope="session")

@@ -691,7 +691,7 @@ def test_a_hand_beside_cut_edges_counts_as_none(
     def all_cut(*_: object) -> Float64:
         raise HandError("all of the hand lies beside cut edges")
 
-    monkeypatch.setattr(RotationGuard, "rotation", all_cut)
+    monkeypatch.setattr(RotationGuard, "_describe", all_cut)
     seen = stage.see()
     assert seen.hand is None
     assert "beside cut edges" in seen.problem

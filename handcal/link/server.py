@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 import time
 from collections import deque
@@ -9,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.link import handcal_pb2 as pb
@@ -146,7 +148,9 @@ class HeadsetServer(Endpoint):
         return self._send_reliably(Slot.CURSOR, messages.cursor(points_W_m, cursor_id))
 
     def send_live_hand(self, points_W_m: ArrayLike, red: bool) -> None:
-        """Send the live hand, (N, 3) of frame W; the newest replaces what has not left yet.
+        """Send the live hand, (N, 3) of frame W, thinned evenly to what every frame can carry.
+
+        The newest replaces what has not left yet.
 
         Raises
         ------
@@ -155,11 +159,13 @@ class HeadsetServer(Endpoint):
         LinkError
             If the link is closed.
         """
+        points = np.asarray(points_W_m)
+        thinned = points[:: max(1, math.ceil(len(points) / self._settings.live_points))]
         with self._changed:
             self._require_running()
             self._live_frame += 1
             self._stream.clear()
-            self._stream.extend(messages.live_hand(points_W_m, red, self._live_frame))
+            self._stream.extend(messages.live_hand(thinned, red, self._live_frame))
 
     def send_prompt(self, text: str, eyes: Sequence[Eye] = EYES) -> Outgoing:
         """Send a text to show and the eyes to keep open, reliably.

@@ -27,6 +27,8 @@ class LinkSettings:
         Longest wait for a datagram while nothing is queued.
     receive_buffer_bytes : int
         Socket buffer to ask the system for.
+    live_points : int
+        Points at most of a live hand, for each frame: with these it looks closed.
     """
 
     resend_s: float = 0.04
@@ -39,6 +41,7 @@ class LinkSettings:
     burst_pause_s: float = 0.001
     idle_wait_s: float = 0.005
     receive_buffer_bytes: int = 4 * 2**20
+    live_points: int = 3000
 
 
 DEFAULT_SETTINGS = LinkSettings()

@@ -12,6 +12,7 @@ from handcal.link.wire import MAX_DATAGRAM_BYTES
 Address: TypeAlias = tuple[str, int]
 
 _MAX_BATCH = 256
+_ANYWHERE: Address = ("192.0.2.1", 9)  # an address for documentation; nothing is sent there
 
 
 class Transport(Protocol):
@@ -93,6 +94,18 @@ def local_address(server: Address) -> Address:
         except OSError as error:
             raise LinkError(f"cannot reach {server[0]}:{server[1]}: {error.strerror}") from error
         return probe.getsockname()[0], 0
+
+
+def reachable_address(bound: Address) -> Address:
+    """Return where others reach a socket: on all networks, the address of the default one.
+
+    Raises
+    ------
+    LinkError
+        If it is bound on all networks, but there is none.
+    """
+    host, port = bound
+    return (local_address(_ANYWHERE)[0], port) if host == "0.0.0.0" else bound  # noqa: S104
 
 
 def resolve(host: str, port: int) -> Address:

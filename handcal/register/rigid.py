@@ -69,18 +69,23 @@ class RigidResult:
 
 
 def register_rigid(
-    source: Surface, target: Surface, settings: RigidSettings = RigidSettings()
+    source: Surface,
+    target: Surface,
+    settings: RigidSettings = RigidSettings(),
+    T_start: Float64 | None = None,
 ) -> RigidResult:
-    """Register `source` to `target`, from where their means lie on one another.
+    """Register `source` to `target`.
 
     Parameters
     ----------
     source, target : Surface
         From `describe_surface`.
     settings : RigidSettings
+    T_start : (4, 4) float64, optional
+        T_target_source to begin with; by default their means lie on one another.
     """
     offset_m = target.points_m.mean(axis=0) - source.points_m.mean(axis=0)
-    T_target_source = rigid(translation_m=offset_m)
+    T_target_source = rigid(translation_m=offset_m) if T_start is None else T_start
     reach_m = np.sqrt(source.points_m.var(axis=0).sum())
     history: list[float] = []
     information = np.eye(6)

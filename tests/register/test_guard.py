@@ -140,3 +140,22 @@ def test_the_advice_is_about_the_axis_turned_about_most() -> None:
     assert turn_advice([0.1, -0.3, 0.2]) == TurnAdvice(
         "y", 0.3, "Turn the right edge of your hand toward you"
     )
+
+
+def test_following_a_turning_hand_gives_what_registering_it_anew_does() -> None:
+    made = trial_alignment(1, 0.0, SENSED)
+    guard = RotationGuard(made.cursor_m, made.cursor_cut)
+    middle_m = made.cursor_m.mean(axis=0)
+    for angle_deg in (0.0, 2.0, 4.0, 7.0, 10.0, 9.0):
+        turn = rigid([0.0, np.radians(angle_deg), 0.0])
+        hand_m = transform(turn, made.hand_m - middle_m) + middle_m
+        followed = guard.follow(hand_m, made.hand_cut)
+        assert _miss_deg(followed, guard.rotation(hand_m, made.hand_cut)) < 0.6
+
+
+def test_a_hand_that_leaps_is_found_again() -> None:
+    made = trial_alignment(1, 0.0, SENSED)
+    guard = RotationGuard(made.cursor_m, made.cursor_cut)
+    guard.follow(transform(rigid([0.0, 0.0, 1.0]), made.hand_m), made.hand_cut)
+    followed = guard.follow(made.hand_m, made.hand_cut)
+    assert _miss_deg(followed, guard.rotation(made.hand_m, made.hand_cut)) < 0.6
