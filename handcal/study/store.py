@@ -1,0 +1,117 @@
+"""A study's folder: what it is a study of, the trials done so far, and the table of them all.
+
+Rows are stored in chunks, each written at once and checked by its SHA-256 when read; one that is
+damaged counts as not done.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from handcal.errors import FileError
+from handcal.files import make_folder, read_json, write_atomic, write_json
+
+Row: TypeAlias = dict[str, float | int | str | bool | None]
+"""One row of a study's table; None where there is nothing to tell."""
+
+_LIBRARIES = "handcal", "numpy", "scipy", "opencv-python-headless"
+
+
+class StudyFolder:
+    """The folder of one study.
+
+    Parameters
+    ----------
+    path : Path
+        Made if it is not there.
+    name : str
+    settings : dict
+        JSON-able.
+    chunks : sequence of sequence of dict
+        The cases, JSON-able, as they are stored together.
+
+    Raises
+    ------
+    FileError
+        If the folder holds another study, or cannot be read or written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        name: str,
+        settings: Mapping[str, Any],
+        chunks: Sequence[Sequence[Mapping[str, Any]]],
+    ) -> None:
+        self._path = make_folder(path)
+        self._chunks = make_folder(path / "chunks")
+        file = path / "study.json"
+        study = json.loads(
+            json.dumps(
+                {
+                    "name": name,
+                    "settings": settings,
+                    "cases": sum(map(len, chunks)),
+                    "cases_sha256": _sha256(chunks),
+                    "versions": {library: version(library) for library in _LIBRARIES}
+                    | {"python": platform.python_version()},
+                }
+            )
+        )
+        if not file.exists():
+            write_json(file, study)
+        elif others := _differences(read_json(file), study):
+            raise FileError(
+                f"{path} holds another study ({others}); "
+                "choose another folder, or delete this one to begin again"
+            )
+
+    def read_chunk(self, number: int) -> list[list[Row]] | None:
+        """Return the rows of each case of a chunk; None if it is not there, or damaged."""
+        file = self._file(number)
+        try:
+            stored = read_json(file)
+        except FileError:
+            return None
+        rows: list[list[Row]] | None = stored.get("rows")
+        return rows if stored.get("sha256") == _sha256(rows) else None
+
+    def write_chunk(self, number: int, rows: list[list[Row]]) -> None:
+        """Store the rows of each case of a chunk."""
+        write_json(self._file(number), {"sha256": _sha256(rows), "rows": rows})
+
+    def write_rows(self, rows: Sequence[Row]) -> None:
+        """Write ``rows.csv``: a column for every key, in the order in which they first come."""
+        columns = list(dict.fromkeys(key for row in rows for key in row))
+        text = io.StringIO()
+        writer = csv.DictWriter(text, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        write_atomic(self._path / "rows.csv", text.getvalue().encode())
+
+    def _file(self, number: int) -> Path:
+        return self._chunks / f"{number:04d}.json"
+
+
+def _sha256(value: object) -> str:
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()
+
+
+def _differences(stored: Mapping[str, Any], study: Mapping[str, Any]) -> str:
+    """Return what the two differ in, as one line: empty if they are the same."""
+    parts = []
+    for key in study:
+        old, new = stored.get(key), study[key]
+        if isinstance(old, dict) and isinstance(new, dict):
+            parts.append(_differences(old, new))
+        elif old != new:
+            parts.append(f"{key} {old!r} there, {new!r} here")
+    return "; ".join(filter(None, parts))

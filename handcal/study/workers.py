@@ -1,0 +1,119 @@
+"""Who does a study's trials: this process, processes on this machine, or a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
+from contextlib import contextmanager
+
+from handcal.errors import HandcalError
+
+_CONNECT_S = 10
+_THREAD_LIMITS = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
+
+
+@contextmanager
+def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executor]:
+    """Yield what runs functions; what has not begun when the context is left is not run.
+
+    Parameters
+    ----------
+    workers : int or None
+        Processes on this machine, as many as cores if None; 1 means a thread of this process.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers do the work instead.
+
+    Raises
+    ------
+    HandcalError
+        If there is no such scheduler, Dask is not installed, or a worker dies.
+    """
+    workers = workers or os.cpu_count() or 1
+    if scheduler is not None:
+        opened = _cluster(scheduler)
+    elif workers == 1:
+        opened = _shut_down(ThreadPoolExecutor(1))
+    else:
+        opened = _processes(workers)
+    with opened as executor:
+        yield executor
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as error:
+        raise HandcalError(
+            "studies on a cluster need Dask: install it with pip install handcal[cluster]"
+        ) from error
+    try:
+        client = Client(  # type: ignore[no-untyped-call]
+            address, timeout=_CONNECT_S, set_as_default=False
+        )
+    except (OSError, ValueError) as error:
+        raise HandcalError(
+            f"no Dask scheduler answers at {address!r}; start one with `dask scheduler` and "
+            "give the address that it shows, as tcp://HOST:PORT"
+        ) from error
+    with client:
+        try:
+            yield client.get_executor(pure=False)  # type: ignore[no-untyped-call]
+        except (KilledWorker, CancelledError) as error:
+            raise HandcalError(
+                "the Dask cluster lost its scheduler or its workers; the same command goes on "
+                "once it is there again"
+            ) from error
+
+
+@contextmanager
+def _processes(workers: int) -> Iterator[Executor]:
+    # More than one thread of linear algebra in each process would only be in the others' way.
+    before = {name: os.environ.get(name) for name in _THREAD_LIMITS}
+    os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
+    context = multiprocessing.get_context("spawn")
+    try:
+        with _shut_down(ProcessPoolExecutor(workers, context, _prepare_process)) as executor:
+            yield executor
+    except BrokenExecutor as error:
+        raise HandcalError(
+            "a process of the study died, perhaps for want of memory; the same command goes on, "
+            "with --workers fewer of them"
+        ) from error
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def _shut_down(executor: Executor) -> Iterator[Executor]:
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _prepare_process() -> None:
+    """Leave Ctrl+C to the process that started this one, and end with it, even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "this process was started by multiprocessing"
+    parent.join()
+    os._exit(1)
