@@ -11,12 +11,13 @@ from typing import Literal, TypeAlias
 
 from handcal.camera.folder import FolderCamera
 from handcal.camera.recording import check_recording
+from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.sdk_devices import choose_device, connected_devices, librealsense
 from handcal.doctor import Finding, Health, examine_camera, examine_disk
 from handcal.errors import HandcalError, LinkError
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
-from handcal.link.transport import Address, UdpTransport, local_address
+from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 from handcal.rig.rig_file import read_rig
 from handcal.station_settings import StationSettings
@@ -28,9 +29,6 @@ PARTS: dict[Part, str] = {
     "rig": "Rig file",
     "sessions": "Session folder",
 }
-RECORDING_SUFFIXES = (".db3", ".bag")
-
-_ANYWHERE: Address = ("192.0.2.1", 9)  # an address for documentation; nothing is sent there
 
 
 def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Finding]:
@@ -131,17 +129,11 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
     if not 1 <= settings.port <= 65535:
         return _broken(f"{settings.port} is no port", "choose one from 1 to 65535")
     _require_free((settings.host, settings.port))
-    if not address.is_unspecified:
-        return _good(_invitation(settings.host, settings.port))
     try:
-        host, _ = local_address(_ANYWHERE)
+        host, port = reachable_address((str(address), settings.port))
     except LinkError:
         return _limited("this computer has no network", "connect it to the headset's network")
-    return _good(_invitation(host, settings.port))
-
-
-def _invitation(host: str, port: int) -> str:
-    return f"let it connect to {host}, UDP port {port}, with the pairing key"
+    return _good(f"let it connect to {host}, UDP port {port}, with the pairing key")
 
 
 def _require_free(address: Address) -> None:

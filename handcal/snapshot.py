@@ -11,7 +11,7 @@ from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
 from handcal.results import Results
 from handcal.session import SessionRecord
-from handcal.types import Eye, Float64, Frame
+from handcal.types import Alignment, Eye, Float64, Frame
 from handcal.wearer_view import EyeView
 
 
@@ -31,6 +31,8 @@ class Procedure:
     refused : int
         Confirmations refused so far.
     guard_limit_rad : float
+    alignments : tuple of Alignment
+        Those not deleted, even while the session cannot take them.
     results : Results or None
         Of all alignments; None while there are none, or alignments have changed since.
     applied_shift_m : mapping of eye to (3,) float64
@@ -45,6 +47,7 @@ class Procedure:
     refusal: str
     refused: int
     guard_limit_rad: float
+    alignments: tuple[Alignment, ...]
     results: Results | None
     applied_shift_m: Mapping[Eye, Float64]
     is_applied: bool

@@ -26,6 +26,7 @@ from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
 from handcal.link.pairing import new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
+from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session import Session
 from handcal.sim.eyes import TrueEyes
@@ -112,7 +113,9 @@ class Station(Closable):
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where the headset connects to."""
+        """Where the headset connects to: host, which others can reach, and port."""
+        with suppress(LinkError):  # no network, not yet
+            return reachable_address(self._link.address)
         return self._link.address
 
     def step(self) -> Snapshot:
@@ -271,10 +274,10 @@ class Station(Closable):
             return ""
         if self._simulation is not None:
             return "the virtual headset has not connected yet"
-        host, port = self._link.address
+        host, port = self.address
         return (
-            f"no headset is connected; let it connect to UDP port {port} of this computer "
-            f"(listening at {host}) with the pairing key"
+            f"no headset is connected; let it connect to {host}, UDP port {port}, with the "
+            "pairing key"
         )
 
     def _procedure(self) -> Procedure:
@@ -286,6 +289,7 @@ class Station(Closable):
             refusal=calibration.refusal,
             refused=calibration.refused,
             guard_limit_rad=self.settings.calibration.guard.limit_rad,
+            alignments=calibration.alignments,
             results=calibration.results,
             applied_shift_m=calibration.applied_shift_m,
             is_applied=calibration.is_applied,

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Literal, Protocol
 
 from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence, QRegion
+from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -72,9 +72,6 @@ class Panel(Protocol):
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show what there is of it."""
-
-    def visibleRegion(self) -> QRegion:
-        """Return what can be seen of the panel."""
 
 
 @dataclass(frozen=True, slots=True)

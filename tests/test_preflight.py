@@ -157,13 +157,13 @@ def test_a_network_headset_cannot_be_waited_for(
     assert find("headset", replace(live, port=70_000)).found == "70000 is no port"
     assert find("headset", live, key="short").found == "the pairing key is too short"
     everywhere = replace(live, host="0.0.0.0")
-    monkeypatch.setattr(preflight, "local_address", lambda _: ("192.168.1.20", 5))
+    monkeypatch.setattr(preflight, "reachable_address", lambda bound: ("192.168.1.20", bound[1]))
     assert "192.168.1.20" in find("headset", everywhere).found
 
     def fail(_: object) -> None:
         raise LinkError("cannot reach")
 
-    monkeypatch.setattr(preflight, "local_address", fail)
+    monkeypatch.setattr(preflight, "reachable_address", fail)
     assert find("headset", everywhere).health is Health.LIMITED
 
 

@@ -33,6 +33,7 @@ from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
+from handcal_gui.widgets.sentence import sentence
 
 _EMPTY = "The camera's picture will appear here. Choose a camera on the start page."
 _NO_COLOR = "This camera gives no colour picture."
@@ -96,9 +97,9 @@ class CameraPanel(QWidget):
         """Show the newest frame, unless frozen, and how the camera does."""
         if not self._freeze.isChecked() and snapshot.frame is not None:
             self._show_frame(snapshot.frame, snapshot.observation)
-        problem = snapshot.camera.problem or ("" if self._frame else _EMPTY)
+        message = "No picture" if snapshot.camera.problem else "" if self._frame else _EMPTY
         caption = "Frozen" if self._freeze.isChecked() else self._caption
-        self._pictures.show_text(message=problem, caption="" if problem else caption)
+        self._pictures.show_text(message=message, caption="" if message else caption)
         age_ms = (snapshot.t_host_ns - self._frame.t_host_ns) / 1e6 if self._frame else None
         self._status.show_status(snapshot.camera, age_ms)
 
@@ -261,4 +262,4 @@ def _caption(seen: Observation) -> str:
     """Return what is to be said of the hand."""
     if seen.is_red and seen.rotation_rad is not None:
         return f"Turned by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
-    return seen.problem[:1].upper() + seen.problem[1:]
+    return sentence(seen.problem)

@@ -17,6 +17,7 @@ from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.cloud.cloud_view import CloudView
 from handcal_gui.cloud.orbit import Direction
 from handcal_gui.cloud.splat import rgb
+from handcal_gui.panels.missing import what_is_missing
 from handcal_gui.results.residual_scale import ResidualScale, residual_colors
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import LegendEntry
@@ -106,10 +107,9 @@ class CloudPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the cursor, while there is one, and the live hand."""
         seen, cursor = snapshot.observation, snapshot.procedure.cursor
-        problem = snapshot.camera.problem or (seen.problem if seen else "")
+        problem = what_is_missing(snapshot)
         if seen is None and not problem:
             return
-        problem = problem[:1].upper() + problem[1:]
         hand = seen.hand if seen and not problem else None
         placed = cursor or hand
         if placed is None:

@@ -22,6 +22,7 @@ from handcal_gui.link.link_history import LinkHistory
 from handcal_gui.link.link_table import RATES_S, LinkTable
 from handcal_gui.link.pairing_box import PairingBox
 from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.widgets.sentence import sentence
 
 _PERIOD_S = 0.25
 """Numbers that change faster cannot be read."""
@@ -106,7 +107,7 @@ class LinkPanel(QWidget):
             self._is_connected = is_connected
             self._draw_sign(is_connected)
         word = "Connected" if is_connected else "Not connected"
-        self._state.setText(f"{word}. {problem[:1].upper()}{problem[1:]}" if problem else word)
+        self._state.setText(f"{word}. {sentence(problem)}" if problem else word)
 
     def _draw_sign(self, is_connected: bool) -> None:
         drawn = icon("link", colors().good) if is_connected else icon("link-off", colors().warning)

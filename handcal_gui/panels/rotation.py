@@ -16,6 +16,7 @@ from handcal_gui.rotation.dial import RotationDial
 from handcal_gui.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.plots import Plot
+from handcal_gui.widgets.sentence import sentence
 
 _HISTORY_S = 10.0
 _HISTORY_LIMITS = 2.0
@@ -61,14 +62,15 @@ class RotationPanel(QWidget):
             self._angle_line.clear()
         if procedure.cursor is None or procedure.state is not State.ALIGN:
             self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
+        elif snapshot.camera.problem:
+            self._show_nothing("? No picture", _NO_HAND)
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
 
     def _show_observation(self, observation: Observation) -> None:
         if observation.rotation_rad is None:
-            problem = observation.problem
-            self._show_nothing("? No hand", problem[:1].upper() + problem[1:] or _NO_HAND)
+            self._show_nothing("? No hand", sentence(observation.problem) or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
         if angle_rad < _STRAIGHT_RAD and not observation.is_red:

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidg
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal.wearer_view import EyeView, Overlay
+from handcal_gui.panels.missing import what_is_missing
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.wearer_view.eye_canvas import LINES, EyeCanvas
 from handcal_gui.widgets.legend import LegendEntry
@@ -59,11 +60,10 @@ class WearerViewPanel(QWidget):
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show what the eyes see, which eye is closed, or why there is nothing to see."""
-        seen, procedure = snapshot.observation, snapshot.procedure
-        problem = snapshot.camera.problem or (seen.problem if seen else "")
+        procedure, missing = snapshot.procedure, what_is_missing(snapshot)
         for eye, column in self._eyes.items():
             is_closed = procedure.cursor is not None and eye not in procedure.eyes
-            message = _CLOSED if is_closed else problem[:1].upper() + problem[1:]
+            message = _CLOSED if is_closed else missing
             is_solved = procedure.results is not None and eye in procedure.results.shifts
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
 

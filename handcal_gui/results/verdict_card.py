@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 from handcal.types import Eye, Verdict
 from handcal_gui.results.rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.sentence import sentence
 
 _ROLES = {"accept": "good", "repeat": "warning", "implausible": "red"}
 _REASON_LINES = 4
@@ -48,7 +49,7 @@ class VerdictCard(QFrame):
             self._reason.setText("Took no part in any alignment")
         else:
             self._word.setText(VERDICT_WORDS[verdict.name])
-            self._reason.setText(verdict.reason[:1].upper() + verdict.reason[1:])
+            self._reason.setText(sentence(verdict.reason))
         self._reason.setToolTip(self._reason.text())
         self._recolor()
 

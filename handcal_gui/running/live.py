@@ -66,6 +66,7 @@ class Live(QObject):
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
         self._is_watching = self._turn = False
+        self._seen: set[Panel] = set()
         self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
         self._complained_of = ""
         self._timer = QTimer(self)
@@ -216,18 +217,22 @@ class Live(QObject):
         self._turn = not self._turn
         waiting = (panels.cloud,) if self._turn else (panels.rotation, panels.wearer_view)
         for panel in panels.all():
-            if panel in always or not (panel in waiting or panel.visibleRegion().isEmpty()):
+            if panel in always or (panel in self._seen and panel not in waiting):
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
             snapshot.problem or snapshot.camera.problem or snapshot.link_problem
         )
-        self._watch_views(not panels.wearer_view.visibleRegion().isEmpty())
+        self._watch_views(panels.wearer_view in self._seen)
         self.polled.emit(snapshot)
 
     def _catch_up(self, panel: Panel, is_seen: bool) -> None:
         """Let a panel that comes into sight show at once how things stand."""
-        if is_seen and self._snapshot is not None:
+        if not is_seen:
+            self._seen.discard(panel)
+            return
+        self._seen.add(panel)
+        if self._snapshot is not None:
             panel.show_snapshot(self._snapshot)
 
     def _watch_views(self, wanted: bool) -> None:

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.sentence import sentence
 
 
 class Banner(QWidget):
@@ -66,7 +67,7 @@ class Banner(QWidget):
 
     def _refresh(self) -> None:
         self._icon.setPixmap(icon("warning").pixmap(2 * SPACING_PX))
-        self._text.setText(self.text[:1].upper() + self.text[1:])
+        self._text.setText(sentence(self.text))
         self._close.setVisible(bool(self._message))
         self.setStyleSheet(f"#banner {{ border: 1px solid {colors().red}; border-radius: 4px; }}")
         self.setVisible(bool(self.text))

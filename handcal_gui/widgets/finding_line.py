@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 from handcal.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.fields import button, named, paragraph
+from handcal_gui.widgets.sentence import sentence
 
 _ICONS = {Health.GOOD: "check", Health.LIMITED: "warning", Health.BROKEN: "cross"}
 _WORDS = {Health.GOOD: "Good", Health.LIMITED: "Note", Health.BROKEN: "Problem"}
@@ -42,7 +43,9 @@ class FindingLine(QWidget):
     ) -> None:
         """Show a finding; `fix` labels the button that calls `mend`."""
         self._finding, self._mend = finding, mend
-        self._text.setText(" ".join(map(_sentence, filter(None, (finding.found, finding.advice)))))
+        self._text.setText(
+            " ".join(map(_full_sentence, filter(None, (finding.found, finding.advice))))
+        )
         self._button.setText(fix)
         self._button.setVisible(bool(fix))
         self._refresh()
@@ -71,5 +74,5 @@ class FindingLine(QWidget):
             self._mend()
 
 
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
+def _full_sentence(text: str) -> str:
+    return f"{sentence(text)}{'' if text.endswith('.') else '.'}"

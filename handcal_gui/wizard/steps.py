@@ -12,6 +12,7 @@ import numpy as np
 from handcal.calibrate import State
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye
+from handcal_gui.widgets.sentence import sentence
 
 EyePlan = Literal["both", "each", "left", "right"]
 PLANS: dict[EyePlan, str] = {
@@ -170,16 +171,16 @@ class Wizard:
         """Return the eyes that the next alignment is for."""
         if self._repeat is not None:
             return (self._repeat,)
-        return next_eyes(self.plan, snapshot.record.alignments)
+        return next_eyes(self.plan, snapshot.procedure.alignments)
 
     def _connect(self, snapshot: Snapshot) -> View:
         camera, link = snapshot.camera, snapshot.link
         checks = (
             Check(
-                _sentence(camera.problem) or f"Camera: {camera.name}",
+                "No picture from the camera" if camera.problem else f"Camera: {camera.name}",
                 not camera.problem and camera.rate_hz > 0,
             ),
-            Check(_sentence(snapshot.link_problem) or "Headset connected", link.connected),
+            Check(sentence(snapshot.link_problem) or "Headset connected", link.connected),
             Check(
                 f"Headset tells its pose {link.pose_rate_hz:.0f} times a second"
                 if link.pose_rate_hz
@@ -196,7 +197,7 @@ class Wizard:
 
     def _show_hand(self, snapshot: Snapshot) -> View:
         back = Offer(Action.BACK, "Back")
-        if snapshot.procedure.state is State.SHOW_HAND and snapshot.record.alignments:
+        if snapshot.procedure.state is State.SHOW_HAND and snapshot.procedure.alignments:
             back = Offer(Action.SOLVE, "Keep the alignments so far")
         return View(
             Step.SHOW_HAND,
@@ -239,7 +240,7 @@ class Wizard:
 
     def _solve(self, snapshot: Snapshot) -> View:
         procedure = snapshot.procedure
-        count = len(snapshot.record.alignments)
+        count = len(snapshot.procedure.alignments)
         aligned = Check(f"{count} alignment{'' if count == 1 else 's'} confirmed", True)
         redo = Offer(Action.REDO, "Discard and repeat")
         if procedure.state is State.ALIGNED or procedure.results is None:
@@ -267,7 +268,7 @@ class Wizard:
 
     def _verify(self, snapshot: Snapshot) -> View:
         checks = _verdict_checks(snapshot)
-        if snapshot.procedure.results is None and snapshot.record.alignments:
+        if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return View(
                 Step.VERIFY,
                 "The alignments have changed. Solve again.",
@@ -275,7 +276,7 @@ class Wizard:
                 Offer(Action.SOLVE, "Solve"),
                 (Offer(Action.ANOTHER, "Add alignment"),),
             )
-        if not is_complete(self.plan, snapshot.record.alignments):
+        if not is_complete(self.plan, snapshot.procedure.alignments):
             eyes = _names(self.eyes(snapshot))
             return View(
                 Step.VERIFY,
@@ -337,7 +338,7 @@ def _hand_check(snapshot: Snapshot) -> Check:
     if seen is not None and seen.hand is not None:
         return Check("Hand found", True)
     problem = seen.problem if seen is not None else ""
-    return Check(_sentence(problem or "no hand in view"), False)
+    return Check(sentence(problem or "no hand in view"), False)
 
 
 def _verdict_checks(snapshot: Snapshot) -> tuple[Check, ...]:
@@ -348,10 +349,6 @@ def _verdict_checks(snapshot: Snapshot) -> tuple[Check, ...]:
         Check(f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}", verdict.name == "accept")
         for eye, verdict in results.verdicts.items()
     )
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _names(eyes: Sequence[Eye]) -> str:

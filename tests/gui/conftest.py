@@ -148,7 +148,10 @@ def snapshot(
             link=replace(LINK, **link),
             link_problem="",
             problem="",
-            procedure=replace(_procedure(state, shots, results), **procedure),
+            procedure=replace(
+                _procedure(state, shots, results),
+                **{"alignments": changes.get("record", record).alignments, **procedure},
+            ),
             record=record,
             views=_views(rig, shots),
         )
@@ -332,6 +335,7 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
         refusal="",
         refused=0,
         guard_limit_rad=float(np.radians(9.0)),
+        alignments=(),
         results=results if is_solved else None,
         applied_shift_m=applied_m,
         is_applied=state is not State.APPLYING,

@@ -177,6 +177,12 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert stored.station == studio.settings
 
 
+def shown_checks(technician: Technician) -> list[str]:
+    """Return what the wizard says that there is, and is not."""
+    shown = technician.program.wizard_panel.shown
+    return [check.text for check in shown.checks] if shown else []
+
+
 def test_a_hand_lost_is_said_and_nothing_can_be_made_of_it(live: Technician, studio: Any) -> None:
     studio.camera.shows = "cursor"
     live.press_space_for(Action.NEXT)
@@ -225,7 +231,11 @@ def test_a_silent_headset_is_told_and_sending_repeated(live: Technician, studio:
     live.wait(lambda: "no headset is connected" in live.snapshot.link_problem)
     assert "acknowledge" in live.banner
     assert "acknowledge" in live.child(QLabel, "wizardNote").text()
+    live.program.window.docks["link"].raise_()
+    state = live.child(QLabel, "link-state")
+    live.wait(lambda: state.text().startswith("Not connected"))
     studio.headset.come_back()
+    live.wait(lambda: state.text() == "Connected")
     live.wait(lambda: not live.snapshot.link_problem)
     live.press_space_for(Action.APPLY)
     live.wait_for_state(State.APPLIED)
@@ -264,6 +274,7 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
     assert live.snapshot.record.alignments == ()
+    live.wait(lambda: "1 alignment confirmed" in shown_checks(live))
     away.rename(path)
     live.wait(lambda: live.banner == "")
     live.wait(lambda: live.snapshot.record.is_solved)

@@ -169,7 +169,7 @@ def test_an_unplugged_camera_leaves_its_last_picture_dimmed(
             t_host_ns=NOW_NS + 20_000_000_000,
         )
     )
-    assert view(panel, "colour").message == problem
+    assert view(panel, "colour").message == "No picture"
     assert text(panel, "camera-age") == "20 s"
     dimmed = picture(panel)
     assert dimmed != before

@@ -89,20 +89,23 @@ def test_eye_that_is_closed_says_so(panel: WearerViewPanel, snapshot: MakeSnapsh
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "message"),
     [
-        {"observation": {"hand": None, "problem": "no hand in view"}},
-        {"observation": None, "camera": {"problem": "no hand in view"}},
+        (
+            {"observation": {"hand": None, "cloud": None, "problem": "no hand in view; raise it"}},
+            "No hand",
+        ),
+        ({"observation": {"hand": None, "problem": "no pose yet"}}, "No pose yet"),
+        ({"observation": None, "camera": {"problem": "no camera is connected"}}, "No picture"),
     ],
-    ids=["lost hand", "camera"],
 )
 def test_problem_takes_the_place_of_the_view(
-    panel: WearerViewPanel, snapshot: MakeSnapshot, changes: dict[str, object]
+    panel: WearerViewPanel, snapshot: MakeSnapshot, changes: dict[str, object], message: str
 ) -> None:
     panel.show_snapshot(snapshot())
     panel.show_snapshot(snapshot(**changes))
     for eye in EYES:
-        assert _canvas(panel, eye).accessibleDescription() == "No hand in view"
+        assert _canvas(panel, eye).accessibleDescription() == message
         assert _texts(panel, eye)[1:] == UNKNOWN
 
 
