@@ -1,0 +1,1 @@
+"""Calibration methods that handcal is compared with: pure functions on arrays."""
