@@ -13,10 +13,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
+from handcal.camera_options import add_realsense_options, realsense_of
 from handcal.errors import FileError, HandcalError
 from handcal.evaluate_commands import add_evaluate_commands
 from handcal.export.formats import FORMATS
@@ -332,7 +333,7 @@ def _parser() -> argparse.ArgumentParser:
         "--frames", type=number(int, 1, 100_000), default=100_000, help="end after so many"
     )
     one.add_argument("--seed", type=seed, default=1, help="of the simulated hand and room")
-    _add_realsense_options(one)
+    add_realsense_options(one)
 
     one = add(headset, json=False)
     port = number(int, 1, 65535)
@@ -378,24 +379,10 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_realsense_options(command: Parser) -> None:
-    from handcal.camera.settings import Preset, Profile
-
-    command.add_argument("--serial", default="", help="of the RealSense; the first if absent")
-    command.add_argument("--profile", choices=get_args(Profile), default="auto", help="size")
-    command.add_argument("--preset", choices=get_args(Preset), help="the SDK's visual preset")
-    positive = number(float, 0.0, 1e6)
-    command.add_argument("--exposure-us", type=positive, help="of the depth; automatic if absent")
-    command.add_argument("--laser-power-mw", type=positive, help="of the projector")
-    for name in ("spatial-filter", "temporal-filter", "hole-filling"):
-        command.add_argument(f"--{name}", action="store_true", help="the SDK's, on the depth")
-
-
 def _open_source(arguments: argparse.Namespace) -> Camera:
     """Open the camera that a command's ``--source`` names."""
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
-    from handcal.camera.settings import RealSenseSettings
     from handcal.camera.synthetic import SyntheticCamera
     from handcal.sim.hand import make_hand
     from handcal.sim.render import World
@@ -407,9 +394,7 @@ def _open_source(arguments: argparse.Namespace) -> Camera:
             world = World(make_hand(arguments.seed), make_room(arguments.seed))
             return SyntheticCamera(world, swaying_hand, seed=arguments.seed)
         case "realsense":
-            names = [field.name for field in fields(RealSenseSettings)]
-            chosen = {name: getattr(arguments, name) for name in names}
-            return RealSenseCamera(RealSenseSettings(**chosen))
+            return RealSenseCamera(realsense_of(arguments))
         case path:
             return open_recording(Path(path))
 

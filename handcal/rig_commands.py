@@ -1,4 +1,4 @@
-"""``handcal rig board, camera, stereo, convert``: boards and cameras from the command line.
+"""``handcal rig board, take, camera, stereo, convert``: boards and cameras from the command line.
 
 Each command reads images or files, says what was found and how far to trust it, and writes one
 part; they import what they need when they run.
@@ -7,9 +7,12 @@ part; they import what they need when they run.
 from __future__ import annotations
 
 import argparse
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+from handcal.camera_options import add_realsense_options, realsense_of
 from handcal.errors import FileError, HandcalError
 from handcal.files import make_folder, write_json
 from handcal.terminal import Commands, Parser, add_command, console, fail, number, progress, table
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from handcal.rig.board import Board
+    from handcal.rig.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
     from handcal.rig.views import View
     from handcal.rig.worst import WorstView
@@ -43,6 +47,42 @@ def board(arguments: argparse.Namespace) -> None:
             console.print(f"{arguments.png}: {image.shape[1]}x{image.shape[0]} pixels")
     except ValueError as error:
         raise HandcalError(str(error)) from error
+
+
+def take(arguments: argparse.Namespace) -> None:
+    """Take images of a board, or of a display's grid, from a camera, a recording or a video."""
+    from handcal.camera.playback import PlaybackSettings
+    from handcal.camera.view_source import open_view_source
+    from handcal.rig.choose import ChooseSettings
+    from handcal.rig_take import TakeSettings, keep_imager, take_views
+
+    sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
+    if len(set(sources)) < len(sources):
+        fail("one camera cannot be both of a pair", 2)
+    folder = arguments.output.absolute()
+    folders = [folder / "depth", folder / "headset"] if arguments.headset else [folder]
+    choose = ChooseSettings(most=arguments.most or 25)
+    board = board_of(arguments)
+    if arguments.grid:
+        choose = ChooseSettings(most=arguments.most or 5, apart_share=0.0)
+        board = grid_of(arguments, *arguments.grid).board
+    realsense = realsense_of(arguments)
+    with ExitStack() as stack:
+        cameras = [
+            stack.enter_context(
+                open_view_source(source, realsense, PlaybackSettings(), partial(keep_imager, into))
+            )
+            for source, into in zip(sources, folders, strict=True)
+        ]
+        console.print(f"From {' and '.join(one.name for one in cameras)}; Ctrl+C ends it")
+        report = stack.enter_context(progress())
+        settings = TakeSettings(seconds=arguments.seconds, choose=choose)
+        taken = take_views(cameras, folders, board, settings, report)
+    for why, count in taken.passed_over.items():
+        console.print(f"{count} of {taken.looked_at} moments passed over: {why}")
+    if not taken.kept:
+        raise HandcalError("no image was kept; see above")
+    console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}")
 
 
 def camera(arguments: argparse.Namespace) -> None:
@@ -129,10 +169,11 @@ def convert(arguments: argparse.Namespace) -> None:
 
 
 def add_rig_commands(commands: Commands) -> None:
-    """Add ``handcal rig board, camera, stereo, convert``."""
+    """Add ``handcal rig board, take, camera, stereo, convert``."""
     from handcal.rig.board_print import PAPERS
     from handcal.rig.camera import LensModel
     from handcal.rig.formats import FORMATS
+    from handcal.rig.views import MAX_VIEWS
 
     one = add_command(commands, board, json=False)
     add_board_options(one)
@@ -142,6 +183,28 @@ def add_rig_commands(commands: Commands) -> None:
     one.add_argument(
         "--square-px", type=number(int, 4, 2000), default=100, help="squares' side in the PNG"
     )
+
+    one = add_command(commands, take, json=False)
+    one.add_argument(
+        "source",
+        help="'realsense', the number of a camera, or a recording or video",
+    )
+    one.add_argument("--headset", metavar="SOURCE", help="the headset's camera, to take pairs")
+    one.add_argument("--output", type=Path, metavar="FOLDER", required=True, help="of the images")
+    one.add_argument(
+        "--seconds", type=number(float, 0.1, 3600.0), default=60.0, help="by the camera's time"
+    )
+    one.add_argument("--most", type=number(int, 1, MAX_VIEWS), help="images; 25, of a grid 5")
+    one.add_argument(
+        "--grid",
+        type=number(int, 60, 16384),
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        help="look for the grid on a display of this size, and keep images that are alike",
+    )
+    add_square_option(one)
+    add_board_options(one)
+    add_realsense_options(one)
 
     one = add_command(commands, camera, json=False)
     one.add_argument("images", type=Path, nargs="+", help="images, or folders of images")
@@ -192,6 +255,13 @@ def add_board_options(command: Parser) -> None:
     command.add_argument("--legacy", action="store_true", help="printed by OpenCV before 4.6")
 
 
+def add_square_option(command: Parser) -> None:
+    """Add the option that says how large a grid's squares are."""
+    command.add_argument(
+        "--square-px", type=number(int, 20, 2000), default=80, help="side of the grid's squares"
+    )
+
+
 def _add_calibration(command: Parser, lenses: tuple[str, ...], formats: tuple[str, ...]) -> None:
     add_board_options(command)
     command.add_argument("--lens", choices=lenses, default="full", help="model of distortion")
@@ -217,6 +287,16 @@ def board_of(arguments: argparse.Namespace) -> Board:
             dictionary=arguments.dictionary,
             legacy=arguments.legacy,
         )
+    except ValueError as error:
+        raise HandcalError(str(error)) from error
+
+
+def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
+    """Return the grid that the options describe; HandcalError if the display has no room."""
+    from handcal.rig.grid import Grid
+
+    try:
+        return Grid(width_px, height_px, arguments.square_px)
     except ValueError as error:
         raise HandcalError(str(error)) from error
 

@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING
 
 from handcal.errors import HandcalError
 from handcal.files import make_folder
-from handcal.rig_commands import add_board_options, board_of, show_views
+from handcal.rig_commands import (
+    add_board_options,
+    add_square_option,
+    board_of,
+    grid_of,
+    show_views,
+)
 from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
 
 if TYPE_CHECKING:
     from handcal.rig.display import DisplaySettings
-    from handcal.rig.grid import Grid
     from handcal.rig.viewpoint import ViewpointPose
     from handcal.types import Intrinsics, Rig
 
@@ -24,7 +29,7 @@ def grid(arguments: argparse.Namespace) -> None:
     from handcal.image_file import write_png
     from handcal.rig.grid import draw_grid
 
-    made = _grid(arguments, *arguments.display)
+    made = grid_of(arguments, *arguments.display)
     make_folder(arguments.png.parent)
     write_png(arguments.png, draw_grid(made))
     columns, rows = made.squares
@@ -47,7 +52,7 @@ def display(arguments: argparse.Namespace) -> None:
     camera = read_intrinsics(arguments.camera_intrinsics)
     viewpoint = _viewpoint(arguments, camera)
     screen = screen_of(rig, eye)
-    shown = _grid(arguments, screen.width_px, screen.height_px)
+    shown = grid_of(arguments, screen.width_px, screen.height_px)
     with progress() as report:
         views = read_views(image_files(arguments.images), shown.board, report)
     views = drop(views, arguments.drop)
@@ -128,7 +133,7 @@ def add_rig_file_commands(commands: Commands) -> None:
         help="size of the display",
     )
     one.add_argument("--png", type=Path, metavar="FILE", required=True, help="where to write it")
-    _add_square(one)
+    add_square_option(one)
 
     one = add_command(commands, display, json=False)
     one.add_argument("images", type=Path, nargs="+", help="images of the grid, or folders of them")
@@ -160,7 +165,7 @@ def add_rig_file_commands(commands: Commands) -> None:
     )
     one.add_argument("--nominal-distance-m", type=metres, default=2.0, help="of the virtual image")
     one.add_argument("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out")
-    _add_square(one)
+    add_square_option(one)
     add_board_options(one)
     _add_rig_and_output(one)
 
@@ -189,26 +194,11 @@ def add_rig_file_commands(commands: Commands) -> None:
     one.add_argument("--output", type=Path, required=True, help="rig file to write")
 
 
-def _add_square(command: Parser) -> None:
-    command.add_argument(
-        "--square-px", type=number(int, 20, 2000), default=80, help="side of the grid's squares"
-    )
-
-
 def _add_rig_and_output(command: Parser) -> None:
     command.add_argument(
         "--rig", type=Path, help="rig file to start from; the shipped example if absent"
     )
     command.add_argument("--output", type=Path, required=True, help="rig file to write")
-
-
-def _grid(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
-    from handcal.rig.grid import Grid
-
-    try:
-        return Grid(width_px, height_px, arguments.square_px)
-    except ValueError as error:
-        raise HandcalError(str(error)) from error
 
 
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:

@@ -11,6 +11,9 @@ from handcal.camera.recording import RecordingCamera
 from handcal.camera.sdk_recorder import record_db3
 from handcal.types import Frame
 
+RECORDING_SUFFIXES = (".db3", ".bag")
+"""Of librealsense's recordings."""
+
 
 def open_recording(path: Path, settings: PlaybackSettings | None = None) -> PlayedCamera:
     """Return a camera that plays a ``.db3`` or ``.bag`` file, or a folder of images.

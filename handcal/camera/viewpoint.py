@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from handcal.camera.playback import PlaybackSettings
 from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, FileError
 from handcal.image_file import MAX_SIDE_PX, read_image
@@ -53,7 +54,11 @@ class ViewpointCamera(Closable):
         """
 
 
-def open_viewpoint(source: int | Path, size_px: tuple[int, int] | None = None) -> ViewpointCamera:
+def open_viewpoint(
+    source: int | Path,
+    size_px: tuple[int, int] | None = None,
+    playback: PlaybackSettings | None = None,
+) -> ViewpointCamera:
     """Return the viewpoint camera that `source` names.
 
     Parameters
@@ -63,6 +68,8 @@ def open_viewpoint(source: int | Path, size_px: tuple[int, int] | None = None) -
         PNG and JPEG images, which come by name, or a video file.
     size_px : (int, int), optional
         Width and height asked of a camera; what it delivers may differ.
+    playback : PlaybackSettings, optional
+        How a video is played.
 
     Raises
     ------
@@ -71,7 +78,7 @@ def open_viewpoint(source: int | Path, size_px: tuple[int, int] | None = None) -
     """
     if isinstance(source, int):
         return _Device(source, size_px)
-    return _Images(source) if source.is_dir() else _Video(source)
+    return _Images(source) if source.is_dir() else _Video(source, playback or PlaybackSettings())
 
 
 def list_viewpoints() -> list[int]:
@@ -148,7 +155,7 @@ class _Device(_Capture):
 
 
 class _Video(_Capture):
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, playback: PlaybackSettings) -> None:
         if not path.is_file():
             raise CameraError(f"there is no video {path}")
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
@@ -159,12 +166,21 @@ class _Video(_Capture):
         if max(capture.get(side) for side in sides) > MAX_SIDE_PX:
             self.close()
             raise CameraError(f"{path} has images larger than {MAX_SIDE_PX} px")
+        self._playback = playback
+        self._begin_ns = time.monotonic_ns()
 
     def read(self) -> tuple[UInt8, int]:
         image = self._read()
+        if image is None and self._playback.loop:
+            self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
+            self._begin_ns = time.monotonic_ns()
+            image = self._read()
         if image is None:
             raise CameraEndError(f"{self.name}: that was the last")
-        return image, round(1e6 * self._capture.get(cv2.CAP_PROP_POS_MSEC))
+        t_ns = round(1e6 * self._capture.get(cv2.CAP_PROP_POS_MSEC))
+        if self._playback.real_time:
+            time.sleep(max(0.0, 1e-9 * (self._begin_ns + t_ns - time.monotonic_ns())))
+        return image, t_ns
 
 
 def _is_listed(number: int) -> bool:

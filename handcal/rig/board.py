@@ -117,7 +117,7 @@ class BoardView:
         freeze(self, "ids", np.int64, len(self.points_m))
 
 
-def find_board(image: UInt8, board: Board) -> BoardView:
+def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView:
     """Find the board's inner corners to a fraction of a pixel.
 
     Parameters
@@ -126,6 +126,8 @@ def find_board(image: UInt8, board: Board) -> BoardView:
         Grey or RGB, as the camera sees it: lens included, not mirrored. That a plain checkerboard
         is mirrored cannot be seen in one image.
     board : Board
+    explain : bool
+        Whether to find out why there is no board, which takes longer than finding one.
 
     Raises
     ------
@@ -139,7 +141,8 @@ def find_board(image: UInt8, board: Board) -> BoardView:
     ids, pixels = find_corners(gray, board)
     points_m = corners_m(board)[ids]
     if len(ids) < MIN_CORNERS or np.linalg.matrix_rank(points_m[:, :2] - points_m[0, :2]) < 2:
-        raise BoardError(why_not_found(gray, board, find_corners))
+        why = why_not_found(gray, board, find_corners) if explain else "no board is seen"
+        raise BoardError(why)
     fits = _fits(points_m, pixels)
     if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS:
         raise BoardError(

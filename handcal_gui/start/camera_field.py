@@ -7,8 +7,8 @@ from dataclasses import replace
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
+from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
-from handcal.preflight import RECORDING_SUFFIXES
 from handcal.station_settings import Source, StationSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
 from handcal_gui.widgets.fields import beside, button, choice, named

@@ -1,0 +1,78 @@
+"""Which moments of a moving board to keep: at rest, sharp, and unlike those kept before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.rig.board import BoardView
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseSettings:
+    """What is kept.
+
+    Attributes
+    ----------
+    most : int
+        Views, or pairs of views.
+    rest_share : float
+        A board at rest has moved by less since the moment looked at before: mean distance of its
+        corners, of the image's width. The images of a pair are seldom taken quite together.
+    apart_share : float
+        What is kept differs by more from everything kept before; 0 keeps like views as well.
+    most_blur_px : float
+        Width of the squares' edges.
+    """
+
+    most: int = 25
+    rest_share: float = 0.003
+    apart_share: float = 0.06
+    most_blur_px: float = 4.0
+
+
+class ViewChooser:
+    """Looks at one moment after the other, seen by one camera or by the two of a pair."""
+
+    def __init__(self, settings: ChooseSettings | None = None) -> None:
+        self._settings = settings or ChooseSettings()
+        self._kept: list[BoardView] = []
+        self._before: BoardView | None = None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there are enough."""
+        return len(self._kept) >= self._settings.most
+
+    def look(self, seen: Sequence[BoardView | None]) -> str:
+        """Return why a moment is not kept; empty if it is.
+
+        Parameters
+        ----------
+        seen : sequence of BoardView or None
+            By each camera; None where the board was not found.
+        """
+        settings = self._settings
+        first, before = seen[0], self._before
+        self._before = first
+        found = [one for one in seen if one is not None]
+        if first is None or len(found) < len(seen):
+            return "the board is not seen"
+        if before is None or _moved_share(before, first) > settings.rest_share:
+            return "the board moves: hold it still for a moment"
+        if max(one.blur_px for one in found) > settings.most_blur_px:
+            return "the image is blurred: hold the board still, and see to focus and light"
+        if any(_moved_share(one, first) < settings.apart_share for one in self._kept):
+            return "the board was seen like this before: tilt it, or move it elsewhere"
+        self._kept.append(first)
+        return ""
+
+
+def _moved_share(a: BoardView, b: BoardView) -> float:
+    """Return the mean distance of the corners that both show, of the image's width."""
+    _, of_a, of_b = np.intersect1d(a.ids, b.ids, assume_unique=True, return_indices=True)
+    if not len(of_a):
+        return np.inf
+    return float(np.linalg.norm(a.pixels[of_a] - b.pixels[of_b], axis=1).mean()) / b.size[0]

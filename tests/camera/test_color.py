@@ -1,0 +1,99 @@
+"""The colour of cameras with depth, and of whatever else shows a board."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.camera.color import ColorCamera
+from handcal.camera.playback import PlaybackSettings
+from handcal.camera.recordings import open_recording, record_frames
+from handcal.camera.settings import RealSenseSettings
+from handcal.camera.view_source import REALSENSE, open_view_source
+from handcal.errors import CameraEndError, CameraError
+from handcal.types import Frame
+
+MakeFrames = Callable[..., Iterator[Frame]]
+
+
+@pytest.fixture
+def recording(tmp_path: Path, make_frames: MakeFrames) -> Path:
+    record_frames(tmp_path / "take", make_frames(3))
+    return tmp_path / "take"
+
+
+def test_a_recording_gives_its_colour_and_tells_its_imager_once(
+    recording: Path, make_frames: MakeFrames
+) -> None:
+    told: list[Frame] = []
+    with open_view_source(str(recording), tell=told.append) as camera:
+        for wanted in make_frames(3):
+            image, t_ns = camera.read()
+            assert wanted.color is not None
+            np.testing.assert_array_equal(image, wanted.color)
+            assert t_ns == wanted.t_camera_ns
+        with pytest.raises(CameraEndError):
+            camera.read()
+    assert [frame.T_C_D.tolist() for frame in told] == [wanted.T_C_D.tolist()]
+    with pytest.raises(CameraError, match="is closed"):
+        camera.read()
+
+
+def test_a_camera_without_colour_is_named(tmp_path: Path, make_frames: MakeFrames) -> None:
+    record_frames(tmp_path / "gray", make_frames(2, with_color=False))
+    playback = PlaybackSettings(loop=True)
+    with (
+        ColorCamera(open_recording(tmp_path / "gray", playback)) as camera,
+        pytest.raises(CameraError, match="Recording gray gives no colour"),
+    ):
+        camera.read()
+
+
+def test_first_frames_without_colour_are_passed_over(
+    tmp_path: Path, make_frames: MakeFrames
+) -> None:
+    first, second = make_frames(2)
+    bare = replace(first, color=None, color_intrinsics=None)
+    record_frames(tmp_path / "late", iter([second, replace(bare, t_camera_ns=10**9)]))
+    with open_view_source(str(tmp_path / "late"), playback=PlaybackSettings(loop=True)) as camera:
+        times = [camera.read()[1] for _ in range(2)]
+    assert times == [second.t_camera_ns] * 2  # the second, without colour, between them
+
+
+def test_a_realsense_is_run_as_its_settings_say(
+    plug_in: Callable[..., object],
+) -> None:
+    plug_in()
+    settings = RealSenseSettings(profile="848x480")
+    with open_view_source(REALSENSE, settings) as camera:
+        image, _ = camera.read()
+    assert image.shape == (480, 848, 3)
+    with pytest.raises(CameraError, match="serial 9 is not connected"):
+        open_view_source(REALSENSE, RealSenseSettings(serial="9"))
+
+
+def test_a_video_is_played_over_and_over_at_its_pace(tmp_path: Path) -> None:
+    path = tmp_path / "view.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
+    for level in (50, 200):
+        writer.write(np.full((48, 64, 3), level, np.uint8))
+    writer.release()
+    with open_view_source(
+        str(path), playback=PlaybackSettings(real_time=True, loop=True)
+    ) as camera:
+        read = [camera.read() for _ in range(4)]
+    assert [round(float(image.mean()), -1) for image, _ in read] == [50, 200, 50, 200]
+    assert read[2][1] == read[0][1]
+
+
+def test_images_and_cameras_are_opened_by_what_they_are_called(tmp_path: Path) -> None:
+    assert cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
+    with open_view_source(str(tmp_path)) as camera:
+        assert camera.read()[0].shape == (48, 64, 3)
+    with pytest.raises(CameraError, match="camera 9"):
+        open_view_source("9")

@@ -1,0 +1,59 @@
+"""Which moments of a moving board are kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.rig.board import Board, BoardView, corners_m
+from handcal.rig.choose import ChooseSettings, ViewChooser
+
+POINTS_M = corners_m(Board())
+IDS = np.arange(len(POINTS_M))
+
+
+def seen(x_px: float = 0.0, blur_px: float = 2.0, ids: slice = slice(None)) -> BoardView:
+    pixels = POINTS_M[:, :2] * 1000.0 + [100.0 + x_px, 100.0]
+    return BoardView(POINTS_M[ids], pixels[ids], (1000, 800), IDS[ids], blur_px)
+
+
+def test_a_board_is_kept_once_it_rests_and_again_elsewhere() -> None:
+    chooser = ViewChooser()
+    said = [chooser.look([seen(x_px)]) for x_px in (0, 1, 2, 300, 301)]
+    assert [not why for why in said] == [False, True, False, False, True]
+    assert "moves" in said[0]
+    assert "like this before" in said[2]
+    assert "moves" in said[3]
+
+
+@pytest.mark.parametrize(
+    ("moment", "why"),
+    [
+        ([None], "not seen"),
+        ([seen(), None], "not seen"),
+        ([seen(blur_px=6.0)], "blurred"),
+        ([seen(), seen(blur_px=6.0)], "blurred"),
+        ([seen(x_px=4.0)], "moves"),
+    ],
+)
+def test_what_is_not_kept_is_explained(moment: list[BoardView | None], why: str) -> None:
+    chooser = ViewChooser()
+    chooser.look([seen()])
+    assert why in chooser.look(moment)
+
+
+def test_other_corners_of_the_board_are_another_view() -> None:
+    chooser = ViewChooser()
+    for part in (slice(0, 20), slice(30, 54)):
+        chooser.look([seen(ids=part)])
+        assert chooser.look([seen(ids=part)]) == ""
+
+
+def test_a_grid_is_kept_as_often_as_asked_for() -> None:
+    chooser = ViewChooser(ChooseSettings(most=3, apart_share=0.0))
+    kept = 0
+    while not chooser.is_done:
+        kept += not chooser.look([replace(seen())])
+    assert kept == 3

@@ -1,0 +1,180 @@
+"""Taking images of a board by itself, from videos in which it moves and rests."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.__main__ import main
+from handcal.camera.viewpoint import open_viewpoint
+from handcal.closable import Closable
+from handcal.errors import CameraTimeoutError
+from handcal.geometry import interpolate_pose, rigid
+from handcal.rig.board import Board
+from handcal.rig.choose import ChooseSettings
+from handcal.rig.formats import read_intrinsics, read_pose
+from handcal.rig.views import image_files, pair_views, read_views
+from handcal.rig_take import DEPTH_TO_COLOR, IMAGER, TakeSettings, keep_imager, take_views
+from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
+from handcal.types import Float64, Frame, Intrinsics, UInt8
+
+BOARD = Board(squares=(7, 5), square_m=0.035, marker_m=0.025)
+CAMERA = Intrinsics(480, 360, 400.0, 401.0, 238.0, 181.0)
+T_H_D = rigid([-0.1, 0.0, 0.0], [-0.02, -0.03, 0.01])
+RESTS, FRAMES_EACH = 4, 3
+
+
+def write_video(path: Path, T_camera_D: Float64) -> None:
+    """Show the board at rest in some places, three frames each, and once on its way between."""
+    rng = np.random.default_rng(3)
+    painter = BoardPainter(BOARD, CAMERA, PictureSettings(samples=1))
+    poses = board_poses(BOARD, CAMERA, RESTS, rng, others=((T_H_D, CAMERA),))
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (480, 360))
+    for number, T in enumerate(poses):
+        on_the_way = [interpolate_pose(poses[number - 1], T, 0.5)] if number else []
+        for shown in [*on_the_way, *[T] * FRAMES_EACH]:
+            gray = painter.paint(T_camera_D @ shown, rng)
+            video.write(np.repeat(gray[..., None], 3, axis=2))
+    video.release()
+
+
+@pytest.fixture(scope="module")
+def videos(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("videos")
+    for name, T in (("depth", np.eye(4)), ("headset", T_H_D)):
+        write_video(folder / f"{name}.avi", T)
+    return folder / "depth.avi", folder / "headset.avi"
+
+
+def test_each_rest_is_kept_once_and_in_pairs(videos: tuple[Path, Path], tmp_path: Path) -> None:
+    folders = tmp_path / "depth", tmp_path / "headset"
+    told: list[float] = []
+    with open_viewpoint(videos[0]) as depth, open_viewpoint(videos[1]) as headset:
+        taken = take_views(
+            (depth, headset), folders, BOARD, TakeSettings(), lambda _, share: told.append(share)
+        )
+    assert taken.kept == RESTS
+    assert taken.looked_at == RESTS * (FRAMES_EACH + 1) - 1
+    assert sum(taken.passed_over.values()) == taken.looked_at - RESTS
+    assert any("board moves" in why for why in taken.passed_over)
+    assert any("seen like this before" in why for why in taken.passed_over)
+    assert told == sorted(told)
+    pairs = pair_views(*(read_views(image_files([folder]), BOARD) for folder in folders))
+    assert len(pairs) == RESTS
+    assert all(one.found for pair in pairs for one in pair)
+
+
+def test_no_more_are_taken_than_asked_for(videos: tuple[Path, Path], tmp_path: Path) -> None:
+    settings = TakeSettings(choose=ChooseSettings(most=2, apart_share=0.0))
+    for _ in range(2):  # what is there stays
+        with open_viewpoint(videos[0]) as camera:
+            taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
+        assert taken.kept == 2
+    names = [path.name for path in sorted((tmp_path / "a").iterdir())]
+    assert names == [f"a-00{number}.png" for number in (1, 2, 3, 4)]
+
+
+def test_time_is_up(videos: tuple[Path, Path], tmp_path: Path) -> None:
+    with open_viewpoint(videos[0]) as camera:
+        settings = TakeSettings(seconds=0.35)
+        taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
+    assert (taken.kept, taken.looked_at) == (1, 4)
+
+
+class LateCamera(Closable):
+    """Gives its first image after some time-outs, and no other."""
+
+    name = "late"
+
+    def __init__(self, silent: int) -> None:
+        self.left = silent
+
+    def read(self) -> tuple[UInt8, int]:
+        self.left -= 1
+        if self.left >= 0:
+            raise CameraTimeoutError("no frame for 1 s")
+        self.left = 1000
+        return np.full((360, 480, 3), 90, np.uint8), 0
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_camera_that_falls_silent_is_told(tmp_path: Path) -> None:
+    camera = LateCamera(2)
+    with pytest.raises(CameraTimeoutError, match="no frame for 1 s"):
+        take_views((camera,), (tmp_path / "a",), BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
+    assert camera.left < 1000  # after its first image
+
+
+def test_the_depth_imager_is_kept_beside_its_colour(tmp_path: Path) -> None:
+    T_C_D = rigid([0.0, 0.01, 0.0], [0.015, 0.0, 0.0])
+    frame = Frame(
+        *(1, 0, 0, np.zeros((360, 480), np.uint16), 1e-3, CAMERA),
+        color=np.zeros((360, 480, 3), np.uint8),
+        color_intrinsics=CAMERA,
+        T_C_D=T_C_D,
+    )
+    keep_imager(tmp_path / "depth", frame)
+    assert read_intrinsics(tmp_path / "depth" / IMAGER) == CAMERA
+    np.testing.assert_allclose(read_pose(tmp_path / "depth" / DEPTH_TO_COLOR), T_C_D, atol=1e-12)
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
+    """Run ``handcal rig take``; return its exit code."""
+    monkeypatch.setattr(sys, "argv", ["handcal", "rig", "take", *map(str, words)])
+    try:
+        main()
+    except SystemExit as ended:
+        return int(str(ended.code))
+    return 0
+
+
+def test_the_command_says_what_it_kept_and_what_it_passed_over(
+    videos: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    board = ("--squares", 7, 5, "--square-mm", 35, "--marker-mm", 25)
+    out = tmp_path / "new" / "views"
+    assert run(monkeypatch, videos[0], *board, "--most", 2, "--output", out) == 0
+    said = capsys.readouterr().out
+    assert "2 kept in " in said
+    assert "moments passed over: the board moves" in said
+    assert len(list(out.glob("views-*.png"))) == 2
+
+    assert run(monkeypatch, videos[0], "--output", out, "--seconds", 0.5) == 1
+    heard = capsys.readouterr()
+    assert "passed over: the board is not seen" in heard.out
+    assert "no image was kept" in heard.err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("1", "--headset", "1"), 2, "cannot be both"),
+        (("99",), 1, "there is no camera 99"),
+        (("nothing.mp4",), 1, "there is no video nothing.mp4"),
+        (("nothing.db3",), 1, "there is no recording nothing.db3"),
+        (("nothing.mp4", "--grid", "60", "60"), 1, "no room for 3 squares"),
+    ],
+)
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lists cameras as files")
+def test_what_is_wrong_is_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    words: tuple[str, ...],
+    code: int,
+    said: str,
+) -> None:
+    assert run(monkeypatch, *words, "--output", tmp_path / "out") == code
+    line = capsys.readouterr().err
+    assert said in line
+    assert line.count("\n") == 1
+    assert not (tmp_path / "out").exists()
