@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handcal import statistics
 from handcal.display import arcmin_from_px, eye_projection, target_corners_m
 from handcal.geometry import project
+from handcal.statistics import Summary
 from handcal.types import EYES, Eye, EyeDisplay, Float64, freeze
 
 _SHAPES: dict[str, tuple[int, ...]] = {
@@ -75,17 +77,6 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
-    """How numbers are spread; `sd` is that of a sample."""
-
-    mean: float
-    sd: float
-    median: float
-    min: float
-    max: float
-
-
-@dataclass(frozen=True, slots=True)
 class ErrorStatistics:
     """Errors of several trials.
 
@@ -93,13 +84,13 @@ class ErrorStatistics:
     ----------
     trials, corners : int
         Each corner counts as one error, as in the paper.
-    px, arcmin : Spread
+    px, arcmin : Summary
     """
 
     trials: int
     corners: int
-    px: Spread
-    arcmin: Spread
+    px: Summary
+    arcmin: Summary
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +154,19 @@ def summarise(trials: Sequence[Trial]) -> TrialStatistics:
     )
 
 
+def calibration_numbers(trials: Sequence[Trial]) -> tuple[int, ...]:
+    """Return which calibration each of a session's trials judges, from 1.
+
+    A calibration is what has a calibrated φ of its own; the first of the left eye is that of the
+    right eye too, and so on, as both are aligned together.
+    """
+    known: dict[Eye, dict[bytes, int]] = {eye: {} for eye in EYES}
+    return tuple(
+        known[trial.eye].setdefault(trial.calibrated_shift_m.tobytes(), 1 + len(known[trial.eye]))
+        for trial in trials
+    )
+
+
 def trial_json(trial: Trial) -> dict[str, Any]:
     """Return a trial, without its time, as JSON-able values."""
     arrays = {name: getattr(trial, name).tolist() for name in _SHAPES}
@@ -197,14 +201,6 @@ def _by(trials: Sequence[Trial], name: str) -> dict[Any, ErrorStatistics]:
 def _errors(trials: Sequence[Trial]) -> ErrorStatistics:
     px = np.concatenate([trial.error_px for trial in trials])
     arcmin = np.concatenate([trial.error_arcmin for trial in trials])
-    return ErrorStatistics(len(trials), len(px), _spread(px), _spread(arcmin))
-
-
-def _spread(values: Float64) -> Spread:
-    return Spread(
-        mean=float(values.mean()),
-        sd=float(values.std(ddof=1)),
-        median=float(np.median(values)),
-        min=float(values.min()),
-        max=float(values.max()),
+    return ErrorStatistics(
+        len(trials), len(px), statistics.summarise(px), statistics.summarise(arcmin)
     )

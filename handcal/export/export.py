@@ -111,13 +111,22 @@ def _write(
 ) -> None:
     """Write the files of one format into `place`, which are meant for `folder`."""
     match name:
-        case "report":
-            for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf"):
+        case "report" | "html":
+            for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf", "jinja2"):
                 import_module(heavy)
                 checkpoint(0.0)
-            from handcal.export.report import write_report
+            from handcal.export.report import session_report
+            from handcal.report.figures import write_figures
+            from handcal.report.html import write_html
+            from handcal.report.pdf import write_pdf
 
-            write_report(place / "report.pdf", outcome, checkpoint)
+            report = session_report(outcome)
+            if name == "report":
+                write_pdf(place / "report.pdf", report, checkpoint)
+            else:
+                write_html(place / "report.html", report, lambda share: checkpoint(0.5 * share))
+                figures = place / "figures"
+                write_figures(figures, report, lambda share: checkpoint(0.5 + 0.5 * share))
         case "csv":
             write_parameters(place / "parameters.csv", outcome)
             write_trials(place / "trials.csv", outcome)

@@ -6,6 +6,7 @@ Left and right differ in colour, marker and line, so that the report also reads 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -14,6 +15,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.patches import Ellipse, Rectangle
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from handcal.display import eye_projection
 from handcal.export.outcome import Outcome
@@ -30,7 +32,7 @@ _HAND, _CURSOR = "#0072B2", "#D55E00"
 _LEAST_MM = 0.01
 _LABEL_PT, _TITLE_PT = 7.5, 8.5
 # Side of a cell of the residual map, and the colour of one without inliers.
-_CELL_MM = 2.5
+CELL_MM = 2.5
 _OUTLIER = (0.75, 0.75, 0.75, 1.0)
 # An outline is sought in a mask in which a display's longer side is so long, and gaps between
 # points are closed.
@@ -114,54 +116,89 @@ def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results
         _name(ax, f"{eye} eye", "φ₁, mm (to the right)", "φ₂, mm (down)")
 
 
-def draw_residuals(
-    ax: Axes, alignment: Alignment, eye: Eye, shift: EyeShift, most_mm: float
-) -> None:
+@dataclass(frozen=True, slots=True)
+class ResidualCells:
+    """A hand as the eye faces it, in cells, each (N,).
+
+    Attributes
+    ----------
+    x_mm, y_mm : float64
+        Upper left corners, in E.
+    points, inliers : int64
+    mean_mm : float64
+        Of the inliers' residuals; NaN without.
+    """
+
+    x_mm: Float64
+    y_mm: Float64
+    points: NDArray[np.int64]
+    inliers: NDArray[np.int64]
+    mean_mm: Float64
+
+
+def residual_cells(alignment: Alignment, eye: Eye, shift: EyeShift) -> ResidualCells:
+    """Return the mean residual of an alignment's hand points in cells of `CELL_MM`."""
+    hand_mm = 1e3 * transform(alignment.T_E_W[eye], alignment.hand_m)[:, :2]
+    corner_mm = hand_mm.min(axis=0)
+    places = ((hand_mm - corner_mm) / CELL_MM).astype(int)
+    cells, of_point = np.unique(places, axis=0, return_inverse=True)
+    is_inlier = np.isfinite(shift.residuals_m)
+    points, inliers = (
+        np.bincount(each, minlength=len(cells)) for each in (of_point, of_point[is_inlier])
+    )
+    sums_mm = np.bincount(of_point[is_inlier], 1e3 * shift.residuals_m[is_inlier], len(cells))
+    mean_mm = np.divide(sums_mm, inliers, out=np.full(len(cells), np.nan), where=inliers > 0)
+    x_mm, y_mm = (corner_mm + CELL_MM * cells).T
+    return ResidualCells(x_mm, y_mm, points, inliers, mean_mm)
+
+
+def draw_residuals(ax: Axes, cells: ResidualCells, most_mm: float) -> None:
     """Draw the hand as the eye faces it, coloured by the mean residual in each cell.
 
     Colours reach to `most_mm`; cells in which all points are outliers are grey.
     """
-    hand_mm = 1e3 * transform(alignment.T_E_W[eye], alignment.hand_m)[:, :2]
-    corner_mm = hand_mm.min(axis=0)
-    columns, rows = ((hand_mm - corner_mm) / _CELL_MM).astype(int).T
-    width, height = columns.max() + 1, rows.max() + 1
-    cells = rows * width + columns
-    is_inlier = np.isfinite(shift.residuals_m)
-    points, inliers = (
-        np.bincount(each, minlength=width * height) for each in (cells, cells[is_inlier])
+    left_mm, top_mm = cells.x_mm.min(), cells.y_mm.min()
+    columns, rows = (
+        np.rint((axis_mm - axis_mm.min()) / CELL_MM).astype(int)
+        for axis_mm in (cells.x_mm, cells.y_mm)
     )
-    residuals_mm = 1e3 * shift.residuals_m[is_inlier]
-    sums_mm = np.bincount(cells[is_inlier], residuals_mm, minlength=width * height)
+    width, height = columns.max() + 1, rows.max() + 1
     colors = ScalarMappable(Normalize(0.0, max(_LEAST_MM, most_mm), clip=True), "viridis")
-    picture = colors.to_rgba(sums_mm / np.maximum(inliers, 1))
-    picture[inliers == 0] = _OUTLIER
-    picture[points == 0] = 0.0
-    left_mm, top_mm = corner_mm
+    picture = np.zeros((height, width, 4))
+    has_inliers = cells.inliers > 0
+    picture[rows, columns] = _OUTLIER
+    picture[rows[has_inliers], columns[has_inliers]] = colors.to_rgba(cells.mean_mm[has_inliers])
     ax.imshow(
-        picture.reshape(height, width, 4),
-        extent=(left_mm, left_mm + width * _CELL_MM, top_mm + height * _CELL_MM, top_mm),
+        picture,
+        extent=(left_mm, left_mm + width * CELL_MM, top_mm + height * CELL_MM, top_mm),
         interpolation="nearest",
     )
     ax.set_aspect("equal", adjustable="datalim")
     _color_bar(ax, colors)
 
 
-def draw_overlay(
-    ax: Axes, display: EyeDisplay, alignment: Alignment, eye: Eye, eye_shift_m: Float64
-) -> None:
-    """Draw what an eye at one place saw at the moment of an alignment, in the display's pixels.
+def overlay_outlines(
+    display: EyeDisplay, alignment: Alignment, eye: Eye, eye_shift_m: Float64
+) -> dict[str, list[Float64]]:
+    """Return what an eye at one place saw at the moment of an alignment, in the display's pixels.
 
-    The hand as the eye sees it through the display, and the cursor as the headset drew it.
+    Outlines, each (N, 2) and closed, of the hand as the eye sees it through the display, and of the
+    cursor as the headset drew it.
     """
     hand_E, cursor_E = (
         transform(alignment.T_E_W[eye], points) for points in (alignment.hand_m, alignment.cursor_m)
     )
     seen = project(eye_projection(display, eye_shift_m), hand_E)
     drawn = project(eye_projection(display, alignment.drawn_shift_m[eye]), cursor_E)
-    for outline in _outlines(seen, display):
+    return {"hand": _outlines(seen, display), "cursor": _outlines(drawn, display)}
+
+
+def draw_overlay(ax: Axes, display: EyeDisplay, outlines: Mapping[str, Sequence[Float64]]) -> None:
+    """Draw what `overlay_outlines` gave within the display's frame."""
+    for outline in outlines["hand"]:
         ax.fill(*outline.T, facecolor=_HAND, alpha=0.25, linewidth=0.0)
         ax.plot(*outline.T, color=_HAND, linewidth=0.6)
-    for outline in _outlines(drawn, display):
+    for outline in outlines["cursor"]:
         ax.plot(*outline.T, color=_CURSOR, linewidth=1.0, linestyle=(0, (4, 1.5)))
     width, height = display.width_px, display.height_px
     ax.add_patch(Rectangle((-0.5, -0.5), width, height, fill=False, linewidth=0.6))

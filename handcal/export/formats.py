@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
-Format: TypeAlias = Literal["report", "csv", "yaml", "json", "ply", "zip"]
+Format: TypeAlias = Literal["report", "html", "csv", "yaml", "json", "ply", "zip"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +21,7 @@ class FormatInfo:
 FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
     {
         "report": FormatInfo("Report (PDF)", ("report.pdf",)),
+        "html": FormatInfo("Report (HTML)", ("report.html", "figures/*.png", "figures/*.csv")),
         "csv": FormatInfo("Parameters and trials (CSV)", ("parameters.csv", "trials.csv")),
         "yaml": FormatInfo("Calibration (OpenCV YAML)", ("calibration.yaml",)),
         "json": FormatInfo(

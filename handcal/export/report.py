@@ -1,33 +1,31 @@
-"""The PDF report: what was found for each eye, how sure it is, and what it was found from."""
+"""What the report of a session says: what was found for each eye, how sure it is, and from what."""
 
 from __future__ import annotations
 
-import io
-import platform
-from collections.abc import Callable, Iterator, Mapping
-from datetime import UTC, datetime
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from importlib.metadata import version
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
-from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 from handcal.export import figures
 from handcal.export.definitions import DEFINITIONS
+from handcal.export.figure_rows import (
+    convergence_rows,
+    overlay_rows,
+    residual_rows,
+    running_mean_rows,
+)
+from handcal.export.figures import ResidualCells
 from handcal.export.outcome import Origin, Outcome
-from handcal.files import write_atomic
+from handcal.export.tables import parameter_rows, trial_rows
 from handcal.register.verdict import expected_error_arcmin
-from handcal.report.page import Column, Document, plain
+from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
+from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.results import Results
-from handcal.trial import ErrorStatistics, summarise
+from handcal.statistics import mean_interval
+from handcal.trial import ErrorStatistics, calibration_numbers, summarise
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
-
-if TYPE_CHECKING:
-    from typing_extensions import Buffer
 
 _ORIGINS: Mapping[Origin, str] = {
     "fine_tuned": "fine-tuned by hand",
@@ -39,97 +37,83 @@ _VERDICTS: Mapping[VerdictName, str] = {
     "repeat": "to be aligned again",
     "implausible": "implausible",
 }
-# More settings than these are left to settings.json.
-_MAX_SETTINGS = 120
 
 
-def write_report(path: Path, outcome: Outcome, checkpoint: Callable[[float], None]) -> None:
-    """Write the report as PDF, A4, with its fonts.
-
-    Parameters
-    ----------
-    path : Path
-    outcome : Outcome
-    checkpoint : callable
-        Told the share done, many times a second; what it raises ends the writing.
-    """
-    pages = compose(outcome, lambda share: checkpoint(0.4 * share))
-    stream = _CheckedStream(checkpoint, 0.4)
-    # TrueType rather than Type 3, which publishers refuse; pictures at 200 dots an inch.
-    with matplotlib.rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
-        pdf: Any = PdfPages(stream, metadata=_metadata(outcome))
-        for done, page in enumerate(pages):
-            stream.share = 0.4 + 0.5 * done / len(pages)
-            pdf.savefig(page)
-        stream.share = 0.9
-        pdf.close()  # not after an error: it would go on writing
-    write_atomic(path, stream.getvalue())
+def session_report(outcome: Outcome) -> Report:
+    """Return the report of a session."""
+    return Report(
+        title="Eye-display calibration",
+        subject=f"{outcome.name} · {outcome.record.wearer or 'wearer not named'}",
+        lead=_verdict(outcome),
+        sections=list(_sections(outcome)),
+    )
 
 
-def compose(outcome: Outcome, checkpoint: Callable[[float], None]) -> list[Figure]:
-    """Return the report's pages; arguments as `write_report`."""
-    document = Document(f"{outcome.name} · {outcome.record.wearer or 'wearer not named'}")
-    sections = list(_sections(document, outcome))
-    for done, section in enumerate(sections):
-        checkpoint(done / len(sections))
-        section()
-    return document.finish()
-
-
-class _CheckedStream(io.BytesIO):
-    """Bytes whose every writing is a checkpoint: matplotlib works for long between two pages."""
-
-    def __init__(self, checkpoint: Callable[[float], None], share: float) -> None:
-        super().__init__()
-        self.share = share
-        self._checkpoint = checkpoint
-
-    def write(self, data: Buffer, /) -> int:
-        self._checkpoint(self.share)
-        return super().write(data)
-
-
-def _sections(document: Document, outcome: Outcome) -> Iterator[Callable[[], None]]:
-    """Yield what sets each part of the report, in order; none takes long."""
-    results = outcome.results
-    yield lambda: _summary(document, outcome)
-    if results is not None:
-        yield lambda: _alignments(document, outcome, results)
-        yield lambda: _shift_plots(document, outcome, results)
-        yield lambda: _convergence(document, outcome, results)
-        yield from _residuals(document, outcome, results)
-        yield from _overlays(document, outcome)
-    if outcome.record.trials:
-        yield lambda: _user_test(document, outcome)
-        yield lambda: _running_mean(document, outcome)
-        yield lambda: _trials(document, outcome)
-    if outcome.record.notes.strip():
-        yield lambda: _notes(document, outcome.record.notes)
-    yield lambda: _conditions(document, outcome)
-    yield lambda: _definitions(document)
-
-
-def _summary(document: Document, outcome: Outcome) -> None:
+def _sections(outcome: Outcome) -> Iterator[Section]:
     record, results = outcome.record, outcome.results
-    document.title("Eye-display calibration")
-    document.text(_verdict(outcome), points=11.0)
-    document.space(4.0)
-    facts = {
-        "Wearer": record.wearer or "not named",
-        "Session": outcome.name,
-        "Begun": _time(outcome.started),
-        "Rig": record.rig.name,
-        "Method": outcome.settings.method,
-        "Alignments": str(len(record.alignments)),
-        "Confirmations refused": str(sum(event.name == "refused" for event in record.events)),
-        "Trials of the user test": str(len(record.trials)),
-        "Made with": f"handcal {version('handcal')}, Python {platform.python_version()}, "
-        f"NumPy {np.__version__}, on {platform.system()} {platform.machine()}",
-        "Made at": _time(datetime.now(UTC).isoformat()),
-    }
-    document.table([Column(align="left"), Column(align="left")], list(facts.items()))
-    document.heading("Eye shift φ")
-    document.table(
+    yield _summary(outcome)
+    yield _shifts(outcome)
+    if results is not None:
+        yield _solution(outcome, results)
+        yield _alignments(outcome, results)
+        yield _shift_plots(outcome, results)
+        yield _convergence(outcome, results)
+        yield _residuals(outcome, results)
+        yield _overlays(outcome)
+    if record.trials:
+        yield _user_test(outcome)
+        yield _trials(outcome)
+    if record.notes.strip():
+        yield Section("Notes", [record.notes])
+    links = [event for event in record.events if event.name == "link"]
+    if links:
+        title = f"Link to the headset, at {at_minute(links[-1].time)}"
+        yield Section(title, settings_items(links[-1].data, "journal.jsonl"))
+    yield Section("Settings", settings_items(record.settings))
+    yield Section("Definitions", [facts(DEFINITIONS)], starts_page=True)
+
+
+def _verdict(outcome: Outcome) -> str:
+    """Return the verdict in one sentence."""
+    if outcome.results is None:
+        return "Nothing is solved: the session holds no alignment."
+    parts = [
+        f"{eye} eye {_VERDICTS[verdict.name]}: {verdict.reason}"
+        for eye, verdict in outcome.results.verdicts.items()
+    ]
+    tuned = [eye for eye in EYES if outcome.final(eye) == "fine_tuned"]
+    if tuned:
+        parts.append(f"{' and '.join(tuned)} fine-tuned by hand since")
+    sentence = "; ".join(parts)
+    return f"{sentence[0].upper()}{sentence[1:]}."
+
+
+def _summary(outcome: Outcome) -> Section:
+    record = outcome.record
+    return Section(
+        "",
+        [
+            facts(
+                {
+                    "Wearer": record.wearer or "not named",
+                    "Session": outcome.name,
+                    "Begun": at_minute(outcome.started),
+                    "Rig": record.rig.name,
+                    "Method": outcome.settings.method,
+                    "Alignments": str(len(record.alignments)),
+                    "Confirmations refused": str(
+                        sum(event.name == "refused" for event in record.events)
+                    ),
+                    "Trials of the user test": str(len(record.trials)),
+                    **made_with(),
+                }
+            )
+        ],
+    )
+
+
+def _shifts(outcome: Outcome) -> Section:
+    table = Table(
         [
             Column("eye", "left"),
             Column("φ", "left"),
@@ -152,11 +136,14 @@ def _summary(document: Document, outcome: Outcome) -> None:
             if origin != "offline" or outcome.final(eye) == origin
         ],
     )
-    if results is None:
-        document.text("There is no alignment, so nothing was solved.")
-        return
-    document.heading("How it was solved")
-    document.table(
+    items: list[Item] = [table]
+    if outcome.results is None:
+        items.append("There is no alignment, so nothing was solved.")
+    return Section("Eye shift φ", items)
+
+
+def _solution(outcome: Outcome, results: Results) -> Section:
+    table = Table(
         [
             Column("eye", "left"),
             Column("verdict", "left"),
@@ -170,7 +157,7 @@ def _summary(document: Document, outcome: Outcome) -> None:
             [
                 eye,
                 results.verdicts[eye].name,
-                f"{expected_error_arcmin(record.rig.eyes[eye], shift):.1f}",
+                f"{expected_error_arcmin(outcome.record.rig.eyes[eye], shift):.1f}",
                 f"{1e3 * shift.rms_m:.2f}",
                 f"{100 * shift.inlier_ratio:.0f}",
                 str(shift.iterations),
@@ -179,40 +166,20 @@ def _summary(document: Document, outcome: Outcome) -> None:
             for eye, shift in results.shifts.items()
         ],
     )
+    items: list[Item] = [table]
     if results.eye_distance_m is not None:
-        document.text(f"Implied eye distance: {1e3 * results.eye_distance_m:.1f} mm.")
+        items.append(f"Implied eye distance: {1e3 * results.eye_distance_m:.1f} mm.")
+    return Section("How it was solved", items)
 
 
-def _verdict(outcome: Outcome) -> str:
-    """Return the verdict in one sentence."""
-    if outcome.results is None:
-        return "Nothing is solved: the session holds no alignment."
-    parts = [
-        f"{eye} eye {_VERDICTS[verdict.name]}: {verdict.reason}"
-        for eye, verdict in outcome.results.verdicts.items()
-    ]
-    tuned = [eye for eye in EYES if outcome.final(eye) == "fine_tuned"]
-    if tuned:
-        parts.append(f"{' and '.join(tuned)} fine-tuned by hand since")
-    sentence = "; ".join(parts)
-    return f"{sentence[0].upper()}{sentence[1:]}."
-
-
-def _shift_cells(outcome: Outcome, eye: Eye, origin: Origin) -> list[str]:
-    if origin == "solved" and outcome.results is not None:
-        return _with_sigma(outcome.results.shifts[eye])
-    return [_mm(value) for value in outcome.shifts_m[eye][origin]]
-
-
-def _alignments(document: Document, outcome: Outcome, results: Results) -> None:
+def _alignments(outcome: Outcome, results: Results) -> Section:
     record = outcome.record
     times = {
         event.data.get("number"): event.time
         for event in record.events
         if event.name == "alignment_saved"
     }
-    document.heading("Alignments")
-    document.table(
+    table = Table(
         [
             Column("no."),
             Column("time, UTC"),
@@ -243,92 +210,123 @@ def _alignments(document: Document, outcome: Outcome, results: Results) -> None:
             )
             for eye, shift in shifts.items()
         ],
-    )
-    document.caption(
         "Each alignment solved alone, without priors; eyes: those open. One alignment with both "
-        "eyes open shows one hand displacement for both; fusing shares it out between them."
+        "eyes open shows one hand displacement for both; fusing shares it out between them.",
     )
+    return Section("Alignments", [table])
 
 
-def _shift_plots(document: Document, outcome: Outcome, results: Results) -> None:
+def _shift_plots(outcome: Outcome, results: Results) -> Section:
     numbers = outcome.record.alignment_numbers
-    document.heading("φ of each alignment, and fused", room_mm=75.0)
-    figures.draw_shifts(document.axes(58.0, 3), outcome, results)
-    document.caption("Bars are ± σ. Tuned: set by hand, hollow, where there is one.")
-    figures.draw_ellipses(document.axes(68.0, 2), numbers, results)
-    document.caption(
-        "Grey: each alignment by its number; coloured: fused. Ellipses are 1σ (39 % of cases); the "
-        "cross at 0 is the viewpoint of the offline calibration."
+    rows = list(parameter_rows(outcome))
+    return Section(
+        "φ of each alignment, and fused",
+        [
+            Figure(
+                "shifts",
+                "Bars are ± σ. Tuned: set by hand, hollow, where there is one.",
+                lambda axes: figures.draw_shifts(axes, outcome, results),
+                rows,
+                height_mm=58.0,
+                columns=3,
+            ),
+            Figure(
+                "ellipses",
+                "Grey: each alignment by its number; coloured: fused. Ellipses are 1σ (39 % of "
+                "cases); the cross at 0 is the viewpoint of the offline calibration.",
+                lambda axes: figures.draw_ellipses(axes, numbers, results),
+                rows,
+                height_mm=68.0,
+                columns=2,
+            ),
+        ],
     )
 
 
-def _convergence(document: Document, outcome: Outcome, results: Results) -> None:
-    document.heading("Convergence", room_mm=70.0)
-    figures.draw_convergence(document.axes(55.0, 2), outcome.record.alignment_numbers, results)
-    document.caption("Root mean square distance of the pairs at each iteration.")
+def _convergence(outcome: Outcome, results: Results) -> Section:
+    numbers = outcome.record.alignment_numbers
+    figure = Figure(
+        "convergence",
+        "Root mean square distance of the pairs at each iteration.",
+        lambda axes: figures.draw_convergence(axes, numbers, results),
+        list(convergence_rows(numbers, results)),
+        height_mm=55.0,
+        columns=2,
+    )
+    return Section("Convergence", [figure])
 
 
-def _residuals(
-    document: Document, outcome: Outcome, results: Results
-) -> Iterator[Callable[[], None]]:
+def _residuals(outcome: Outcome, results: Results) -> Section:
     record = outcome.record
     residuals_m = [shift.residuals_m for each in results.alignments for shift in each.values()]
     most_mm = 1e3 * float(np.nanpercentile(np.concatenate(residuals_m), 98))
 
-    def draw(index: int) -> None:
-        number, alignment = record.alignment_numbers[index], record.alignments[index]
-        axes = document.axes(66.0, 2)
+    def draw(number: int, cells: Mapping[Eye, ResidualCells], axes: Sequence[Axes]) -> None:
         for ax, eye in zip(axes, EYES, strict=True):
-            if eye in results.alignments[index]:
-                shift = results.alignments[index][eye]
-                figures.draw_residuals(ax, alignment, eye, shift, most_mm)
+            if eye in cells:
+                figures.draw_residuals(ax, cells[eye], most_mm)
                 ax.set_title(f"alignment {number}, {eye} eye", fontsize=8.5, loc="left")
             else:
                 ax.remove()
 
-    yield lambda: document.heading("Residuals on the hand", room_mm=80.0)
-    for index in range(len(results.alignments)):
-        yield partial(draw, index)
-    yield lambda: document.caption(
-        "The hand as the eye faces it, in E, mm; colour: mean residual in cells of 2.5 mm; grey: "
-        "only outliers, or points that belong to a cut edge."
-    )
+    items: list[Item] = [
+        "The hand as the eye faces it, in E, mm; colour: mean residual in cells of "
+        f"{figures.CELL_MM:g} mm; grey: only outliers, or points that belong to a cut edge."
+    ]
+    for number, alignment, shifts in zip(
+        record.alignment_numbers, record.alignments, results.alignments, strict=True
+    ):
+        cells = {
+            eye: figures.residual_cells(alignment, eye, shift) for eye, shift in shifts.items()
+        }
+        rows = list(residual_rows(number, cells))
+        drawn = partial(draw, number, cells)
+        items.append(Figure(f"residuals-{number}", "", drawn, rows, height_mm=66.0, columns=2))
+    return Section("Residuals on the hand", items)
 
 
-def _overlays(document: Document, outcome: Outcome) -> Iterator[Callable[[], None]]:
-    """Yield what draws each eye's newest alignment."""
+def _overlays(outcome: Outcome) -> Section:
+    """Return each eye's newest alignment as the eye saw it."""
     record = outcome.record
     newest = {
         eye: (number, alignment)
         for number, alignment in zip(record.alignment_numbers, record.alignments, strict=True)
         for eye in alignment.eyes
     }
-
-    def draw(eye: Eye, number: int, alignment: Alignment) -> None:
-        shifts_m = {"before": np.zeros(3), "after": outcome.final_shift_m(eye)}
-        for ax, (when, shift_m) in zip(document.axes(58.0, 2), shifts_m.items(), strict=True):
-            figures.draw_overlay(ax, record.rig.eyes[eye], alignment, eye, shift_m)
-            ax.set_title(f"alignment {number}, {eye} eye, {when}", fontsize=8.5, loc="left")
-
-    yield lambda: document.heading("Hand and cursor through the display", room_mm=75.0)
-    for eye, (number, alignment) in newest.items():
-        yield partial(draw, eye, number, alignment)
-    yield lambda: document.caption(
+    items: list[Item] = [
         "When the wearer confirmed, the hand (filled) covered the cursor (dashed, as the headset "
         "drew it then). Before: what the offline calibration predicts for that moment. After: what "
         "the final φ predicts; the better φ is, the better they agree. Pixels; the frame is the "
         "display, beyond which nothing is drawn."
-    )
+    ]
+    items += [_overlay(outcome, eye, *found) for eye, found in newest.items()]
+    return Section("Hand and cursor through the display", items)
 
 
-def _user_test(document: Document, outcome: Outcome) -> None:
+def _overlay(outcome: Outcome, eye: Eye, number: int, alignment: Alignment) -> Figure:
+    display = outcome.record.rig.eyes[eye]
+    shifts_m = {"before": np.zeros(3), "after": outcome.final_shift_m(eye)}
+    outlines = {
+        when: figures.overlay_outlines(display, alignment, eye, shift_m)
+        for when, shift_m in shifts_m.items()
+    }
+
+    def draw(axes: Sequence[Axes]) -> None:
+        for ax, (when, found) in zip(axes, outlines.items(), strict=True):
+            figures.draw_overlay(ax, display, found)
+            ax.set_title(f"alignment {number}, {eye} eye, {when}", fontsize=8.5, loc="left")
+
+    rows = list(overlay_rows(number, eye, outlines))
+    return Figure(f"overlay-{eye}", "", draw, rows, height_mm=58.0, columns=2)
+
+
+def _user_test(outcome: Outcome) -> Section:
     record = outcome.record
     statistics = summarise(record.trials)
-    document.heading("User test")
     groups = {"all": statistics.total} if statistics.total else {}
     groups |= {f"{eye} eye": errors for eye, errors in statistics.by_eye.items()}
     groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
-    document.table(
+    table = Table(
         [
             Column("trials", "left"),
             Column("number"),
@@ -339,24 +337,47 @@ def _user_test(document: Document, outcome: Outcome) -> None:
             Column("median (min–max), arcmin"),
         ],
         [[name, *_error_cells(errors)] for name, errors in groups.items()],
+        "Reprojection error; each corner of the target counts once.",
     )
-    document.caption("Reprojection error; each corner of the target counts once.")
-    figures.draw_trial_errors(document.axes(62.0, 2), record.trials)
-    document.caption(
-        "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges."
+    boxes = Figure(
+        "trial-errors",
+        "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
+        lambda axes: figures.draw_trial_errors(axes, record.trials),
+        list(trial_rows(outcome)),
+        height_mm=62.0,
+        columns=2,
+    )
+    numbers = record.trial_numbers
+    running = Figure(
+        "running-mean",
+        "Points: mean error of each trial; lines: mean of all so far.",
+        lambda axes: figures.draw_running_mean(axes[0], numbers, record.trials),
+        list(running_mean_rows(numbers, record.trials)),
+        height_mm=48.0,
+    )
+    return Section("User test", [table, _interval(outcome), boxes, running])
+
+
+def _interval(outcome: Outcome) -> str:
+    """Return how sure the mean error is."""
+    trials = outcome.record.trials
+    calibrations = calibration_numbers(trials)
+    if len(set(calibrations)) < 2:
+        return (
+            "All trials judge one calibration, so how far another would differ is not known: no "
+            "interval is given for the mean."
+        )
+    errors = [float(trial.error_arcmin.mean()) for trial in trials]
+    found = mean_interval(errors, calibrations)
+    return (
+        f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
+        f"({100 * found.level:g} % interval {found.low:.2f} to {found.high:.2f})."
     )
 
 
-def _running_mean(document: Document, outcome: Outcome) -> None:
+def _trials(outcome: Outcome) -> Section:
     record = outcome.record
-    figures.draw_running_mean(document.axes(48.0, 1)[0], record.trial_numbers, record.trials)
-    document.caption("Points: mean error of each trial; lines: mean of all so far.")
-
-
-def _trials(document: Document, outcome: Outcome) -> None:
-    record = outcome.record
-    document.heading("Trials", room_mm=30.0)
-    document.table(
+    table = Table(
         [
             Column("no."),
             Column("time, UTC"),
@@ -381,6 +402,7 @@ def _trials(document: Document, outcome: Outcome) -> None:
             for number, trial in zip(record.trial_numbers, record.trials, strict=True)
         ],
     )
+    return Section("Trials", [table])
 
 
 def _error_cells(errors: ErrorStatistics) -> list[str]:
@@ -398,45 +420,10 @@ def _error_cells(errors: ErrorStatistics) -> list[str]:
     ]
 
 
-def _notes(document: Document, notes: str) -> None:
-    document.heading("Notes")
-    document.text(notes)
-
-
-def _conditions(document: Document, outcome: Outcome) -> None:
-    record = outcome.record
-    columns = Column(align="left"), Column(align="left")
-    links = [event for event in record.events if event.name == "link"]
-    if links:
-        document.heading(f"Link to the headset, at {_time(links[-1].time)}")
-        document.table(columns, _flat(links[-1].data)[:_MAX_SETTINGS])
-    settings = _flat(record.settings)
-    document.heading("Settings")
-    document.table(columns, settings[:_MAX_SETTINGS])
-    if len(settings) > _MAX_SETTINGS:
-        document.text(f"and {len(settings) - _MAX_SETTINGS:,} more, in the session's settings.json")
-
-
-def _definitions(document: Document) -> None:
-    document.new_page()
-    document.heading("Definitions")
-    document.table([Column(align="left"), Column(align="left")], list(DEFINITIONS.items()))
-
-
-def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
-    """Return nested values as rows of a name with dots and a short text."""
-    rows: list[tuple[str, str]] = []
-    for name, value in values.items():
-        if isinstance(value, Mapping) and value:
-            rows += _flat(value, f"{prefix}{name}.")
-        else:
-            text = f"{value:.6g}" if isinstance(value, float) else str(value)
-            rows.append((_short(f"{prefix}{name}"), _short(text)))
-    return rows
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 200 else f"{text[:199]}…"
+def _shift_cells(outcome: Outcome, eye: Eye, origin: Origin) -> list[str]:
+    if origin == "solved" and outcome.results is not None:
+        return _with_sigma(outcome.results.shifts[eye])
+    return [_mm(value) for value in outcome.shifts_m[eye][origin]]
 
 
 def _with_sigma(shift: EyeShift) -> list[str]:
@@ -453,16 +440,3 @@ def _mm(value_m: float) -> str:
 
 def _yes(truth: bool) -> str:
     return "yes" if truth else "no"
-
-
-def _time(iso: str) -> str:
-    return f"{iso[:10]} {iso[11:16]} UTC"
-
-
-def _metadata(outcome: Outcome) -> dict[str, str]:
-    wearer = plain(outcome.record.wearer)
-    return {
-        "Title": f"Eye-display calibration {f'of {wearer}' if wearer else plain(outcome.name)}",
-        "Subject": f"Session {plain(outcome.name)}, begun {_time(outcome.started)}",
-        "Creator": f"handcal {version('handcal')}",
-    }

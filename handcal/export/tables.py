@@ -1,12 +1,7 @@
-"""Parameters and trials as CSV (RFC 4180, UTF-8), units in the headers.
-
-A text that a spreadsheet would take for a formula gets an apostrophe in front.
-"""
+"""Parameters and trials as CSV, units in the headers."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,9 +11,8 @@ import numpy as np
 from handcal.export.outcome import Origin, Outcome
 from handcal.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
+from handcal.report.rows import rows_csv
 from handcal.types import EYES, Eye, EyeShift, Float64
-
-_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 _WHOSE = ("session", "wearer")
 _PARAMETERS = (
@@ -68,15 +62,16 @@ def write_parameters(path: Path, outcome: Outcome) -> None:
 
     Columns: docs/export.md.
     """
-    _write(path, _PARAMETERS, outcome, _parameters(outcome))
+    _write(path, _PARAMETERS, outcome, parameter_rows(outcome))
 
 
 def write_trials(path: Path, outcome: Outcome) -> None:
     """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    _write(path, _TRIALS, outcome, _trials(outcome))
+    _write(path, _TRIALS, outcome, trial_rows(outcome))
 
 
-def _parameters(outcome: Outcome) -> Iterator[dict[str, Any]]:
+def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
+    """Yield a row for every φ of each eye."""
     record, results = outcome.record, outcome.results
     if results is not None:
         numbered = zip(record.alignment_numbers, record.alignments, results.alignments, strict=True)
@@ -136,7 +131,8 @@ def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
     }
 
 
-def _trials(outcome: Outcome) -> Iterator[dict[str, Any]]:
+def trial_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
+    """Yield a row for every corner of every trial."""
     record = outcome.record
     for number, trial in zip(record.trial_numbers, record.trials, strict=True):
         for corner in range(len(trial.corners_E_m)):
@@ -173,15 +169,4 @@ def _write(
     path: Path, columns: tuple[str, ...], outcome: Outcome, rows: Iterable[Mapping[str, Any]]
 ) -> None:
     whose = {"session": outcome.name, "wearer": outcome.record.wearer}
-    stream = io.StringIO(newline="")
-    writer = csv.DictWriter(stream, columns)
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({name: _cell(value) for name, value in {**whose, **row}.items()})
-    write_atomic(path, stream.getvalue().encode(errors="replace"))
-
-
-def _cell(value: Any) -> Any:
-    if isinstance(value, str) and value.startswith(_FORMULA_STARTS):
-        return f"'{value}"
-    return value
+    write_atomic(path, rows_csv(({**whose, **row} for row in rows), columns))

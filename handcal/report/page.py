@@ -7,20 +7,22 @@ or note can spoil a page. Lengths are millimetres from the upper left corner.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Page
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
+
+from handcal.report.document import Column, Figure
 
 WIDTH_MM, HEIGHT_MM = 210.0, 297.0
 _MARGIN_MM = 18.0
 _TOP_MM, _BOTTOM_MM = 18.0, 20.0
 CONTENT_MM = WIDTH_MM - 2 * _MARGIN_MM
-_MM_PER_INCH, _POINTS_PER_INCH = 25.4, 72.0
+MM_PER_INCH, _POINTS_PER_INCH = 25.4, 72.0
 _LINE = 1.35
 _FAMILY = "DejaVu Sans"
 _TABLE_PT, _TEXT_PT = 7.5, 9.0
@@ -33,15 +35,7 @@ _MEASURED = 300
 _CELL_LINES = 20
 _CAPTION_MM = 9.0
 # Inside a cell of axes: room for tick labels and titles.
-_AXES_LEFT_MM, _AXES_RIGHT_MM, _AXES_TOP_MM, _AXES_BOTTOM_MM = 13.0, 3.0, 6.0, 10.0
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """A column of a table; a table whose titles are all empty has no head."""
-
-    title: str = ""
-    align: Literal["left", "right"] = "right"
+_AXES_RIGHT_MM, _AXES_TOP_MM, _AXES_BOTTOM_MM = 3.0, 6.0, 10.0
 
 
 class Document:
@@ -55,16 +49,16 @@ class Document:
 
     def __init__(self, footer: str) -> None:
         self._footer = footer
-        self._pages: list[Figure] = []
+        self._pages: list[Page] = []
         self.new_page()
 
     def new_page(self) -> None:
         """Begin a page."""
-        inches = WIDTH_MM / _MM_PER_INCH, HEIGHT_MM / _MM_PER_INCH
-        self._pages.append(Figure(figsize=inches))
+        inches = WIDTH_MM / MM_PER_INCH, HEIGHT_MM / MM_PER_INCH
+        self._pages.append(Page(figsize=inches))
         self._y_mm = _TOP_MM
 
-    def finish(self) -> list[Figure]:
+    def finish(self) -> list[Page]:
         """Give the pages their numbers and return them."""
         y_mm = HEIGHT_MM - 0.6 * _BOTTOM_MM
         footer = _wrap(self._footer, 7.0, "normal", 0.8 * CONTENT_MM)[0]
@@ -123,25 +117,11 @@ class Document:
             self._row(columns, widths_mm, row)
         self.space(1.5)
 
-    def axes(self, height_mm: float, columns: int, *, left_mm: float = _AXES_LEFT_MM) -> list[Axes]:
-        """Return axes beside one another in a strip of the page's width."""
-        self._need(height_mm + _CAPTION_MM)
-        width_mm = CONTENT_MM / columns
-        found = [
-            self._pages[-1].add_axes(
-                _box(
-                    _MARGIN_MM + column * width_mm + left_mm,
-                    self._y_mm + _AXES_TOP_MM,
-                    width_mm - left_mm - _AXES_RIGHT_MM,
-                    height_mm - _AXES_TOP_MM - _AXES_BOTTOM_MM,
-                )
-            )
-            for column in range(columns)
-        ]
-        for axes in found:
-            axes.tick_params(labelsize=7.0)
-            axes.spines[["top", "right"]].set_visible(False)
-        self._y_mm += height_mm
+    def axes(self, figure: Figure) -> list[Axes]:
+        """Return the axes of a figure, beside one another over the page's width."""
+        self._need(figure.height_mm + _CAPTION_MM)
+        found = add_strip(self._pages[-1], (_MARGIN_MM, self._y_mm), figure)
+        self._y_mm += figure.height_mm
         return found
 
     def _need(self, height_mm: float) -> None:
@@ -170,10 +150,39 @@ class Document:
         self._rule(self._y_mm, "0.85" if weight == "normal" else "black", self._pages[-1])
 
     @staticmethod
-    def _rule(y_mm: float, color: str, page: Figure) -> None:
+    def _rule(y_mm: float, color: str, page: Page) -> None:
         y = 1.0 - y_mm / HEIGHT_MM
         ends = _MARGIN_MM / WIDTH_MM, 1.0 - _MARGIN_MM / WIDTH_MM
         page.add_artist(Line2D(ends, (y, y), color=color, linewidth=0.5))
+
+
+def add_strip(canvas: Page, corner_mm: tuple[float, float], figure: Figure) -> list[Axes]:
+    """Add a figure's axes beside one another, `CONTENT_MM` wide, to a page or canvas.
+
+    Parameters
+    ----------
+    canvas : matplotlib.figure.Figure
+    corner_mm : tuple of float
+        The strip's upper left corner, from that of the canvas.
+    figure : Figure
+    """
+    canvas_mm = canvas.get_size_inches() * MM_PER_INCH
+    (x_mm, y_mm), width_mm = corner_mm, CONTENT_MM / figure.columns
+    size_mm = np.array(
+        [
+            width_mm - figure.left_mm - _AXES_RIGHT_MM,
+            figure.height_mm - _AXES_TOP_MM - _AXES_BOTTOM_MM,
+        ]
+    )
+    found = []
+    for column in range(figure.columns):
+        left_mm = x_mm + column * width_mm + figure.left_mm
+        bottom_mm = canvas_mm[1] - y_mm - figure.height_mm + _AXES_BOTTOM_MM
+        axes = canvas.add_axes((*([left_mm, bottom_mm] / canvas_mm), *(size_mm / canvas_mm)))
+        axes.tick_params(labelsize=7.0)
+        axes.spines[["top", "right"]].set_visible(False)
+        found.append(axes)
+    return found
 
 
 def plain(text: str) -> str:
@@ -259,7 +268,7 @@ def _char_width_mm(char: str, weight: str) -> float:
     font = get_font(findfont(FontProperties(family=_FAMILY, weight=weight)))
     font.set_size(100.0, _POINTS_PER_INCH)
     advance: int = font.load_char(ord(char)).linearHoriAdvance
-    return advance / 2**16 / 100.0 * _MM_PER_INCH / _POINTS_PER_INCH
+    return advance / 2**16 / 100.0 * MM_PER_INCH / _POINTS_PER_INCH
 
 
 @lru_cache(maxsize=4096)
@@ -275,12 +284,12 @@ def _charmap() -> frozenset[int]:
 
 
 def _line_mm(points: float) -> float:
-    return _LINE * points * _MM_PER_INCH / _POINTS_PER_INCH
+    return _LINE * points * MM_PER_INCH / _POINTS_PER_INCH
 
 
-def _put(page: Figure, text: str, x_mm: float, y_mm: float, points: float, **style: Any) -> None:
+def _put(page: Page, text: str, x_mm: float, y_mm: float, points: float, **style: Any) -> None:
     """Put one line with its upper edge at `y_mm`."""
-    baseline_mm = y_mm + 0.95 * points * _MM_PER_INCH / _POINTS_PER_INCH
+    baseline_mm = y_mm + 0.95 * points * MM_PER_INCH / _POINTS_PER_INCH
     page.text(
         x_mm / WIDTH_MM,
         1.0 - baseline_mm / HEIGHT_MM,
@@ -290,15 +299,4 @@ def _put(page: Figure, text: str, x_mm: float, y_mm: float, points: float, **sty
         verticalalignment="baseline",
         parse_math=False,
         **style,
-    )
-
-
-def _box(
-    x_mm: float, y_mm: float, width_mm: float, height_mm: float
-) -> tuple[float, float, float, float]:
-    return (
-        x_mm / WIDTH_MM,
-        1.0 - (y_mm + height_mm) / HEIGHT_MM,
-        width_mm / WIDTH_MM,
-        height_mm / HEIGHT_MM,
     )

@@ -16,6 +16,7 @@ from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
     "report": "Verdict, eye shifts, figures and settings, to read and to file",
+    "html": "The same to read in a browser, and each figure with its numbers",
     "csv": "One row for each eye, alignment and trial, for statistics",
     "yaml": "Projection, K, H0 and φ of each eye, read by cv2.FileStorage",
     "json": "The projections as each system wants them",

@@ -25,6 +25,22 @@ resource = pytest.importorskip("resource")
 
 ALL_FILES = {
     "report.pdf",
+    "report.html",
+    *(
+        f"figures/{name}.{suffix}"
+        for name in (
+            "shifts",
+            "ellipses",
+            "convergence",
+            "residuals-1",
+            "residuals-3",
+            "overlay-left",
+            "overlay-right",
+            "trial-errors",
+            "running-mean",
+        )
+        for suffix in ("png", "csv")
+    ),
     "parameters.csv",
     "trials.csv",
     "calibration.yaml",
@@ -166,7 +182,8 @@ def test_a_new_export_replaces_the_old_one_of_its_formats(
 
 def test_a_session_without_alignments_is_exported_too(tmp_path: Path, empty: SessionRecord) -> None:
     export_session(empty, tmp_path, ExportSettings(), ignore, never)
-    assert set(tree(tmp_path)) == {name for name in ALL_FILES if "clouds" not in name}
+    without = {name for name in ALL_FILES if not name.startswith(("clouds/", "figures/"))}
+    assert set(tree(tmp_path)) == without
 
 
 def test_what_cannot_be_solved_is_not_exported(tmp_path: Path, record: SessionRecord) -> None:
@@ -192,7 +209,7 @@ def test_settings_come_back_from_json() -> None:
 @pytest.mark.parametrize(
     ("formats", "near_m", "far_m", "problem"),
     [
-        ((), 0.1, 1.0, "choose formats from report, csv"),
+        ((), 0.1, 1.0, "choose formats from report, html, csv"),
         (("docx",), 0.1, 1.0, "choose formats"),
         (("csv",), 0.0, 1.0, "near_m < far_m is needed, got 0 and 1"),
         (("csv",), 1.0, 0.5, "near_m < far_m"),

@@ -15,8 +15,9 @@ from matplotlib.transforms import Bbox
 
 from handcal.errors import CancelledError
 from handcal.export.outcome import Outcome, conclude
-from handcal.export.report import compose, write_report
+from handcal.export.report import session_report
 from handcal.register.verdict import expected_error_arcmin
+from handcal.report.pdf import compose, write_pdf
 from handcal.session import SessionRecord
 
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
@@ -28,7 +29,7 @@ def ignore(_share: float) -> None:
 
 @pytest.fixture(scope="module")
 def pages(outcome: Outcome) -> list[Figure]:
-    return compose(outcome, ignore)
+    return compose(session_report(outcome), ignore)
 
 
 def texts(pages: list[Figure]) -> list[str]:
@@ -76,13 +77,13 @@ def test_nothing_overlaps_or_leaves_its_page(pages: list[Figure]) -> None:
 def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: str) -> None:
     hostile = replace(empty, wearer=text, notes=text, settings={text: {text: [text]}})
     outcome = replace(conclude(empty), record=hostile)
-    write_report(tmp_path / "report.pdf", outcome, ignore)
+    write_pdf(tmp_path / "report.pdf", session_report(outcome), ignore)
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 
 def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
-    found = texts(compose(conclude(empty), ignore))
+    found = texts(compose(session_report(conclude(empty)), ignore))
     assert "Nothing is solved: the session holds no alignment." in found
     assert "Convergence" not in found
 
@@ -92,7 +93,7 @@ def test_the_file_is_a4_with_its_fonts_and_all_pages(
 ) -> None:
     shares: list[float] = []
     path = tmp_path / "report.pdf"
-    write_report(path, outcome, shares.append)
+    write_pdf(path, session_report(outcome), shares.append)
     assert shares == sorted(shares)
     content = path.read_bytes()
     assert len(re.findall(rb"/Type /Page\b", content)) == len(pages)
@@ -117,5 +118,5 @@ def test_giving_up_at_any_time_leaves_no_file(tmp_path: Path, outcome: Outcome, 
             raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
-        write_report(tmp_path / "report.pdf", outcome, give_up)
+        write_pdf(tmp_path / "report.pdf", session_report(outcome), give_up)
     assert not list(tmp_path.iterdir())

@@ -8,22 +8,23 @@ import numpy as np
 import pytest
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Page
 from matplotlib.transforms import Bbox
 
-from handcal.report.page import CONTENT_MM, WIDTH_MM, Column, Document, plain
+from handcal.report.document import Column, Figure
+from handcal.report.page import CONTENT_MM, WIDTH_MM, Document, plain
 
 LOREM = "When the wearer confirmed, the hand covered the cursor; $x_1$ is no formula. " * 12
 
 
-def text_boxes(page: Figure) -> list[Bbox]:
+def text_boxes(page: Page) -> list[Bbox]:
     """Return the places of a page's own texts, in pixels."""
     FigureCanvasAgg(page)
     with rc_context({"text.hinting": "none"}):  # as in a PDF
         return [text.get_window_extent() for text in page.texts if text.get_text().strip()]
 
 
-def assert_in_order(page: Figure) -> None:
+def assert_in_order(page: Page) -> None:
     """Check that a page's texts lie between its margins and apart from one another."""
     width_px, height_px = page.bbox.size
     margin_px = width_px * (WIDTH_MM - CONTENT_MM) / 2.0 / WIDTH_MM
@@ -37,7 +38,7 @@ def assert_in_order(page: Figure) -> None:
         assert overlap is None or min(overlap.width, overlap.height) < 1.0
 
 
-def lines(pages: list[Figure]) -> list[str]:
+def lines(pages: list[Page]) -> list[str]:
     return [text.get_text() for page in pages for text in page.texts]
 
 
@@ -90,8 +91,9 @@ def test_a_table_takes_any_cell(cell: str) -> None:
 
 def test_axes_have_their_place_between_the_margins() -> None:
     document = Document("footer")
+    strip = Figure("strip", "", lambda _axes: None, [], height_mm=70.0, columns=2)
     for _ in range(5):
-        for axes in document.axes(70.0, 2):
+        for axes in document.axes(strip):
             axes.plot([0.0, 1.0])
     pages = document.finish()
     assert [len(page.axes) for page in pages] == [6, 4]

@@ -1,0 +1,131 @@
+"""What a report says, however it is written."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Row: TypeAlias = Mapping[str, float | int | str | bool | None]
+"""A row of raw numbers, by the names of its columns, with their units."""
+
+AXES_LEFT_MM = 13.0
+"""Room for tick labels and title on the left of axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table; a table whose titles are all empty has no head."""
+
+    title: str = ""
+    align: Literal["left", "right"] = "right"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of texts; units belong in the columns' titles."""
+
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A strip of axes beside one another, over a page's width.
+
+    Attributes
+    ----------
+    name : str
+        Of its files: lower-case letters, digits and hyphens, once in a report.
+    caption : str
+    draw : callable
+        Draws into the axes that it is given; called once for each file the figure is in.
+    rows : sequence of mapping
+        The numbers behind it: the rows of its CSV.
+    height_mm : float
+    columns : int
+        How many axes.
+    left_mm : float
+        Room for tick labels and title on the left of each.
+
+    Raises
+    ------
+    ValueError
+        If the name is none for a file.
+    """
+
+    name: str
+    caption: str
+    draw: Callable[[Sequence[Axes]], None]
+    rows: Sequence[Row]
+    height_mm: float = 60.0
+    columns: int = 1
+    left_mm: float = AXES_LEFT_MM
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
+            raise ValueError(
+                f"a figure is named by lower-case letters, digits and hyphens, not {self.name!r}"
+            )
+
+
+Item: TypeAlias = str | Table | Figure
+"""A paragraph of text, a table or a figure."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a report; `title` may be empty."""
+
+    title: str
+    items: Sequence[Item]
+    starts_page: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All that a report says.
+
+    Attributes
+    ----------
+    title : str
+    subject : str
+        What it is of, in one line; on every page.
+    lead : str
+        The finding in a sentence or two.
+    sections : sequence of Section
+
+    Raises
+    ------
+    ValueError
+        If two figures have one name.
+    """
+
+    title: str
+    subject: str
+    lead: str
+    sections: Sequence[Section]
+
+    def __post_init__(self) -> None:
+        names = Counter(figure.name for figure in self.figures)
+        twice = sorted(name for name, count in names.items() if count > 1)
+        if twice:
+            raise ValueError(f"more than one figure is named {', '.join(twice)}")
+
+    @property
+    def figures(self) -> list[Figure]:
+        """Its figures, in order."""
+        return [
+            item for section in self.sections for item in section.items if isinstance(item, Figure)
+        ]
+
+
+def facts(values: Mapping[str, str], caption: str = "") -> Table:
+    """Return a table without head: names and what there is to say of each."""
+    return Table([Column(align="left"), Column(align="left")], list(values.items()), caption)

@@ -1,0 +1,47 @@
+"""A report's figures by themselves: pictures, and the raw rows behind them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure as Canvas
+
+from handcal.files import make_folder, write_atomic
+from handcal.report.document import Figure, Report
+from handcal.report.page import CONTENT_MM, MM_PER_INCH, add_strip
+from handcal.report.rows import rows_csv
+
+_DPI = 200
+
+
+def write_figures(folder: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
+    """Write NAME.png and NAME.csv for each of a report's figures.
+
+    Parameters
+    ----------
+    folder : Path
+        Created if needed.
+    report : Report
+    checkpoint : callable
+        Told the share done before each figure; what it raises ends the writing.
+    """
+    make_folder(folder)
+    for done, figure in enumerate(report.figures):
+        checkpoint(done / len(report.figures))
+        write_atomic(folder / f"{figure.name}.png", picture(figure, "png"))
+        write_atomic(folder / f"{figure.name}.csv", rows_csv(figure.rows))
+
+
+def picture(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
+    """Return a figure as a picture, as wide as a page's text."""
+    canvas = Canvas(figsize=(CONTENT_MM / MM_PER_INCH, figure.height_mm / MM_PER_INCH))
+    figure.draw(add_strip(canvas, (0.0, 0.0), figure))
+    stream = io.BytesIO()
+    metadata: dict[str, Any] = {"Date": None} if kind == "svg" else {}
+    with rc_context({"svg.hashsalt": "handcal", "svg.fonttype": "path"}):  # the same bytes again
+        canvas.savefig(stream, format=kind, dpi=_DPI, metadata=metadata)
+    return stream.getvalue()

@@ -1,0 +1,71 @@
+"""A report as one HTML file that needs no other, and no network."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from handcal.files import write_atomic
+from handcal.report.document import Figure, Report, Table
+from handcal.report.figures import picture
+from handcal.report.rows import rows_csv
+from handcal.resources import resource_path
+
+_NO_BREAK = "\u00a0"
+
+
+def write_html(path: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
+    """Write a report as HTML with its figures and their raw rows in it.
+
+    Parameters
+    ----------
+    path : Path
+    report : Report
+    checkpoint : callable
+        Told the share done before each figure; what it raises ends the writing.
+    """
+    template = resource_path("report.html.jinja")
+    environment = Environment(
+        loader=FileSystemLoader(template.parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_printable,
+    )
+    environment.tests |= {
+        "table": lambda item: isinstance(item, Table),
+        "figure": lambda item: isinstance(item, Figure),
+    }
+    done = 0
+
+    def drawn(figure: Figure) -> str:
+        nonlocal done
+        checkpoint(done / len(report.figures))
+        done += 1
+        return _data_url("image/svg+xml", picture(figure, "svg"))
+
+    text = environment.get_template(template.name).render(
+        report=report,
+        drawn=drawn,
+        raw=lambda figure: _data_url("text/csv", rows_csv(figure.rows)),
+        version=version("handcal"),
+    )
+    write_atomic(path, text.encode())
+
+
+def _data_url(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{b64encode(content).decode()}"
+
+
+def _printable(value: object) -> object:
+    """Return a text without what no page can show, such as control characters."""
+    if not isinstance(value, str):
+        return value
+    return "".join(
+        char if char.isprintable() or char in ("\n", _NO_BREAK) else "\ufffd" for char in value
+    )

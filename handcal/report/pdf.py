@@ -1,0 +1,114 @@
+"""A report as PDF."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure as Page
+
+from handcal.files import write_atomic
+from handcal.report.document import Figure, Item, Report, Table
+from handcal.report.page import Document, plain
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+# A heading needs so much room for itself, and so much for what follows it.
+_HEADING_MM, _PARAGRAPH_MM, _TABLE_MM = 15.0, 12.0, 25.0
+
+
+def write_pdf(path: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
+    """Write a report as PDF, A4, with its fonts.
+
+    Parameters
+    ----------
+    path : Path
+    report : Report
+    checkpoint : callable
+        Told the share done, many times a second; what it raises ends the writing.
+    """
+    pages = compose(report, lambda share: checkpoint(0.4 * share))
+    stream = _CheckedStream(checkpoint, 0.4)
+    # TrueType rather than Type 3, which publishers refuse; pictures at 200 dots an inch.
+    with rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
+        pdf: Any = PdfPages(stream, metadata=_metadata(report))
+        for done, page in enumerate(pages):
+            stream.share = 0.4 + 0.5 * done / len(pages)
+            pdf.savefig(page)
+        stream.share = 0.9
+        pdf.close()  # not after an error: it would go on writing
+    write_atomic(path, stream.getvalue())
+
+
+def compose(report: Report, checkpoint: Callable[[float], None]) -> list[Page]:
+    """Return the report's pages; arguments as `write_pdf`."""
+    document = Document(report.subject)
+    document.title(report.title)
+    document.text(report.lead, points=11.0)
+    document.space(4.0)
+    count = sum(len(section.items) for section in report.sections)
+    done = 0
+    for section in report.sections:
+        if section.starts_page:
+            document.new_page()
+        if section.title:
+            document.heading(section.title, _HEADING_MM + _room_mm(section.items))
+        for item in section.items:
+            checkpoint(done / count)
+            done += 1
+            _set(document, item)
+    return document.finish()
+
+
+class _CheckedStream(io.BytesIO):
+    """Bytes whose every writing is a checkpoint: matplotlib works for long between two pages."""
+
+    def __init__(self, checkpoint: Callable[[float], None], share: float) -> None:
+        super().__init__()
+        self.share = share
+        self._checkpoint = checkpoint
+
+    def write(self, data: Buffer, /) -> int:
+        self._checkpoint(self.share)
+        return super().write(data)
+
+
+def _set(document: Document, item: Item) -> None:
+    match item:
+        case Table():
+            document.table(item.columns, item.rows)
+        case Figure():
+            item.draw(document.axes(item))
+        case _:
+            document.text(item)
+            document.space(1.5)
+            return
+    if item.caption:
+        document.caption(item.caption)
+
+
+def _room_mm(items: Sequence[Item]) -> float:
+    """Return the room for what a heading must not be parted from: up to a table or figure."""
+    room_mm = 0.0
+    for item in items:
+        match item:
+            case Figure():
+                return room_mm + item.height_mm
+            case Table():
+                return room_mm + _TABLE_MM
+        room_mm += _PARAGRAPH_MM
+    return room_mm
+
+
+def _metadata(report: Report) -> dict[str, str]:
+    return {
+        "Title": plain(f"{report.title}: {report.subject}"),
+        "Subject": plain(report.subject),
+        "Creator": f"handcal {version('handcal')}",
+    }
