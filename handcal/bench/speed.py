@@ -11,13 +11,13 @@ import numpy as np
 from handcal.bench.figure import Figure
 from handcal.bench.settings import BenchSettings
 from handcal.bench.trials import Measured, Progress, trial_hand
-from handcal.bench.wearer import overlay_by_eye
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.geometry import rigid
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
+from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState

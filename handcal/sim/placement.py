@@ -61,6 +61,25 @@ class EyeView:
     drawn_px: Float64
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Slip:
+    """How a placement misses.
+
+    Attributes
+    ----------
+    rotation_rad : (3,) float64
+        Of the hand against its cursor.
+    lateral_rad : (2,) float64
+        Angles about two axes across the line of sight.
+    depth_ratio : float
+        Error of the hand's apparent size.
+    """
+
+    rotation_rad: Float64
+    lateral_rad: Float64
+    depth_ratio: float
+
+
 def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> CursorMatch:
     """Register a cursor to the hand's surface, point to plane, with robust weights.
 
@@ -173,22 +192,18 @@ def _offsets(view: EyeView, points_m: Float64) -> tuple[Float64, Float64]:
     return (seen_px - view.drawn_px[shown]).ravel(), J.reshape(-1, 3)
 
 
-def misplace(
-    T_W_hand: Float64, eye_m: Float64, lateral_rad: Float64, depth_ratio: float
-) -> Float64:
+def misplace(T_W_hand: Float64, eye_m: Float64, slip: Slip) -> Float64:
     """Shift a hand as a person would who sees from `eye_m`: across the line of sight, along it.
 
     Parameters
     ----------
     T_W_hand : (4, 4) float64
+        Turned by the slip already.
     eye_m : (3,) float64
         W.
-    lateral_rad : (2,) float64
-        Angles about two axes across the line of sight.
-    depth_ratio : float
-        Error of the hand's apparent size.
+    slip : Slip
     """
     line_m = T_W_hand[:3, 3] - eye_m
     across = np.linalg.svd(line_m[None])[2][1:]
-    aside = Rotation.from_rotvec(lateral_rad @ across)
-    return rigid(T_W_hand[:3, :3], eye_m + (1.0 + depth_ratio) * aside.apply(line_m))
+    aside = Rotation.from_rotvec(slip.lateral_rad @ across)
+    return rigid(T_W_hand[:3, :3], eye_m + (1.0 + slip.depth_ratio) * aside.apply(line_m))

@@ -17,6 +17,7 @@ from handcal.geometry import interpolate_pose, invert, rigid, transform
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import (
     CursorMatch,
+    Slip,
     match_cursor,
     misplace,
     overlay_hand,
@@ -140,15 +141,6 @@ class WearerAction:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Slip:
-    """How one placement misses: turned hand, angles across the line of sight, apparent size."""
-
-    rotation_rad: Float64
-    lateral_rad: Float64
-    depth_ratio: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Move:
     """A movement of the hand toward a goal, by minimum jerk (Flash & Hogan 1985).
 
@@ -189,6 +181,17 @@ class _Sway:
     def pose(self, t_s: float) -> Float64:
         sway = (self._sizes * np.sin(self._rate_rad_s * t_s + self._phase_rad)).sum(1)
         return rigid(sway[:3], sway[3:])
+
+
+def draw_slip(rng: np.random.Generator, settings: WearerSettings, turned_rad: float = 0.0) -> Slip:
+    """Draw the errors of one placement, of a hand turned by about `turned_rad`."""
+    axis = rng.normal(size=3)
+    angle_rad = turned_rad + settings.rotation_sigma_rad * rng.normal()
+    return Slip(
+        angle_rad * axis / np.linalg.norm(axis),
+        settings.lateral_sigma_arcmin * _ARCMIN * rng.normal(size=2),
+        settings.depth_sigma * rng.normal(),
+    )
 
 
 def draw_eyes(rng: np.random.Generator, settings: WearerSettings) -> dict[Eye, Float64]:
@@ -243,7 +246,7 @@ class Wearer:
         self._move: _Move | None = None
         self._task: tuple[int, tuple[Eye, ...]] | None = None
         self._match: CursorMatch | None = None
-        self._slip = self._draw_slip(0.0)
+        self._slip = self._slip_turned_by(0.0)
         self._confirmed_s = 0.0
         self._P_confirmed: Mapping[Eye, Float64] = {}
 
@@ -287,9 +290,9 @@ class Wearer:
             self._match = match_cursor(self._hand, cursor_m, self._T_W_hand)
         self._task = task
         turned_rad = self._settings.novice_rotation_rad if self._is_naive else 0.0
-        self._reach(view.t_s, self._draw_slip(turned_rad))
+        self._reach(view.t_s, self._slip_turned_by(turned_rad))
 
-    def _reach(self, t_s: float, slip: _Slip) -> None:
+    def _reach(self, t_s: float, slip: Slip) -> None:
         self._phase = "reaching"
         self._slip = slip
         start_s = t_s + self._settings.reaction_s
@@ -312,12 +315,12 @@ class Wearer:
             if t_s < move.end_s + settings.dwell_s:
                 return False
             if view.guard_red and not self._is_naive:
-                self._reach(t_s, self._draw_slip(0.0))
+                self._reach(t_s, self._slip_turned_by(0.0))
                 return False
             return self._press(view)
         if view.guard_red and t_s > self._confirmed_s + settings.reaction_s:
             self._is_naive = False
-            self._reach(t_s, self._draw_slip(0.0))
+            self._reach(t_s, self._slip_turned_by(0.0))
             return False
         return t_s > self._confirmed_s + settings.patience_s and self._press(view)
 
@@ -341,18 +344,10 @@ class Wearer:
         if placed is None:
             return None
         eye_m = np.mean(eyes_m, axis=0)
-        return misplace(placed[0], eye_m, self._slip.lateral_rad, self._slip.depth_ratio)
+        return misplace(placed[0], eye_m, self._slip)
 
-    def _draw_slip(self, turned_rad: float) -> _Slip:
-        """Draw the errors of one placement, with a hand turned by about `turned_rad`."""
-        settings, rng = self._settings, self._rng
-        axis = rng.normal(size=3)
-        angle_rad = turned_rad + settings.rotation_sigma_rad * rng.normal()
-        return _Slip(
-            angle_rad * axis / np.linalg.norm(axis),
-            settings.lateral_sigma_arcmin * _ARCMIN * rng.normal(size=2),
-            settings.depth_sigma * rng.normal(),
-        )
+    def _slip_turned_by(self, turned_rad: float) -> Slip:
+        return draw_slip(self._rng, self._settings, turned_rad)
 
     def _choose_place(self) -> Float64:
         """Return a pose for the raised hand, upright, the palm facing the eyes."""

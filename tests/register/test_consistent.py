@@ -10,10 +10,10 @@ from handcal.bench.trials import (
     trial_alignment,
     trial_hand,
 )
-from handcal.bench.wearer import overlay_by_eye
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
+from handcal.sim.overlay import overlay_by_eye
 from handcal.types import Float64, Method
 
 # Few hands are made: trial n has hand n % 10.

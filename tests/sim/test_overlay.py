@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from handcal.bench.trials import trial_hand
-from handcal.bench.wearer import overlay_by_eye
 from handcal.display import eye_projection
 from handcal.geometry import project, transform
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
+from handcal.sim.overlay import overlay_by_eye
+from handcal.sim.placement import Slip
 from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
@@ -27,6 +28,29 @@ def test_the_hand_covers_the_cursor_on_the_display() -> None:
     hand_px, cursor_px = _overlay({"left": np.array([0.004, -0.003, 0.010])})
     for side in (np.min, np.max, np.mean):
         np.testing.assert_allclose(side(hand_px, axis=0), side(cursor_px, axis=0), atol=6.0)
+
+
+def test_a_cursor_drawn_rightly_lies_on_the_hand() -> None:
+    """With the true φ rendered, and no slip, the wearer puts the hand back where it was."""
+    true_m = {eye: np.array([0.010, -0.009, 0.006]) for eye in EYES}
+    alignment = overlay_by_eye(
+        np.random.default_rng(3), trial_hand(3), RIG, true_m, 2000, drawn_shift_m=true_m
+    )
+    moved_m = alignment.hand_m.mean(axis=0) - alignment.cursor_m.mean(axis=0)
+    assert np.abs(moved_m).max() < 0.003  # both are sampled apart; 8 mm otherwise
+
+
+def test_a_slip_moves_and_turns_the_hand() -> None:
+    slip = Slip(np.array([0.0, 0.0, 0.05]), np.array([0.004, 0.0]), 0.02)
+    true_m = dict.fromkeys(EYES, np.zeros(3))
+    alignment = overlay_by_eye(
+        np.random.default_rng(4), trial_hand(4), RIG, true_m, 2000, slip=slip
+    )
+    assert np.linalg.norm(alignment.rotation_rad) == pytest.approx(0.05)
+    moved_m = alignment.hand_m.mean(axis=0) - alignment.cursor_m.mean(axis=0)
+    away_m = 0.56  # from the eyes
+    assert moved_m[2] == pytest.approx(0.02 * away_m, abs=0.003)
+    assert np.linalg.norm(moved_m[:2]) == pytest.approx(0.004 * away_m, abs=0.003)
 
 
 def test_eyes_at_the_viewpoints_need_no_update() -> None:

@@ -1,0 +1,103 @@
+"""Alignments as a person makes them who looks through the displays, one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from handcal.display import projection_matrix, view_of_eye
+from handcal.geometry import invert, rigid, transform
+from handcal.sim.hand import HandModel
+from handcal.sim.placement import Slip, misplace, overlay_hand, view_through
+from handcal.sim.raster import visible_points
+from handcal.types import EYES, Alignment, Bool, Eye, Float64, Rig
+
+_FOREARM_M = 0.04
+# Where the palm is raised and how far that may differ, for all of it to be on both displays.
+_PALM_H_M = np.array([0.0, 0.088, 0.51])
+_PALM_SPREAD_M = np.array([0.015, 0.006, 0.025])
+_PALM_TURN_RAD = 0.1
+_NO_SLIP = Slip(np.zeros(3), np.zeros(2), 0.0)
+
+
+def overlay_by_eye(
+    rng: np.random.Generator,
+    hand: HandModel,
+    rig: Rig,
+    true_shift_m: Mapping[Eye, Float64],
+    points: int,
+    depth_sigma_m: float = 0.0,
+    *,
+    slip: Slip = _NO_SLIP,
+    drawn_shift_m: Mapping[Eye, Float64] | None = None,
+) -> Alignment:
+    """Let a person overlay the own hand on its cursor.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    hand : HandModel
+    rig : Rig
+    true_shift_m : mapping of eye to (3,) float64
+        φ of the open eyes.
+    points : int
+        Of each cloud, as the depth camera sees it; both are sampled apart.
+    depth_sigma_m : float
+        Standard deviation of each point's depth noise.
+    slip : Slip
+        By how much the overlay misses.
+    drawn_shift_m : mapping of eye to (3,) float64, optional
+        φ that the cursor is drawn with; the offline calibration by default.
+
+    Returns
+    -------
+    Alignment
+        In H for W: the head keeps still.
+    """
+
+    def see(T_H_hand: Float64) -> tuple[Float64, Bool]:
+        points_D_m, is_cut = visible_points(
+            hand,
+            invert(rig.T_H_D) @ T_H_hand,
+            points,
+            rng,
+            intrinsics=rig.depth_intrinsics,
+            forearm_m=_FOREARM_M,
+            depth_sigma_m=depth_sigma_m,
+        )
+        return transform(rig.T_H_D, points_D_m), is_cut
+
+    drawn_m = {eye: np.zeros(3) for eye in EYES} | dict(drawn_shift_m or {})
+    T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
+    palm_m = _PALM_H_M + rng.uniform(-1.0, 1.0, 3) * _PALM_SPREAD_M
+    T_H_raised = rigid(rng.normal(0.0, _PALM_TURN_RAD, 3), palm_m)
+    cursor_m, cursor_is_cut = see(T_H_raised)
+    views = [
+        view_through(
+            rig.eyes[eye],
+            shift_m,
+            np.eye(4),
+            projection_matrix(rig.eyes[eye], drawn_m[eye]) @ rig.eyes[eye].T_V_H,
+            cursor_m,
+        )
+        for eye, shift_m in true_shift_m.items()
+    ]
+    turned = T_H_raised @ rigid(slip.rotation_rad)
+    placed = overlay_hand(transform(invert(T_H_raised), cursor_m), turned, views)
+    assert placed is not None, "the cursor is on the displays"
+    eyes_m = [transform(invert(T_E_H[eye]), m[None])[0] for eye, m in true_shift_m.items()]
+    hand_m, hand_is_cut = see(misplace(placed[0], np.mean(eyes_m, axis=0), slip))
+    R_D_raised = rig.T_H_D[:3, :3].T @ T_H_raised[:3, :3]
+    return Alignment(
+        cursor_m=cursor_m,
+        hand_m=hand_m,
+        cursor_is_cut=cursor_is_cut,
+        hand_is_cut=hand_is_cut,
+        T_E_W=T_E_H,
+        eyes=tuple(true_shift_m),
+        rotation_rad=R_D_raised @ slip.rotation_rad,
+        t_a_ns=0,
+        t_b_ns=1,
+        drawn_shift_m=drawn_m,
+    )
