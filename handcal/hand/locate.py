@@ -192,9 +192,10 @@ def _palm_to_wrist(
     along_axis_m = np.tensordot(axis, points_m, 1) - axis @ palm_m
     armward = near_palm & (along_axis_m > _ARMWARD_COS * from_palm_m)
     shell = (from_palm_m[armward] / _SHELL_M).astype(int)
-    profile_m = np.zeros(1 + int(_PALM_TO_WRIST_MAX_M / _SHELL_M))
+    # Of radius_m's type, or ufunc.at takes thirty times as long.
+    profile_m = np.zeros(1 + int(_PALM_TO_WRIST_MAX_M / _SHELL_M), radius_m.dtype)
     np.maximum.at(profile_m, shell, radius_m[armward])
-    return _end_of_fall(profile_m) * _SHELL_M + _WRIST_BEYOND_M
+    return _end_of_fall(profile_m.astype(np.float64)) * _SHELL_M + _WRIST_BEYOND_M
 
 
 def _end_of_fall(profile_m: Float64) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -27,6 +28,7 @@ _PANELS_OF_STEPS = {
     Step.SAVE: "session",
 }
 """What to look at when a step begins."""
+_RECORD = "record the trial"
 
 
 class Live(QObject):
@@ -65,7 +67,9 @@ class Live(QObject):
         self._solve_settings = SolveSettings()
         self._stream: Stream | None = None
         self._snapshot: Snapshot | None = None
-        self._is_watching = self._turn = False
+        self._is_watching = False
+        panels = window.panels
+        self._turns = deque((panels.cloud, panels.rotation, panels.wearer_view))
         self._seen: set[Panel] = set()
         self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
         self._complained_of = ""
@@ -158,8 +162,9 @@ class Live(QObject):
         # What is shown for a comparison only is not the φ that a trial is about.
         trials.trial_requested.connect(fine_tune.settle)
         trials.trial_requested.connect(
-            lambda eye, depth_m: self._ask("record the trial", lambda s: s.save_trial(eye, depth_m))
+            lambda eye, depth_m: self._ask(_RECORD, lambda s: s.save_trial(eye, depth_m))
         )
+        trials.doubted.connect(partial(self._take_failure, _RECORD))
 
     def _connect_session(self) -> None:
         session, trials = self._window.panels.session, self._window.panels.trials
@@ -214,8 +219,8 @@ class Live(QObject):
         # Out of sight, too: they may be used before another snapshot comes.
         always = panels.fine_tune, panels.trials
         # What takes long to paint takes turns, lest the window wait for all of it at once.
-        self._turn = not self._turn
-        waiting = (panels.cloud,) if self._turn else (panels.rotation, panels.wearer_view)
+        self._turns.rotate()
+        waiting = tuple(self._turns)[1:]
         for panel in panels.all():
             if panel in always or (panel in self._seen and panel not in waiting):
                 panel.show_snapshot(snapshot)

@@ -13,12 +13,13 @@ from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import role_color
 
 LINES = {
-    "hand": ("text", (1.5, Qt.PenStyle.SolidLine)),
-    "drawn": ("live", (1.5, Qt.PenStyle.DashLine)),
-    "cursor": ("cursor", (2.5, Qt.PenStyle.SolidLine)),
-    "offline": ("muted", (1.5, Qt.PenStyle.DotLine)),
+    "hand": ("text", (1.0, Qt.PenStyle.SolidLine)),
+    "drawn": ("live", (1.0, Qt.PenStyle.DashLine)),
+    "cursor": ("cursor", (2.0, Qt.PenStyle.SolidLine)),
+    "offline": ("muted", (1.0, Qt.PenStyle.DotLine)),
 }
-"""Colour of each outline, and width in pixels and style of its line."""
+"""Colour of each outline, and width in pixels and style of its line; wider ones take Qt ten times
+as long, and their halos make them plain enough."""
 _HALO_PX = 4.5
 _MOST_POINTS = 180
 """Of each outline, since Qt takes a microsecond and more for each."""
