@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from handcal.errors import HandcalError
 from handcal.rig.board_trouble import MIN_CORNERS, why_not_found
-from handcal.types import Float64, UInt8, freeze
+from handcal.types import Float32, Float64, UInt8, freeze
 
 BoardKind: TypeAlias = Literal["charuco", "checkerboard"]
 Int64: TypeAlias = NDArray[np.int64]
@@ -215,7 +215,7 @@ def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
     """Tell whether the first square is black, as printed, and how far x points to the right."""
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
     row, column = np.indices(middles.shape[:2])
-    shades = _sample(gray, middles)
+    shades = shades_at(gray, middles)
     is_black = (row + column) % 2 == 0
     first_is_black = bool(shades[is_black].mean() < shades[~is_black].mean())
     return first_is_black, float(grid[0, -1, 0] - grid[0, 0, 0])
@@ -244,7 +244,7 @@ def _checker(gray: UInt8, corners: Float64, H: Float64) -> Float64:
     """Return how much the squares around each corner alternate; half as much at a board's edge."""
     quadrants = 0.3 * np.array([[-1, -1], [1, 1], [-1, 1], [1, -1]])
     places = cv2.perspectiveTransform(corners[:, None] + quadrants, H)
-    shades = _sample(gray, np.asarray(places, dtype=np.float64))
+    shades = shades_at(gray, np.asarray(places, dtype=np.float64))
     alternation: Float64 = np.abs(shades[:, :2].sum(axis=1) - shades[:, 2:].sum(axis=1))
     return alternation
 
@@ -280,7 +280,7 @@ def _blur_px(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> float:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     offsets_px = np.arange(-4.0, 4.5, 0.5)
     places = (starts + ends)[:, None] / 2 + offsets_px[:, None] * across[:, None]
-    shades = _sample(gray, places)
+    shades = shades_at(gray, places)
     steepness = np.abs(np.diff(shades, axis=1)).max(axis=1) / 0.5
     widths_px = np.ptp(shades, axis=1) / np.maximum(steepness, 1e-3)
     # A motion blurs the edges across it only: the wider half counts.
@@ -300,8 +300,8 @@ def _neighbours(ids: Int64, pixels: Float64, columns: int) -> tuple[Float64, Flo
     return edges[:, 0], edges[:, 1]
 
 
-def _sample(gray: UInt8, places: Float64) -> Float64:
-    """Return the image's shade at places of shape (..., 2)."""
+def shades_at(gray: UInt8 | Float32, places: Float64) -> Float64:
+    """Return an image's shades at places of shape (..., 2), in pixels."""
     x, y = places.reshape(-1, 1, 2).astype(np.float32).T
     shades = cv2.remap(gray, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(shades, dtype=np.float64).reshape(places.shape[:-1])

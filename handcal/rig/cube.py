@@ -13,6 +13,7 @@ from handcal.errors import HandcalError
 from handcal.geometry import camera_matrix, image_points, rigid, transform
 from handcal.rig.board import DICTIONARIES
 from handcal.rig.board_trouble import light_trouble
+from handcal.rig.marker_corners import refine_corners
 from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, UInt8
 
@@ -87,7 +88,7 @@ def face_pose(cube: Cube, marker: int) -> Float64:
 
 
 def corners_m(cube: Cube, markers: Iterable[int]) -> Float64:
-    """Return the corners of markers in the cube's frame, (4 * markers, 3), as OpenCV orders them."""
+    """Return the corners of markers, four each as OpenCV orders them, in the cube's frame."""
     flat = np.column_stack([cube.marker_m * _AROUND, np.zeros(4)])
     return np.concatenate([transform(face_pose(cube, marker), flat) for marker in markers])
 
@@ -123,8 +124,10 @@ def find_cube(image: UInt8, cube: Cube) -> Mapping[int, Float64]:
     twice = [marker for marker in seen if ids.count(marker) > 1]
     if twice:
         raise CubeError(f"marker {twice[0]} is seen twice: take other cubes and prints away")
+    cells = cube.marker_dictionary.markerSize + 2
+    rough = {marker: found[ids.index(marker)].reshape(4, 2).astype(np.float64) for marker in seen}
     return MappingProxyType(
-        {marker: found[ids.index(marker)].reshape(4, 2).astype(np.float64) for marker in seen}
+        {marker: refine_corners(image, px, cells) for marker, px in rough.items()}
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -13,7 +14,8 @@ from handcal.rig.board_print import draw_board
 from handcal.types import Float32, Float64, Intrinsics, UInt8
 
 _SQUARE_PX = 64  # of the texture
-_BLACK, _WHITE, _WALL = 30.0, 215.0, 120.0
+BLACK, WHITE, WALL = 30.0, 215.0, 120.0
+"""How much light ink, paper and what is behind send back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,7 @@ class BoardPainter:
         self._board, self._camera = board, camera
         self._settings = settings or PictureSettings()
         print_ = draw_board(board, _SQUARE_PX).astype(np.float32) / 255
-        texture = _BLACK + (_WHITE - _BLACK) * print_
+        texture = BLACK + (WHITE - BLACK) * print_
         self._texture = texture
         self._rays = pixel_rays(camera, self._settings.samples)
 
@@ -59,22 +61,24 @@ class BoardPainter:
         # The texture's pixel centres are at whole numbers; its margin is one square.
         at = (places_m / self._board.square_m + 1) * _SQUARE_PX - 0.5
         x, y = np.moveaxis(np.clip(at, -1e4, 1e4).astype(np.float32), 2, 0)
-        fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=_WALL)
+        fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=WALL)
         size = self._camera.width, self._camera.height
         image = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32)
-        return self._expose(image, rng)
+        return expose(image, self._settings, rng)
 
-    def _expose(self, image: Float32, rng: np.random.Generator) -> UInt8:
-        height, width = image.shape
-        falloff = rng.uniform(-0.15, 0.15, 2)
-        light = 1 + np.add.outer(
-            falloff[0] * np.linspace(-1, 1, height), falloff[1] * np.linspace(-1, 1, width)
-        )
-        if self._settings.blur_px > 0:
-            image = np.asarray(cv2.GaussianBlur(image, (0, 0), self._settings.blur_px), np.float32)
-        noisy = image * light + rng.normal(scale=self._settings.noise, size=image.shape)
-        shades: UInt8 = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
-        return shades
+
+def expose(image: Float32, settings: PictureSettings, rng: np.random.Generator) -> UInt8:
+    """Return the picture that a camera takes of light (H, W), 0 to 255: uneven, blurred, noisy."""
+    height, width = image.shape
+    falloff = rng.uniform(-0.15, 0.15, 2)
+    light = 1 + np.add.outer(
+        falloff[0] * np.linspace(-1, 1, height), falloff[1] * np.linspace(-1, 1, width)
+    )
+    if settings.blur_px > 0:
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), settings.blur_px), np.float32)
+    noisy = image * light + rng.normal(scale=settings.noise, size=image.shape)
+    shades: UInt8 = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+    return shades
 
 
 def board_view(
@@ -141,17 +145,23 @@ def _sees(points_m: Float64, camera: Intrinsics) -> bool:
     return bool((pixels > edge_px).all() and (pixels < size - edge_px).all())
 
 
+@lru_cache(maxsize=2)
 def pixel_rays(camera: Intrinsics, samples: int) -> Float32:
     """Return directions (H * samples, W * samples, 3) of rays through parts of the pixels."""
     within = (np.arange(samples) + 0.5) / samples - 0.5
     x = (np.arange(camera.width)[:, None] + within).ravel()
     y = (np.arange(camera.height)[:, None] + within).ravel()
     pixels = np.stack(np.meshgrid(x, y), axis=-1)
-    undistorted = cv2.undistortPoints(
-        pixels.reshape(-1, 1, 2),
-        camera_matrix(camera),
-        np.array(camera.distortion or (0.0,) * 5),
-        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
-    )
-    plane = undistorted.reshape(*pixels.shape)
-    return np.dstack([plane, np.ones(plane.shape[:2])]).astype(np.float32)
+    if any(camera.distortion):
+        undistorted = cv2.undistortPoints(
+            pixels.reshape(-1, 1, 2),
+            camera_matrix(camera),
+            np.array(camera.distortion),
+            criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
+        )
+        plane = undistorted.reshape(*pixels.shape)
+    else:
+        plane = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    rays = np.dstack([plane, np.ones(plane.shape[:2])]).astype(np.float32)
+    rays.flags.writeable = False  # they are kept
+    return rays
