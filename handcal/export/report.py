@@ -343,7 +343,7 @@ def _user_test(outcome: Outcome) -> Section:
         "trial-errors",
         "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
         lambda axes: figures.draw_trial_errors(axes, record.trials),
-        list(trial_rows(outcome)),
+        list(trial_rows(record.trial_numbers, record.trials)),
         height_mm=62.0,
         columns=2,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from handcal.export.outcome import Origin, Outcome
 from handcal.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.rows import rows_csv
+from handcal.trial import Trial
 from handcal.types import EYES, Eye, EyeShift, Float64
 
 _WHOSE = ("session", "wearer")
@@ -67,7 +68,8 @@ def write_parameters(path: Path, outcome: Outcome) -> None:
 
 def write_trials(path: Path, outcome: Outcome) -> None:
     """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    _write(path, _TRIALS, outcome, trial_rows(outcome))
+    record = outcome.record
+    _write(path, _TRIALS, outcome, trial_rows(record.trial_numbers, record.trials))
 
 
 def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
@@ -131,10 +133,9 @@ def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
     }
 
 
-def trial_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
-    """Yield a row for every corner of every trial."""
-    record = outcome.record
-    for number, trial in zip(record.trial_numbers, record.trials, strict=True):
+def trial_rows(numbers: Sequence[int], trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+    """Yield a row for every corner of every trial, given with their numbers."""
+    for number, trial in zip(numbers, trials, strict=True):
         for corner in range(len(trial.corners_E_m)):
             x_m, y_m, z_m = map(float, trial.corners_E_m[corner])
             yield {

@@ -1,0 +1,206 @@
+"""The user test of Hu et al. 2021 over the sessions of several wearers.
+
+The reprojection error is the distance in the display between a corner of the target drawn with the
+calibrated φ and with the φ that the wearer adjusted by hand; each corner counts once.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from handcal.errors import FileError
+from handcal.export.tables import trial_rows
+from handcal.session import Session, SessionRecord
+from handcal.statistics import (
+    MeanInterval,
+    Summary,
+    VarianceComponents,
+    mean_interval,
+    summarise,
+    variance_components,
+)
+from handcal.trial import calibration_numbers
+
+CornerRow: TypeAlias = dict[str, Any]
+"""One corner of one trial: the columns of `trial_rows`, and whose it is."""
+
+Unit: TypeAlias = Literal["wearer", "calibration"]
+"""What an interval takes for independent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UserTest:
+    """The trials of all sessions.
+
+    Attributes
+    ----------
+    sessions : mapping of str to SessionRecord
+        Those with trials, by a name of their own.
+    left_out : mapping of str to str
+        Why the others are left out, by their folders.
+    corners : sequence of dict
+        All errors.
+    """
+
+    sessions: Mapping[str, SessionRecord]
+    left_out: Mapping[str, str]
+    corners: Sequence[CornerRow]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupErrors:
+    """The errors of some of the trials.
+
+    Attributes
+    ----------
+    calibrations, trials, corners : int
+    px, arcmin : Summary
+    unit : {"wearer", "calibration"}
+    interval_arcmin : MeanInterval or None
+        Of the mean over units; None if there are less than two.
+    """
+
+    calibrations: int
+    trials: int
+    corners: int
+    px: Summary
+    arcmin: Summary
+    unit: Unit
+    interval_arcmin: MeanInterval | None
+
+
+@dataclass(frozen=True, slots=True)
+class UserTestResult:
+    """What a user test came to; JSON-able with `dataclasses.asdict`.
+
+    Attributes
+    ----------
+    total : GroupErrors
+    by_wearer, by_eye, by_depth_m : mapping of str to GroupErrors
+    components_arcmin : VarianceComponents or None
+        How far wearers differ, and the errors of one; None for a single wearer.
+    left_out : mapping of str to str
+    """
+
+    total: GroupErrors
+    by_wearer: Mapping[str, GroupErrors]
+    by_eye: Mapping[str, GroupErrors]
+    by_depth_m: Mapping[str, GroupErrors]
+    components_arcmin: VarianceComponents | None
+    left_out: Mapping[str, str]
+
+
+def read_user_test(
+    folders: Iterable[Path], checkpoint: Callable[[float], None] = lambda _share: None
+) -> UserTest:
+    """Read the trials of sessions; those that are damaged or hold none are left out and named.
+
+    Parameters
+    ----------
+    folders : iterable of Path
+        Sessions, and folders of sessions.
+    checkpoint : callable
+        Told the share done before each session; what it raises ends the reading.
+
+    Raises
+    ------
+    FileError
+        If no session holds a trial.
+    """
+    paths = list(dict.fromkeys(path for folder in folders for path in _sessions(folder)))
+    kept: dict[Path, SessionRecord] = {}
+    left_out: dict[str, str] = {}
+    for done, path in enumerate(paths):
+        checkpoint(done / len(paths))
+        try:
+            record = Session.open(path)
+        except FileError as error:
+            left_out[str(path)] = str(error)
+            continue
+        if why := _unfit(record, kept):
+            left_out[str(path)] = why
+        else:
+            kept[path] = record
+    if not kept:
+        reasons = "; ".join(f"{path}: {why}" for path, why in list(left_out.items())[:3])
+        raise FileError(
+            f"there is no trial of the user test to evaluate ({reasons or 'no folder'})"
+        )
+    names = Counter(path.name for path in kept)
+    sessions = {
+        path.name if names[path.name] == 1 else str(path): record for path, record in kept.items()
+    }
+    rows = [row for name, record in sessions.items() for row in _corners(name, record)]
+    return UserTest(sessions, left_out, rows)
+
+
+def evaluate_user_test(test: UserTest) -> UserTestResult:
+    """Return the errors of all trials, and of each wearer, eye and distance.
+
+    Intervals take wearers for independent; those of a single wearer, calibrations.
+    """
+    wearers = [row["wearer"] for row in test.corners]
+    unit: Unit = "wearer" if len(set(wearers)) > 1 else "calibration"
+    errors_arcmin = [row["error_arcmin"] for row in test.corners]
+    return UserTestResult(
+        total=_errors(test.corners, unit),
+        by_wearer=_by(test.corners, "wearer", "calibration"),
+        by_eye=_by(test.corners, "eye", unit),
+        by_depth_m=_by(test.corners, "target_depth_m", unit),
+        components_arcmin=(
+            variance_components(errors_arcmin, wearers) if unit == "wearer" else None
+        ),
+        left_out=test.left_out,
+    )
+
+
+def _sessions(folder: Path) -> Iterator[Path]:
+    """Yield the sessions in a folder, or the folder itself if it is one, or holds none."""
+    inside = sorted(journal.parent for journal in folder.glob("*/journal.jsonl"))
+    if (folder / "journal.jsonl").exists() or not inside:
+        inside = [folder]
+    yield from (path.absolute() for path in inside)
+
+
+def _unfit(record: SessionRecord, kept: Mapping[Path, SessionRecord]) -> str:
+    """Return why a session is left out; empty if it is not."""
+    if not record.trials:
+        return "holds no trial of the user test"
+    for path, other in kept.items():
+        if other.events[0] == record.events[0]:
+            return f"is a copy of {path}"
+    return ""
+
+
+def _corners(name: str, record: SessionRecord) -> Iterator[CornerRow]:
+    """Yield the rows of a session; a wearer without name is one of their own."""
+    calibrations = dict(zip(record.trial_numbers, calibration_numbers(record.trials), strict=True))
+    whose = {"wearer": record.wearer or f"not named, {name}", "session": name}
+    for row in trial_rows(record.trial_numbers, record.trials):
+        yield {**whose, "calibration": calibrations[row["trial"]], **row}
+
+
+def _by(rows: Sequence[CornerRow], column: str, unit: Unit) -> dict[str, GroupErrors]:
+    return {
+        str(value): _errors([row for row in rows if row[column] == value], unit)
+        for value in sorted({row[column] for row in rows})
+    }
+
+
+def _errors(rows: Sequence[CornerRow], unit: Unit) -> GroupErrors:
+    calibrations = [(row["session"], row["calibration"]) for row in rows]
+    units = [row["wearer"] for row in rows] if unit == "wearer" else calibrations
+    arcmin = [row["error_arcmin"] for row in rows]
+    return GroupErrors(
+        calibrations=len(set(calibrations)),
+        trials=len({(row["session"], row["trial"]) for row in rows}),
+        corners=len(rows),
+        px=summarise([row["error_px"] for row in rows]),
+        arcmin=summarise(arcmin),
+        unit=unit,
+        interval_arcmin=mean_interval(arcmin, units) if len(set(units)) > 1 else None,
+    )
