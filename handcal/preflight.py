@@ -80,26 +80,27 @@ def _camera(settings: StationSettings) -> Finding:
         case "realsense":
             return examine_camera(choose_device(connected_devices(), settings.realsense.serial))
         case "recording":
-            return _recording(settings.recording)
+            return _recording(settings.recording, settings.playback.loop)
         case "simulator":
             return _good("simulated; no hardware is needed")
 
 
-def _recording(name: str) -> Finding:
+def _recording(name: str, is_looped: bool) -> Finding:
     kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, or a folder that handcal recorded"
     if not name:
         return _broken("no recording is chosen", f"choose {kinds}")
     path = Path(name)
+    how = "played over and over" if is_looped else "played once"
     if path.is_dir():
         with FolderCamera(path) as camera:
-            return _good(f"{camera.name}, played over and over")
+            return _good(f"{camera.name}, {how}")
     if not path.is_file():
         return _broken(f"there is no recording {path}", f"choose {kinds}")
     if path.suffix not in RECORDING_SUFFIXES:
         return _broken(f"{path.name} is no recording", f"choose {kinds}")
     librealsense()
     check_recording(path)
-    return _good(f"{path.stat().st_size / 2**20:,.1f} MiB, played over and over")
+    return _good(f"{path.stat().st_size / 2**20:,.1f} MiB, {how}")
 
 
 def _headset(settings: StationSettings, pairing_key: str) -> Finding:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -53,7 +54,7 @@ def take(arguments: argparse.Namespace) -> None:
     """Take images of a board, or of a display's grid, from a camera, a recording or a video."""
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.view_source import open_view_source
-    from handcal.rig.choose import ChooseSettings
+    from handcal.rig.choose import ALIKE, ChooseSettings
     from handcal.rig_take import TakeSettings, keep_imager, take_views
 
     sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
@@ -61,11 +62,11 @@ def take(arguments: argparse.Namespace) -> None:
         fail("one camera cannot be both of a pair", 2)
     folder = arguments.output.absolute()
     folders = [folder / "depth", folder / "headset"] if arguments.headset else [folder]
-    choose = ChooseSettings(most=arguments.most or 25)
-    board = board_of(arguments)
     if arguments.grid:
-        choose = ChooseSettings(most=arguments.most or 5, apart_share=0.0)
-        board = grid_of(arguments, *arguments.grid).board
+        choose, board = ALIKE, grid_of(arguments, *arguments.grid).board
+    else:
+        choose, board = ChooseSettings(), board_of(arguments)
+    choose = replace(choose, most=arguments.most or choose.most)
     realsense = realsense_of(arguments)
     with ExitStack() as stack:
         cameras = [

@@ -15,7 +15,6 @@ import numpy as np
 from handcal.calibrate import Calibration, PlacedHand, ProcedureError, State
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.camera.playback import PlaybackSettings
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
 from handcal.camera.synthetic import SyntheticCamera
@@ -213,7 +212,7 @@ class Station(Closable):
         if settings.source == "realsense":
             return RealSenseCamera(settings.realsense)
         if settings.source == "recording":
-            return open_recording(Path(settings.recording), PlaybackSettings(real_time=True))
+            return open_recording(Path(settings.recording), settings.playback)
         if self._simulation is None:
             raise CameraError("the simulated camera needs the virtual headset, with its wearer")
         return SyntheticCamera(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from handcal.calibrate import CalibrationSettings
+from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.resources import resource_path
 
@@ -23,7 +24,9 @@ class StationSettings:
     ----------
     source : {"simulator", "recording", "realsense"}
     recording : str
-        Path of the recording that `source` plays, over and over: a file or a folder.
+        Path of the recording that `source` plays: a file or a folder.
+    playback : PlaybackSettings
+        How: at its own pace and over and over, unless told otherwise.
     realsense : RealSenseSettings
     headset : {"virtual", "network"}
         The virtual headset is a process of its own on this machine; it brings the simulated wearer.
@@ -44,6 +47,9 @@ class StationSettings:
 
     source: Source = "simulator"
     recording: str = ""
+    playback: PlaybackSettings = field(
+        default_factory=lambda: PlaybackSettings(real_time=True, loop=True)
+    )
     realsense: RealSenseSettings = field(default_factory=RealSenseSettings)
     headset: HeadsetKind = "virtual"
     host: str = "0.0.0.0"  # noqa: S104 (a headset is another device; the datagrams are signed)

@@ -162,10 +162,11 @@ class Program(QObject):
     def calibrate_rig(self) -> RigWizard | None:
         """Lead through the offline calibration; None if what is entered could not be kept."""
         try:
-            wizard = RigWizard(WorkFolder(self._file.path.parent / "rig"), self.window)
+            folder = WorkFolder(self._file.path.parent / "rig")
         except FileError as error:
             self.window.banner.show_message(str(error))
             return None
+        wizard = RigWizard(folder, self.window, self.start.new.settings.realsense)
         wizard.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         wizard.rig_saved.connect(self._use_rig)
         wizard.open()

@@ -16,6 +16,7 @@ import pytest
 
 from handcal import preflight
 from handcal.camera.folder import record_folder
+from handcal.camera.playback import PlaybackSettings
 from handcal.camera.sdk_devices import Device
 from handcal.camera.settings import RealSenseSettings
 from handcal.doctor import Finding, Health
@@ -132,6 +133,8 @@ def test_a_recorded_folder_needs_no_sdk(
     finding = find("camera", replace(played, recording=str(tmp_path / "hand")))
     assert finding.found == "Recording hand, played over and over"
     assert finding.health is Health.GOOD
+    once = replace(played, recording=str(tmp_path / "hand"), playback=PlaybackSettings())
+    assert find("camera", once).found == "Recording hand, played once"
 
 
 def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: Path) -> None:

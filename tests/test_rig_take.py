@@ -14,11 +14,19 @@ from handcal.camera.viewpoint import open_viewpoint
 from handcal.closable import Closable
 from handcal.errors import CameraTimeoutError
 from handcal.geometry import interpolate_pose, rigid
+from handcal.image_file import read_image
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal.rig.formats import read_intrinsics, read_pose
 from handcal.rig.views import image_files, pair_views, read_views
-from handcal.rig_take import DEPTH_TO_COLOR, IMAGER, TakeSettings, keep_imager, take_views
+from handcal.rig_take import (
+    DEPTH_TO_COLOR,
+    IMAGER,
+    TakeSettings,
+    keep_imager,
+    keep_images,
+    take_views,
+)
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.types import Float64, Frame, Intrinsics, UInt8
 
@@ -83,6 +91,16 @@ def test_time_is_up(videos: tuple[Path, Path], tmp_path: Path) -> None:
         settings = TakeSettings(seconds=0.35)
         taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
     assert (taken.kept, taken.looked_at) == (1, 4)
+
+
+def test_images_of_a_moment_get_one_number(tmp_path: Path) -> None:
+    folders = tmp_path / "depth", tmp_path / "headset"
+    red = np.zeros((64, 64, 3), np.uint8)
+    red[..., 0] = 200
+    keep_images([red], folders[:1])
+    assert keep_images([red, red], folders) == ("depth-002.png", "headset-002.png")
+    stored = read_image(folders[1] / "headset-002.png", cv2.IMREAD_COLOR_RGB)
+    np.testing.assert_array_equal(stored, red)
 
 
 class LateCamera(Closable):

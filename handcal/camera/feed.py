@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -56,7 +57,7 @@ class FeedSettings:
 
 
 class CameraFeed(Closable):
-    """Reads a camera, opening it again when it fails and when a recording ends.
+    """Reads a camera, opening it again when it fails, until a recording ends.
 
     Parameters
     ----------
@@ -100,10 +101,8 @@ class CameraFeed(Closable):
                 self._problem = str(error)
             return None
         except CameraEndError as error:
-            if self._last_index is None:
-                self._problem = f"{error} without a frame"
-            else:
-                self._next_open_s = 0.0  # a recording begins again
+            self._problem = f"{error} without a frame" if self._last_index is None else str(error)
+            self._next_open_s = math.inf
             self.close()
             return None
         except CameraError as error:
@@ -114,7 +113,7 @@ class CameraFeed(Closable):
         return frame
 
     def close(self) -> None:
-        """Close the camera; reading opens it again."""
+        """Close the camera; reading opens it again, unless it has ended."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None

@@ -33,6 +33,10 @@ class ChooseSettings:
     most_blur_px: float = 4.0
 
 
+ALIKE = ChooseSettings(most=5, apart_share=0.0)
+"""A few views by a camera that stands still, as of a display's grid."""
+
+
 class ViewChooser:
     """Looks at one moment after the other, seen by one camera or by the two of a pair."""
 

@@ -12,6 +12,7 @@ from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
 from handcal.image_file import write_png
 from handcal.rig.assemble import screen_of
+from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid
 from handcal.types import Eye
 from handcal_gui.rig.draft import Draft
@@ -185,6 +186,7 @@ class DisplayPage(StepPage):
             grid.board,
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
+            ALIKE,
         )
 
     def _take_board(self) -> None:

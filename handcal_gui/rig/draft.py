@@ -8,6 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError, HandcalError
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
@@ -23,10 +24,13 @@ class Draft(QObject):
     Parameters
     ----------
     folder : WorkFolder
+    realsense : RealSenseSettings
 
     Attributes
     ----------
     folder : WorkFolder
+    realsense : RealSenseSettings
+        How one is run that images are taken with.
     work : RigWork
     rig : Rig
         As far as it is calibrated.
@@ -41,9 +45,12 @@ class Draft(QObject):
     rig_changed = Signal()
     failed = Signal(str)
 
-    def __init__(self, folder: WorkFolder, parent: QObject | None = None) -> None:
+    def __init__(
+        self, folder: WorkFolder, realsense: RealSenseSettings, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
         self.folder = folder
+        self.realsense = realsense
         self.work, of_entries = folder.load()
         self.rig, of_rig = folder.load_rig()
         self.complaint = " ".join(filter(None, (of_entries, of_rig)))

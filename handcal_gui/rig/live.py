@@ -6,60 +6,18 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from handcal.camera.realsense import RealSenseCamera
-from handcal.camera.viewpoint import ViewpointCamera, open_viewpoint
+from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraTimeoutError, HandcalError
-from handcal.rig.formats import write_intrinsics, write_pose
 from handcal.types import UInt8
 from handcal_gui.running.worker import Worker
 
 _LOG = logging.getLogger(__name__)
 
-REALSENSE = "realsense"
-IMAGER, DEPTH_TO_COLOR = "depth-imager.json", "depth-to-color.json"
-"""What a RealSense tells of itself, as files beside the folders of images."""
-
 Images = tuple[UInt8, ...]
 OpenCamera = Callable[[], ViewpointCamera]
-
-
-class ColorOfRealSense(ViewpointCamera):
-    """The colour images of a RealSense, which tells where its depth imager is.
-
-    Parameters
-    ----------
-    folder : Path
-        Where it tells that.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._folder: Path | None = folder
-        self._camera = RealSenseCamera()
-        self.name = self._camera.name
-
-    def read(self) -> tuple[UInt8, int]:
-        """Return the next colour image, and when it was taken; see `ViewpointCamera.read`."""
-        frame = self._camera.read()
-        while frame.color is None:
-            frame = self._camera.read()
-        if self._folder is not None:
-            write_intrinsics(self._folder / IMAGER, frame.depth_intrinsics, "json")
-            write_pose(self._folder / DEPTH_TO_COLOR, frame.T_C_D, "json")
-            self._folder = None
-        return frame.color, frame.t_host_ns
-
-    def close(self) -> None:
-        """Stop the device."""
-        self._camera.close()
-
-
-def open_camera(source: str, folder: Path) -> ViewpointCamera:
-    """Open a RealSense's colour camera, or a camera by its number; CameraError if it fails."""
-    return ColorOfRealSense(folder) if source == REALSENSE else open_viewpoint(int(source))
 
 
 class LiveImages(Worker):

@@ -10,10 +10,9 @@ import cv2
 import numpy as np
 
 from handcal.errors import CancelledError, FileError
-from handcal.files import make_folder, write_atomic
 from handcal.image_file import read_image
 from handcal.rig.board import Board
-from handcal.rig.views import View, image_files, pair_views, read_views, view
+from handcal.rig.views import View, image_files, pair_views, read_views
 from handcal.types import UInt8
 from handcal_gui.running.jobs import IsCancelled, Report
 
@@ -101,25 +100,3 @@ def _small(path: Path) -> UInt8 | None:
     scale = _SMALL_PX / max(image.shape[:2])
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return np.ascontiguousarray(small[..., ::-1], np.uint8)
-
-
-def keep_images(images: Sequence[UInt8], folders: Sequence[Path], board: Board) -> tuple[View, ...]:
-    """Write RGB images into a folder each, under the next number, and look for the board in them.
-
-    Raises
-    ------
-    FileError
-        If one cannot be written.
-    """
-    number = 1 + max(_last_number(make_folder(folder)) for folder in folders)
-    views = []
-    for image, folder in zip(images, folders, strict=True):
-        name = f"{folder.name}-{number:03}.png"
-        write_atomic(folder / name, cv2.imencode(".png", image[..., ::-1])[1].tobytes())
-        views.append(view(name, image, board))
-    return tuple(views)
-
-
-def _last_number(folder: Path) -> int:
-    names = (path.stem.rpartition("-")[2] for path in folder.glob(f"{folder.name}-*.png"))
-    return max((int(name) for name in names if name.isdecimal()), default=0)

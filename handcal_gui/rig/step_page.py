@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
 from handcal.rig.board import Board
+from handcal.rig.choose import ChooseSettings
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.form import EntriesForm
 from handcal_gui.rig.images_panel import ImagesPanel
@@ -88,6 +89,7 @@ class StepPage(QWidget):
         board: Board,
         panel: ImagesPanel,
         then: Callable[[], object],
+        choose: ChooseSettings | None = None,
     ) -> None:
         """Take images with cameras, into a folder each, and then look for the board in them."""
 
@@ -96,7 +98,7 @@ class StepPage(QWidget):
             then()
             self.enter()
 
-        dialog = TakeDialog(folders, board, self)
+        dialog = TakeDialog(folders, board, choose or ChooseSettings(), self.draft.realsense, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
         dialog.open()

@@ -7,10 +7,10 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
+from handcal.rig_take import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.form import INTRINSICS_FILES, EntriesForm, intrinsics_field, lens_field
 from handcal_gui.rig.images_panel import ImagesPanel
-from handcal_gui.rig.live import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.rig.solve import Solved, solve_stereo
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.widgets.path_field import PathField
@@ -87,7 +87,8 @@ class StereoPage(StepPage):
 
         def then() -> None:
             self.form.enter(**{f"{path.name}_images": str(path) for path in folders.values()})
-            told = {"imager_intrinsics": path / IMAGER, "depth_to_color": path / DEPTH_TO_COLOR}
+            files = {"imager_intrinsics": IMAGER, "depth_to_color": DEPTH_TO_COLOR}
+            told = {name: path / "depth" / file for name, file in files.items()}
             self.form.enter(**{name: str(file) for name, file in told.items() if file.exists()})
 
         self.take_images(folders, self.draft.work.board, self.panel, then)

@@ -1,4 +1,4 @@
-"""Taking images with cameras of this computer."""
+"""Taking images with cameras of this computer, or out of recordings and videos."""
 
 from __future__ import annotations
 
@@ -7,24 +7,38 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QDialog, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
 
-from handcal.camera.viewpoint import ViewpointCamera
+from handcal.camera.playback import PlaybackSettings
+from handcal.camera.settings import RealSenseSettings
+from handcal.camera.view_source import REALSENSE, open_view_source
+from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.doctor import Finding, Health
 from handcal.rig.board import Board
-from handcal.rig.views import View
+from handcal.rig.choose import ChooseSettings, ViewChooser
+from handcal.rig.views import View, view
+from handcal.rig_take import keep_imager, keep_images, see_board
 from handcal_gui.rig.job_bar import JobBar
-from handcal_gui.rig.live import REALSENSE, Images, LiveImages, open_camera
-from handcal_gui.rig.shots import keep_images
+from handcal_gui.rig.live import Images, LiveImages
 from handcal_gui.running.jobs import IsCancelled, Report
+from handcal_gui.start.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, choice, main_button
+from handcal_gui.widgets.fields import button, choice, main_button, named
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.path_field import PathField
 
-_SOURCES = {str(number): f"Camera {number}" for number in range(10)} | {
-    REALSENSE: "RealSense, colour"
-}
+_RECORDED = "recorded"
+_SOURCES = {REALSENSE: "RealSense, colour", _RECORDED: "Recording or video"}
+_PLAYBACK = PlaybackSettings(real_time=True, loop=True)
 _POLL_MS = 50
 
 
@@ -37,8 +51,13 @@ class TakeDialog(QDialog):
         What each camera is, and where its images go; those that are there stay.
     board : Board
         Looked for in each image taken.
-    open_camera : callable
-        Given a source and the folder above the images', opens a camera.
+    choose : ChooseSettings
+        What is taken where images are taken by themselves.
+    realsense : RealSenseSettings
+    open_source : callable
+        As `open_view_source`.
+    list_cameras : callable
+        As `list_viewpoints`.
 
     Attributes
     ----------
@@ -50,17 +69,26 @@ class TakeDialog(QDialog):
         self,
         folders: Mapping[str, Path],
         board: Board,
+        choose: ChooseSettings,
+        realsense: RealSenseSettings,
         parent: QWidget | None = None,
-        open_camera: Callable[[str, Path], ViewpointCamera] = open_camera,
+        open_source: Callable[..., ViewpointCamera] = open_view_source,
+        list_cameras: Callable[[], list[int]] = list_viewpoints,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("takeDialog")
         self.setWindowTitle("Take images")
-        self._folders, self._board = dict(folders), board
-        self._open_camera = open_camera
+        self._folders, self._board, self._choose = dict(folders), board, choose
+        self._realsense, self._open_source = realsense, open_source
         self._live: LiveImages | None = None
+        self._chooser = ViewChooser(choose)
+        self._kept = 0
+        self._is_looking = False
         self.shown_images: Images | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in folders}
+        self._recorded = {
+            title: PathField(f"Recording or video, {title.lower()}", "either") for title in folders
+        }
         self._views = {title: ImageView(title) for title in folders}
         self._found = FindingLine("taken")
         self._bar = JobBar()
@@ -68,37 +96,54 @@ class TakeDialog(QDialog):
         self._take = main_button("takeImage", "Take")
         self._take.setShortcut(Qt.Key.Key_Space)
         self._take.setToolTip("Space bar")
+        self._by_itself = named(
+            QCheckBox("By itself"),
+            "byItself",
+            help_text="Take an image whenever the board is at rest, sharp, and elsewhere than in "
+            "the images taken before.",
+        )
         self._close = button("close", "Close")
         self._timer = QTimer(self, interval=_POLL_MS)
         self._timer.timeout.connect(self._poll)
+        self._looker = LatestJob(self._take_if_new, self)
+        self._looker.answered.connect(self._show_looked)
+        self._looker.failed.connect(self._show_failure)
         self._start.clicked.connect(self.start)
         self._take.clicked.connect(self.take)
+        self._by_itself.toggled.connect(self._begin_anew)
         self._close.clicked.connect(self.accept)
         self._bar.busy_changed.connect(self._refresh)
         self._bar.failed.connect(self._show_failure)
-        for number, source in enumerate(self._sources.values()):
-            source.setCurrentIndex(number)
+        for source in self._sources.values():
+            source.currentIndexChanged.connect(self._refresh)
         self._lay_out()
         self._refresh()
         self._found.show_finding(Finding("", Health.LIMITED, "choose the cameras, and show them"))
+        self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._offer_cameras)
 
     def start(self) -> None:
         """Show what the chosen cameras see."""
         self._stop_cameras()
-        sources = [source.currentData() for source in self._sources.values()]
+        sources = [self._source(title) for title in self._folders]
+        if "" in sources:
+            self._show_failure("choose the recording or video")
+            return
         if len(set(sources)) < len(sources):
             self._show_failure("one camera cannot be both: choose another")
             return
         opens = [
-            partial(self._open_camera, source, folder.parent)
+            partial(
+                self._open_source,
+                *(source, self._realsense, _PLAYBACK, partial(keep_imager, folder)),
+            )
             for source, folder in zip(sources, self._folders.values(), strict=True)
         ]
         self._live = LiveImages(opens)
         self._live.failed.connect(self._show_failure)
         self._live.start()
         self._timer.start()
-        for view in self._views.values():
-            view.show_text(message="Opening the camera…")
+        for shown in self._views.values():
+            shown.show_text(message="Opening the camera…")
 
     def take(self) -> None:
         """Keep the images shown, and look for the board in them."""
@@ -107,7 +152,8 @@ class TakeDialog(QDialog):
             return
 
         def work(_report: Report, _is_cancelled: IsCancelled) -> object:
-            return keep_images(images, tuple(self._folders.values()), self._board)
+            names = keep_images(images, tuple(self._folders.values()))
+            return [view(name, one, self._board) for name, one in zip(names, images, strict=True)]
 
         self._bar.run("Looking for the board", work, self._show_taken)
 
@@ -117,18 +163,61 @@ class TakeDialog(QDialog):
         self._bar.stop()
         super().done(result)
 
+    def _source(self, title: str) -> str:
+        """Return what a camera is called by `open_view_source`; empty for no recording."""
+        chosen = str(self._sources[title].currentData())
+        return self._recorded[title].path if chosen == _RECORDED else chosen
+
+    def _offer_cameras(self, numbers: list[int]) -> None:
+        for place, source in enumerate(self._sources.values()):
+            for number in reversed(numbers):
+                source.insertItem(0, f"Camera {number}", str(number))
+            if self._live is None:
+                source.setCurrentIndex(place)
+
+    def _begin_anew(self) -> None:
+        self._stop_looking()
+        self._chooser, self._kept = ViewChooser(self._choose), 0
+
+    def _stop_looking(self) -> None:
+        self._looker.stop()
+        self._is_looking = False
+
+    def _take_if_new(self, images: Images) -> str:
+        """Keep images if they are worth it; return why not, in the job's thread."""
+        why_not = self._chooser.look(see_board(images, self._board))
+        if not why_not:
+            keep_images(images, tuple(self._folders.values()))
+        return why_not
+
+    def _show_looked(self, _images: Images, why_not: str) -> None:
+        self._is_looking = False
+        self._kept += not why_not
+        if self._chooser.is_done:
+            self._by_itself.setChecked(False)
+            finding = Finding("", Health.GOOD, f"{self._choose.most} taken: that is enough")
+        elif why_not:
+            finding = Finding("", Health.LIMITED, f"{self._kept} taken; {why_not}")
+        else:
+            finding = Finding("", Health.GOOD, f"{self._kept} taken")
+        self._found.show_finding(finding)
+
     def _poll(self) -> None:
         newest = self._live.newest if self._live is not None else None
         if newest is None or newest is self.shown_images:
             return
         self.shown_images = newest
-        for view, image in zip(self._views.values(), newest, strict=True):
-            view.show_text()
-            view.show_image(image)
+        for shown, image in zip(self._views.values(), newest, strict=True):
+            shown.show_text()
+            shown.show_image(image)
+        if self._by_itself.isChecked() and not self._is_looking:
+            self._is_looking = True
+            self._looker.ask(newest)
         self._refresh()
 
     def _stop_cameras(self) -> None:
         self._timer.stop()
+        self._stop_looking()
         if self._live is not None:
             self._live.stop()
             self._live = None
@@ -137,11 +226,11 @@ class TakeDialog(QDialog):
 
     def _show_failure(self, why: str) -> None:
         self._stop_cameras()
-        for view in self._views.values():
-            view.show_text(message="No picture")
+        for shown in self._views.values():
+            shown.show_text(message="No picture")
         self._found.show_finding(Finding("", Health.BROKEN, why))
 
-    def _show_taken(self, views: tuple[View, ...]) -> None:
+    def _show_taken(self, views: list[View]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
         if problem:
             found = Finding("", Health.LIMITED, problem, "take another")
@@ -152,22 +241,26 @@ class TakeDialog(QDialog):
 
     def _refresh(self) -> None:
         self._take.setEnabled(self.shown_images is not None and not self._bar.is_busy)
+        for title, field in self._recorded.items():
+            field.setEnabled(self._sources[title].currentData() == _RECORDED)
 
     def _lay_out(self) -> None:
         grid = QGridLayout()
         grid.setSpacing(SPACING_PX)
         for column, (title, source) in enumerate(self._sources.items()):
             row = QHBoxLayout()
+            row.setSpacing(SPACING_PX)
             row.addWidget(QLabel(title))
-            row.addWidget(source, 1)
+            row.addWidget(source)
+            row.addWidget(self._recorded[title], 1)
             grid.addLayout(row, 0, column)
             grid.addWidget(self._views[title], 1, column)
-            self._views[title].setMinimumSize(48 * SPACING_PX, 30 * SPACING_PX)
+            self._views[title].setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
         grid.setRowStretch(1, 1)
         foot = QHBoxLayout()
         foot.setSpacing(SPACING_PX)
-        foot.addWidget(self._start)
-        foot.addWidget(self._take)
+        for widget in (self._start, self._take, self._by_itself):
+            foot.addWidget(widget)
         foot.addWidget(self._bar, 1)
         foot.addWidget(self._close)
         layout = QVBoxLayout(self)

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.camera.settings import RealSenseSettings
 from handcal.types import RIG_PARTS, RigPart
 from handcal_gui.rig.board_page import BoardPage
 from handcal_gui.rig.display_page import DisplayPage
@@ -60,6 +61,8 @@ class RigWizard(QDialog):
     ----------
     folder : WorkFolder
         A later wizard goes on from there.
+    realsense : RealSenseSettings, optional
+        How one is run that images are taken with.
 
     Attributes
     ----------
@@ -70,11 +73,16 @@ class RigWizard(QDialog):
 
     rig_saved = Signal(object)
 
-    def __init__(self, folder: WorkFolder, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        folder: WorkFolder,
+        parent: QWidget | None = None,
+        realsense: RealSenseSettings | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
         self.setWindowTitle("Calibrate a rig")
-        self.draft = Draft(folder, self)
+        self.draft = Draft(folder, realsense or RealSenseSettings(), self)
         self._banner = Banner()
         self._rail = named(QListWidget(), "rigRail", "Steps")
         self._title, self._purpose = QLabel(), QLabel()

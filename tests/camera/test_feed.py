@@ -113,14 +113,14 @@ def test_only_a_camera_silent_for_a_while_has_a_problem() -> None:
         assert feed.status.problem == ""
 
 
-def test_a_recording_begins_again() -> None:
-    open_camera, opened = opener([1, CameraEndError("the recording has ended")], [1])
+def test_a_recording_that_has_ended_is_named_and_stays_so() -> None:
+    open_camera, opened = opener([0, CameraEndError("the recording has ended")], [1])
     with CameraFeed(open_camera, SETTINGS) as feed:
         assert feed.read() is not None
-        assert feed.read() is None
-        assert feed.status.problem == ""
-        assert read_frame(feed).index == 1
-    assert len(opened) == 2
+        for _ in range(8):
+            assert feed.read() is None
+            assert feed.status.problem == "the recording has ended"
+    assert len(opened) == 1
 
 
 def test_a_recording_without_a_frame_is_named_and_not_opened_all_the_time() -> None:

@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QMessageBox, QPushButton, QSpinBox
 from pytestqt.qtbot import QtBot
 
+from handcal.camera.settings import RealSenseSettings
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
@@ -23,7 +24,7 @@ ORIGIN = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
 
 @pytest.fixture
 def draft(tmp_path: Path) -> Draft:
-    return Draft(WorkFolder(tmp_path / "work"))
+    return Draft(WorkFolder(tmp_path / "work"), RealSenseSettings())
 
 
 @pytest.fixture

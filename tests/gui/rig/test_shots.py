@@ -6,7 +6,8 @@ import pytest
 
 from handcal.errors import CancelledError, FileError
 from handcal.rig.views import ViewsError
-from handcal_gui.rig.shots import keep_images, look, read_color, without
+from handcal.rig_take import keep_images
+from handcal_gui.rig.shots import look, without
 
 
 def silent(_what: str, _share: float) -> None:
@@ -43,11 +44,7 @@ def test_looking_can_be_given_up(photographs: Any) -> None:
 
 
 def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path: Path) -> None:
-    keep_images(
-        [np.zeros((100, 100, 3), np.uint8)] * 2,
-        [tmp_path / "a", tmp_path / "b"],
-        photographs.work.board,
-    )
+    keep_images([np.zeros((100, 100, 3), np.uint8)] * 2, [tmp_path / "a", tmp_path / "b"])
     (tmp_path / "b" / "b-001.png").rename(tmp_path / "b" / "b-7.png")
     with pytest.raises(ViewsError, match="belong together"):
         look([tmp_path / "a", tmp_path / "b"], photographs.work.board, silent, go_on)
@@ -56,13 +53,3 @@ def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path:
 def test_an_empty_folder_is_told(photographs: Any, tmp_path: Path) -> None:
     with pytest.raises(FileError, match="no PNG"):
         look([tmp_path], photographs.work.board, silent, go_on)
-
-
-def test_images_are_kept_under_the_next_number(photographs: Any, tmp_path: Path) -> None:
-    folders = tmp_path / "depth", tmp_path / "headset"
-    images = photographs.image("depth"), photographs.image("headset")
-    keep_images(images[:1], folders[:1], photographs.work.board)
-    views = keep_images(images, folders, photographs.work.board)
-    assert [view.name for view in views] == ["depth-002.png", "headset-002.png"]
-    assert all(view.found for view in views)
-    np.testing.assert_array_equal(read_color(folders[1] / "headset-002.png"), images[1])

@@ -10,15 +10,20 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
+from handcal.camera.playback import PlaybackSettings
+from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError, CameraTimeoutError
+from handcal.rig.choose import ChooseSettings
 from handcal.types import UInt8
-from handcal_gui.rig.live import open_camera
 from handcal_gui.rig.shots import read_color
 from handcal_gui.rig.take_dialog import TakeDialog
+from handcal_gui.widgets.path_field import PathField
+
+REALSENSE_SETTINGS = RealSenseSettings(serial="42")
 
 
 class StillCamera(ViewpointCamera):
@@ -50,14 +55,23 @@ def cameras(photographs: Any) -> dict[str, StillCamera]:
 def dialog(
     qtbot: QtBot, photographs: Any, cameras: dict[str, StillCamera], tmp_path: Path
 ) -> Iterator[TakeDialog]:
-    def open_still(source: str, folder: Path) -> ViewpointCamera:
-        assert folder == tmp_path
+    def open_still(source: str, *how: object) -> ViewpointCamera:
+        assert how[:2] == (REALSENSE_SETTINGS, PlaybackSettings(real_time=True, loop=True))
         return cameras[source]
 
     folders = {"Depth camera": tmp_path / "depth", "Headset camera": tmp_path / "headset"}
-    dialog = TakeDialog(folders, photographs.work.board, open_camera=open_still)
+    dialog = TakeDialog(
+        folders,
+        photographs.work.board,
+        ChooseSettings(most=2, apart_share=0.0),
+        REALSENSE_SETTINGS,
+        open_source=open_still,
+        list_cameras=lambda: [0, 1],
+    )
     qtbot.addWidget(dialog)
     dialog.show()
+    sources = dialog.findChildren(QComboBox, "source")
+    qtbot.waitUntil(lambda: [one.currentText() for one in sources] == ["Camera 0", "Camera 1"])
     yield dialog
     dialog.reject()
 
@@ -117,11 +131,47 @@ def test_a_camera_that_fails_is_told_and_can_be_shown_again(
 
 def test_one_camera_cannot_be_both(dialog: TakeDialog) -> None:
     for source in dialog.findChildren(QComboBox, "source"):
-        source.setCurrentIndex(3)
+        source.setCurrentIndex(2)
     button(dialog, "startCameras").click()
     assert "cannot be both" in said(dialog)
 
 
-def test_a_camera_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(CameraError, match="camera 9"):
-        open_camera("9", tmp_path)
+def test_images_are_taken_by_themselves_until_they_are_enough(
+    qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
+) -> None:
+    by_itself = dialog.findChild(QCheckBox, "byItself")
+    assert isinstance(by_itself, QCheckBox)
+    start(qtbot, dialog)
+    by_itself.click()
+    qtbot.waitUntil(lambda: said(dialog) == "2 taken: that is enough.")
+    assert not by_itself.isChecked()
+    for folder in ("depth", "headset"):
+        names = [path.name for path in sorted((tmp_path / folder).iterdir())]
+        assert names == [f"{folder}-00{number}.png" for number in (1, 2)]
+
+
+def test_what_is_not_taken_by_itself_is_explained(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera], tmp_path: Path
+) -> None:
+    cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
+    start(qtbot, dialog)
+    by_itself = dialog.findChild(QCheckBox, "byItself")
+    assert isinstance(by_itself, QCheckBox)
+    by_itself.click()
+    qtbot.waitUntil(lambda: said(dialog) == "0 taken; the board is not seen.")
+    assert not (tmp_path / "depth").exists()
+
+
+def test_a_recording_is_shown_as_a_camera_is(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera], tmp_path: Path
+) -> None:
+    fields = dialog.findChildren(PathField)
+    assert not any(field.isEnabled() for field in fields)
+    source = dialog.findChildren(QComboBox, "source")[1]
+    source.setCurrentIndex(source.findText("Recording or video"))
+    assert [field.isEnabled() for field in fields] == [False, True]
+    button(dialog, "startCameras").click()
+    assert said(dialog) == "Choose the recording or video."
+    fields[1].set_path("film.mp4")
+    cameras["film.mp4"] = cameras["1"]
+    start(qtbot, dialog)

@@ -27,6 +27,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.doctor import Finding, Health
 from handcal.preflight import PARTS, Part
@@ -217,6 +218,9 @@ def test_every_choice_reaches_the_settings(
     choose(page, "source", "recording")
     for field in page.findChildren(PathField):
         field.set_path(f"/{field.name}")
+    for box in ("realTime", "loop"):
+        assert find(page, QCheckBox, box).isChecked()
+        find(page, QCheckBox, box).click()
     find(page, QLineEdit, "serial").setText(" 42 ")
     choose(page, "headset", "network")
     find(page, QLineEdit, "host").setText("192.168.1.2")
@@ -230,6 +234,7 @@ def test_every_choice_reaches_the_settings(
     assert settings == StationSettings(
         source="recording",
         recording="/Recording",
+        playback=PlaybackSettings(real_time=False, loop=False),
         realsense=RealSenseSettings(serial="42"),
         headset="network",
         host="192.168.1.2",
