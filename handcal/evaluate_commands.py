@@ -6,7 +6,10 @@ Commands import what they need when they run.
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
+
+from rich.markup import escape
 
 from handcal.files import make_folder
 from handcal.terminal import Commands, add_command, console, progress, save, table
@@ -43,10 +46,50 @@ def detector(arguments: argparse.Namespace) -> None:
     console.print(f"{result['hands']} hands in {result['images']} photographs")
 
 
+def users(arguments: argparse.Namespace) -> None:
+    """Evaluate the user test over sessions: how far calibrations miss what the wearers see."""
+    from handcal.evaluate.user_test import evaluate_user_test, read_user_test
+    from handcal.evaluate.user_test_report import user_test_report
+    from handcal.report.write import write_report
+
+    with progress() as report:
+        test = read_user_test(arguments.folder, lambda share: report("Reading sessions", share))
+        result = evaluate_user_test(test)
+        described = user_test_report(test, result)
+        written = write_report(
+            arguments.output, described, lambda share: report("Writing the report", share)
+        )
+    save(arguments.json, asdict(result))
+    shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")
+    for name, errors in (*result.by_wearer.items(), ("all", result.total)):
+        mean, interval = errors.arcmin, errors.interval_arcmin
+        shown_table.add_row(
+            escape(name),
+            str(errors.calibrations),
+            str(errors.trials),
+            f"{mean.mean:.2f} ± {mean.sd:.2f}",
+            f"{interval.low:.2f} to {interval.high:.2f}" if interval else "–",
+        )
+    console.print(shown_table)
+    for path, why in result.left_out.items():
+        console.print(f"Left out: {path}: {why}", markup=False)
+    console.print(described.lead)
+    for file in written:
+        console.print(str(file), markup=False)
+
+
 def add_evaluate_commands(commands: Commands) -> None:
-    """Add ``handcal evaluate detector``."""
+    """Add ``handcal evaluate …``."""
     one = add_command(commands, detector)
     one.add_argument("--images", type=Path, required=True, help="folder of photographs")
     one.add_argument("--annotations", type=Path, required=True, help="JSON: the hands in them")
     one.add_argument("--sheet", type=Path, metavar="FILE", help="picture of the worst failures")
     one.add_argument("--model", type=Path, metavar="FILE", help="ONNX; the shipped one if absent")
+
+    one = add_command(commands, users)
+    one.add_argument(
+        "folder", type=Path, nargs="+", help="a session's folder, or one that holds sessions"
+    )
+    one.add_argument(
+        "--output", type=Path, default=Path("results/users"), help="folder for the report"
+    )

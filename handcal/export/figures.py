@@ -24,8 +24,8 @@ from handcal.results import Results
 from handcal.trial import Trial
 from handcal.types import EYES, Alignment, Eye, EyeDisplay, EyeShift, Float64
 
-_COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
-_MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
+COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
+MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
 _LINES: Mapping[Eye, str] = {"left": "-", "right": "--"}
 _HAND, _CURSOR = "#0072B2", "#D55E00"
 # No scale ends below, lest rounding look like a finding.
@@ -50,7 +50,7 @@ def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Resu
                 ax.plot(steps, rms_mm, ".-", linewidth=0.8, markersize=3, label=f"{number}")
         ax.set_ylim(0.0, max(_LEAST_MM, ax.get_ylim()[1]))
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        _name(ax, f"{eye} eye", "iteration", "RMS pair distance, mm")
+        name_axes(ax, f"{eye} eye", "iteration", "RMS pair distance, mm")
         if 0 < len(ax.lines) <= 8:
             ax.legend(title="alignment", fontsize=6.5, title_fontsize=6.5, frameon=False)
 
@@ -75,8 +75,8 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
                 list(each),
                 [1e3 * shift.shift_m[component] for shift in each.values()],
                 [1e3 * _sigma_m(shift)[component] for shift in each.values()],
-                fmt=_MARKERS[eye],
-                color=_COLORS[eye],
+                fmt=MARKERS[eye],
+                color=COLORS[eye],
                 markersize=4,
                 linewidth=1.0,
                 capsize=2,
@@ -84,7 +84,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
             )
             if "fine_tuned" in outcome.shifts_m[eye]:
                 tuned_mm = 1e3 * outcome.shifts_m[eye]["fine_tuned"][component]
-                ax.plot(tuned + offset, tuned_mm, _MARKERS[eye], color=_COLORS[eye], mfc="none")
+                ax.plot(tuned + offset, tuned_mm, MARKERS[eye], color=COLORS[eye], mfc="none")
         ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
         ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
         numbers = outcome.record.alignment_numbers
@@ -94,7 +94,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
         names |= {fused: "fused", tuned: "tuned"} if is_tuned else {fused: "fused"}
         ax.set_xticks(list(names), list(names.values()))
         ax.set_xlim(0.5, max(names) + 0.5 * room)
-        _name(ax, f"φ{'₁₂₃'[component]}", "alignment", "mm")
+        name_axes(ax, f"φ{'₁₂₃'[component]}", "alignment", "mm")
     axes[0].legend(fontsize=6.5, frameon=False)
 
 
@@ -107,13 +107,13 @@ def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results
                 x_mm, y_mm, _ = 1e3 * shifts[eye].shift_m
                 ax.text(x_mm, y_mm, f"{number}", fontsize=6.5, color="0.3", ha="center")
         if eye in results.shifts:
-            _ellipse(ax, results.shifts[eye], _COLORS[eye], linewidth=1.6)
-            ax.plot(*(1e3 * results.shifts[eye].shift_m[:2]), "+", color=_COLORS[eye])
+            _ellipse(ax, results.shifts[eye], COLORS[eye], linewidth=1.6)
+            ax.plot(*(1e3 * results.shifts[eye].shift_m[:2]), "+", color=COLORS[eye])
         ax.plot(0.0, 0.0, "x", color="black", markersize=5)
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.08)
         ax.invert_yaxis()
-        _name(ax, f"{eye} eye", "φ₁, mm (to the right)", "φ₂, mm (down)")
+        name_axes(ax, f"{eye} eye", "φ₁, mm (to the right)", "φ₂, mm (down)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,18 +224,18 @@ def draw_trial_errors(axes: Sequence[Axes], trials: Sequence[Trial]) -> None:
                         np.concatenate(errors),
                         positions=[place + offset],
                         widths=0.28,
-                        boxprops={"color": _COLORS[eye], "linestyle": _LINES[eye]},
-                        medianprops={"color": _COLORS[eye], "linewidth": 1.6},
-                        whiskerprops={"color": _COLORS[eye]},
-                        capprops={"color": _COLORS[eye]},
-                        flierprops={"marker": _MARKERS[eye], "markersize": 2.5},
+                        boxprops={"color": COLORS[eye], "linestyle": _LINES[eye]},
+                        medianprops={"color": COLORS[eye], "linewidth": 1.6},
+                        whiskerprops={"color": COLORS[eye]},
+                        capprops={"color": COLORS[eye]},
+                        flierprops={"marker": MARKERS[eye], "markersize": 2.5},
                     )
         for eye in EYES:
-            ax.plot([], [], _LINES[eye], color=_COLORS[eye], label=f"{eye} eye")
+            ax.plot([], [], _LINES[eye], color=COLORS[eye], label=f"{eye} eye")
         ax.set_xticks(range(len(depths_m)), [f"{depth_m:g}" for depth_m in depths_m])
         ax.set_xlim(-0.6, len(depths_m) - 0.4)
         ax.set_ylim(bottom=0.0)
-        _name(ax, f"reprojection error, {unit}", "distance of the target, m", unit)
+        name_axes(ax, f"reprojection error, {unit}", "distance of the target, m", unit)
     axes[0].legend(fontsize=6.5, frameon=False)
 
 
@@ -249,16 +249,17 @@ def draw_running_mean(ax: Axes, numbers: Sequence[int], trials: Sequence[Trial])
         }
         if errors:
             means = np.cumsum(list(errors.values())) / np.arange(1, len(errors) + 1)
-            color, label = _COLORS[eye], f"{eye}, mean so far"
-            ax.plot(list(errors), list(errors.values()), _MARKERS[eye], color=color, markersize=3)
+            color, label = COLORS[eye], f"{eye}, mean so far"
+            ax.plot(list(errors), list(errors.values()), MARKERS[eye], color=color, markersize=3)
             ax.plot(list(errors), means, _LINES[eye], color=color, label=label)
     ax.set_ylim(bottom=0.0)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    _name(ax, "mean error so far", "trial", "arcmin")
+    name_axes(ax, "mean error so far", "trial", "arcmin")
     ax.legend(fontsize=6.5, frameon=False)
 
 
-def _name(ax: Axes, title: str, x: str, y: str) -> None:
+def name_axes(ax: Axes, title: str, x: str, y: str) -> None:
+    """Give axes their title and the names of both, with units."""
     ax.set_title(title, fontsize=_TITLE_PT, loc="left")
     ax.set_xlabel(x, fontsize=_LABEL_PT)
     ax.set_ylabel(y, fontsize=_LABEL_PT)

@@ -1,0 +1,251 @@
+"""What the report of a user test says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+
+from matplotlib.axes import Axes
+
+from handcal.evaluate.user_test import CornerRow, GroupErrors, UserTest, UserTestResult
+from handcal.evaluate.user_test_figures import draw_corners, draw_wearers
+from handcal.export.figures import draw_trial_errors
+from handcal.report.document import Column, Figure, Item, Report, Row, Section, Table, facts
+from handcal.report.provenance import at_minute, made_with
+from handcal.statistics import MeanInterval
+from handcal.trial import calibration_numbers
+
+# Wearers in one figure, and the height of each.
+_WEARERS, _WEARER_MM, _FIGURE_MM = 24, 6.0, 30.0
+_METHOD = (
+    "After a calibration, the wearer adjusted φ by hand until the drawn target covered the real "
+    "one. The reprojection error is the distance in the display between a corner of the target "
+    "drawn with the calibrated φ and with the adjusted one (Hu, Rodriguez y Baena, Cutolo, ISMAR "
+    "2021, user test). Each of the four corners, at each distance and for each eye, counts once."
+)
+_INTERVALS = (
+    "Errors of one wearer are alike, so that only wearers count as independent: intervals are of "
+    "the mean of wearers' means, by Student's t, corrected for skewness from five on (Hall 1992). "
+    "Those of one wearer take calibrations for independent."
+)
+_PUBLISHED = (
+    ("Hu et al. 2021, this method", "10.87", "8.18–13.18", "5.55–17.16"),
+    ("Itoh and Klinker 2014, INDICA", "14.49", "12.10–16.08", "10.42–17.32"),
+    ("Moser and Swan 2016, stylus", "9.57", "6.13–14.80", "0.66–13.09"),
+    ("Moser and Swan 2016, finger", "16.98", "10.83–25.51", "0.93–46.87"),
+)
+
+
+def user_test_report(test: UserTest, result: UserTestResult) -> Report:
+    """Return the report of a user test."""
+    total = result.total
+    return Report(
+        title="User test",
+        subject=f"{_count(len(result.by_wearer), 'wearer')}, "
+        f"{_count(len(test.sessions), 'session')}, {_count(total.trials, 'trial')}",
+        lead=f"{_mean(total)} Of all corners: {total.arcmin.mean:.2f} ± {total.arcmin.sd:.2f} "
+        f"arcmin, {total.px.mean:.2f} ± {total.px.sd:.2f} px (± SD).",
+        sections=list(_sections(test, result)),
+    )
+
+
+def _sections(test: UserTest, result: UserTestResult) -> Iterator[Section]:
+    yield _summary(test, result)
+    yield _errors(test, result)
+    yield _wearers(test, result)
+    yield _corners(test)
+    yield _published(result)
+    yield _sessions(test)
+    if result.left_out:
+        columns = Column("folder", "left"), Column("why", "left")
+        yield Section("Left out", [Table(columns, list(result.left_out.items()))])
+
+
+def _summary(test: UserTest, result: UserTestResult) -> Section:
+    total = result.total
+    counts = {
+        "Wearers": str(len(result.by_wearer)),
+        "Sessions": str(len(test.sessions)),
+        "Calibrations": str(total.calibrations),
+        "Trials": f"{total.trials}, each one eye at one distance",
+        "Corners": str(total.corners),
+    }
+    return Section("", [facts(counts | made_with()), _METHOD])
+
+
+def _errors(test: UserTest, result: UserTestResult) -> Section:
+    groups = {"all": result.total}
+    groups |= {f"{eye} eye": errors for eye, errors in result.by_eye.items()}
+    groups |= {f"at {depth_m} m": errors for depth_m, errors in result.by_depth_m.items()}
+    items: list[Item] = [_table("trials", groups), _INTERVALS]
+    if result.components_arcmin is not None:
+        found = result.components_arcmin
+        items.append(
+            f"Standard deviation of wearers' mean errors {found.between:.2f} arcmin, of the errors "
+            f"of one wearer {found.within:.2f} arcmin (analysis of variance)."
+        )
+    trials = [trial for record in test.sessions.values() for trial in record.trials]
+    figure = Figure(
+        "errors",
+        "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
+        lambda axes: draw_trial_errors(axes, trials),
+        test.corners,
+        height_mm=62.0,
+        columns=2,
+    )
+    return Section("Reprojection error", [*items, figure])
+
+
+def _wearers(test: UserTest, result: UserTestResult) -> Section:
+    names = list(result.by_wearer)
+    items: list[Item] = [_table("wearer", result.by_wearer)]
+    for first in range(0, len(names), _WEARERS):
+        shown = {name: result.by_wearer[name] for name in names[first : first + _WEARERS]}
+        items.append(
+            Figure(
+                f"wearers-{first // _WEARERS + 1}",
+                "Means over calibrations; a wearer of one calibration has no interval.",
+                partial(_draw_wearers, shown, test.corners),
+                list(_wearer_rows(shown)),
+                height_mm=_FIGURE_MM + _WEARER_MM * len(shown),
+                columns=2,
+                left_mm=34.0,
+            )
+        )
+    return Section("Wearers", items)
+
+
+def _draw_wearers(
+    shown: Mapping[str, GroupErrors], rows: Sequence[CornerRow], axes: Sequence[Axes]
+) -> None:
+    draw_wearers(axes, shown, rows)
+
+
+def _corners(test: UserTest) -> Section:
+    displays = [
+        display for record in test.sessions.values() for display in record.rig.eyes.values()
+    ]
+    sizes_px = {(display.width_px, display.height_px) for display in displays}
+    figure = Figure(
+        "corners",
+        "Left: crosses are the true places, dots the drawn ones; the frame is the display. Right: "
+        "how far each drawn corner is from its true place.",
+        lambda axes: draw_corners(axes, test.corners, sizes_px),
+        test.corners,
+        height_mm=80.0,
+        columns=2,
+    )
+    return Section("Where corners are drawn", [figure])
+
+
+def _published(result: UserTestResult) -> Section:
+    found = result.total.arcmin
+    here = (
+        "this test",
+        f"{found.median:.2f}",
+        f"{found.q1:.2f}–{found.q3:.2f}",
+        f"{found.min:.2f}–{found.max:.2f}",
+    )
+    columns = [
+        Column("study", "left"),
+        Column("median, arcmin"),
+        Column("interquartile range, arcmin"),
+        Column("min–max, arcmin"),
+    ]
+    text = (
+        "Published figures as printed in Hu et al. 2021, whose test had 3 wearers, 10 calibrations "
+        "each, 3 distances and 4 corners, and a mean of 10.79 ± 3.21 arcmin (7.71 ± 2.29 px). The "
+        "maximum printed for the stylus is below its third quartile. Displays, wearers and targets "
+        "differ between the studies."
+    )
+    return Section("Beside published tests", [text, Table(columns, [here, *_PUBLISHED])])
+
+
+def _sessions(test: UserTest) -> Section:
+    columns = [
+        Column("session", "left"),
+        Column("wearer", "left"),
+        Column("begun", "left"),
+        Column("rig", "left"),
+        Column("calibrations"),
+        Column("trials"),
+    ]
+    rows = [
+        [
+            name,
+            record.wearer or "not named",
+            at_minute(record.events[0].time),
+            record.rig.name,
+            str(len(set(calibration_numbers(record.trials)))),
+            str(len(record.trials)),
+        ]
+        for name, record in test.sessions.items()
+    ]
+    return Section("Sessions", [Table(columns, rows)])
+
+
+def _table(of: str, groups: Mapping[str, GroupErrors]) -> Table:
+    columns = [
+        Column(of, "left"),
+        Column("calibrations"),
+        Column("corners"),
+        Column("mean ± SD, px"),
+        Column("mean ± SD, arcmin"),
+        Column("95 % interval"),
+        Column("median (quartiles)"),
+        Column("min–max"),
+    ]
+    rows = [
+        [
+            name,
+            str(group.calibrations),
+            str(group.corners),
+            f"{group.px.mean:.2f}\u00a0±\u00a0{group.px.sd:.2f}",
+            f"{group.arcmin.mean:.2f}\u00a0±\u00a0{group.arcmin.sd:.2f}",
+            _range(group.interval_arcmin),
+            f"{group.arcmin.median:.2f} ({group.arcmin.q1:.2f}–{group.arcmin.q3:.2f})",
+            f"{group.arcmin.min:.2f}–{group.arcmin.max:.2f}",
+        ]
+        for name, group in groups.items()
+    ]
+    return Table(columns, rows, "Interval of the mean, median, quartiles and extremes in arcmin.")
+
+
+def _wearer_rows(shown: Mapping[str, GroupErrors]) -> Iterator[Row]:
+    for wearer, group in shown.items():
+        interval = group.interval_arcmin
+        yield {
+            "wearer": wearer,
+            "calibrations": group.calibrations,
+            "trials": group.trials,
+            "corners": group.corners,
+            "mean_arcmin": group.arcmin.mean,
+            "sd_arcmin": group.arcmin.sd,
+            "low_arcmin": interval.low if interval else None,
+            "high_arcmin": interval.high if interval else None,
+            "median_arcmin": group.arcmin.median,
+            "q1_arcmin": group.arcmin.q1,
+            "q3_arcmin": group.arcmin.q3,
+            "min_arcmin": group.arcmin.min,
+            "max_arcmin": group.arcmin.max,
+            "mean_px": group.px.mean,
+            "sd_px": group.px.sd,
+        }
+
+
+def _mean(total: GroupErrors) -> str:
+    found = total.interval_arcmin
+    if found is None:
+        return "One calibration was tested, so how far another would differ is not known."
+    return (
+        f"Mean reprojection error over {found.clusters} {total.unit}s {found.mean:.2f} arcmin, "
+        f"{100 * found.level:g} % interval {_range(found)}."
+    )
+
+
+def _range(interval: MeanInterval | None) -> str:
+    return f"{interval.low:.2f}\u00a0to\u00a0{interval.high:.2f}" if interval else "–"
+
+
+def _count(number: int, what: str) -> str:
+    return f"1 {what}" if number == 1 else f"{number:,} {what}s"
