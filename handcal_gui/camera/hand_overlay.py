@@ -42,6 +42,8 @@ class HandOverlay:
             return
         color = QColor(colors().red if self.is_red else colors().live)
         self._draw_mask(painter, QColor(color))
+        # A contour follows pixels anyway, and smooth lines take five times as long.
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
         strays_px = _SMOOTHED_PX / painter.deviceTransform().m11()
         for points_px, is_cut in contour_runs(self.image_px, self.cloud.contour_is_cut):
             _set_pen(painter, color, Qt.PenStyle.DashLine if is_cut else Qt.PenStyle.SolidLine)
@@ -50,17 +52,17 @@ class HandOverlay:
 
     def _draw_mask(self, painter: QPainter, color: QColor) -> None:
         x0, y0, x1, y1 = self.cloud.box_px
+        step = max(1, int(1.0 / painter.deviceTransform().m11()))
+        shown = self.cloud.mask[y0:y1:step, x0:x1:step] & np.uint8(1)
+        height, width = shown.shape
+        mask = QImage(shown.data, width, height, width, QImage.Format.Format_Indexed8)
         color.setAlpha(_MASK_ALPHA)
-        tint = np.where(np.arange(256) == 255, color.rgba(), 0).astype(np.uint32)
-        pixels = tint.take(self.cloud.mask[y0:y1, x0:x1])
-        size = x1 - x0, y1 - y0
-        mask = QImage(pixels.data, *size, pixels.strides[0], QImage.Format.Format_ARGB32)
-        box = QRectF(x0 - 0.5, y0 - 0.5, *size)
+        mask.setColorTable([0, color.rgba()])
         painter.save()
         painter.setTransform(_fit(self.depth_px, self.image_px), combine=True)
-        painter.drawImage(box, mask)
+        painter.drawImage(QRectF(x0 - 0.5, y0 - 0.5, step * width, step * height), mask)
         _set_pen(painter, QColor(colors().muted), Qt.PenStyle.SolidLine)
-        painter.drawRect(box)
+        painter.drawRect(QRectF(x0 - 0.5, y0 - 0.5, x1 - x0, y1 - y0))
         painter.restore()
 
 

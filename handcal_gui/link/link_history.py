@@ -76,5 +76,7 @@ def _scale(plot: Plot, values: Float64, unit: str) -> None:
     """Let the scale reach from zero to above all values."""
     worst = np.max(values, where=~np.isnan(values), initial=0.0)
     top = next((top for top in _TOPS if top >= worst), _TOPS[-1])
+    if plot.item.viewRange()[1][1] == top:
+        return  # an axis takes milliseconds to draw
     plot.item.setYRange(0.0, top, padding=0.0)
     plot.item.getAxis("left").setTicks([[(0.0, "0"), (top, f"{top:g} {unit}")]])

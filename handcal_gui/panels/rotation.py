@@ -19,6 +19,8 @@ from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence
 
 _HISTORY_S = 10.0
+_HISTORY_PERIOD_S = 0.2
+"""Time between two drawings of it."""
 _HISTORY_LIMITS = 2.0
 """The history's scale ends at so many limits, as the dial's does."""
 _STRAIGHT_RAD = np.radians(2.0)
@@ -38,6 +40,7 @@ class RotationPanel(QWidget):
         self.setAccessibleName("Rotation")
         self._cursor: PlacedHand | None = None
         self._history: deque[tuple[float, float]] = deque()
+        self._history_drawn_s = -np.inf
         self._dial = RotationDial()
         self._hand = TurningHand()
         self._advice = _text_label("rotation-advice", scale=1.2)
@@ -59,6 +62,7 @@ class RotationPanel(QWidget):
         if procedure.cursor is not self._cursor:
             self._cursor = procedure.cursor
             self._history.clear()
+            self._history_drawn_s = -np.inf
             self._angle_line.clear()
         if procedure.cursor is None or procedure.state is not State.ALIGN:
             self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
@@ -94,6 +98,9 @@ class RotationPanel(QWidget):
         self._history.append((now_s, float(np.degrees(angle_rad))))
         while self._history[0][0] < now_s - _HISTORY_S:
             self._history.popleft()
+        if 0.0 <= now_s - self._history_drawn_s < _HISTORY_PERIOD_S:
+            return
+        self._history_drawn_s = now_s
         times_s, angles_deg = np.array(self._history).T
         self._angle_line.setData(times_s - now_s, angles_deg)
 

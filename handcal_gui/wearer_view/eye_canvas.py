@@ -21,7 +21,7 @@ LINES = {
 """Colour of each outline, and width in pixels and style of its line; wider ones take Qt ten times
 as long, and their halos make them plain enough."""
 _HALO_PX = 4.5
-_MOST_POINTS = 180
+_MOST_POINTS = 120
 """Of each outline, since Qt takes a microsecond and more for each."""
 _MARGIN = 0.12
 _WIDEST_CROP = 1.8

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel
 
 from handcal_gui.theme import number_font
@@ -12,6 +13,9 @@ UNKNOWN = "–"
 
 class NumberLabel(QLabel):
     """Right-aligned, in digits of one width, as wide as its widest text; a dash at first.
+
+    With every text a QLabel has all layouts around it computed anew, up to the window's, which
+    takes as long as painting a picture; this one only where its text is wider than any before.
 
     Parameters
     ----------
@@ -27,8 +31,34 @@ class NumberLabel(QLabel):
 
     def __init__(self, name: str, widest: str, tooltip: str, scale: float = 1.0) -> None:
         super().__init__(UNKNOWN)
+        self._text = UNKNOWN
         self.setObjectName(name)
         self.setToolTip(tooltip)
         self.setFont(number_font(scale))
         self.setMinimumWidth(self.fontMetrics().horizontalAdvance(widest))
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+
+    def text(self) -> str:
+        """Return what is shown."""
+        return self._text
+
+    def setText(self, text: str) -> None:
+        """Show a number with its unit."""
+        if text == self._text:
+            return
+        self._text = text
+        self.setAccessibleName(text)
+        self.setMinimumWidth(max(self.minimumWidth(), self.fontMetrics().horizontalAdvance(text)))
+        self.update()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw the text as a QLabel would."""
+        self.style().drawItemText(
+            QPainter(self),
+            self.contentsRect(),
+            self.alignment().value,
+            self.palette(),
+            self.isEnabled(),
+            self._text,
+            self.foregroundRole(),
+        )

@@ -1,0 +1,59 @@
+import pytest
+from PySide6.QtCore import QEvent, QObject
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
+
+
+class _Requests(QObject):
+    """Counts how often a widget's layout is to be computed anew."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.count = 0
+
+    def eventFilter(self, _: QObject, event: QEvent) -> bool:
+        self.count += event.type() == QEvent.Type.LayoutRequest
+        return False
+
+
+@pytest.fixture
+def around(qtbot: QtBot) -> QWidget:
+    around = QWidget()
+    qtbot.addWidget(around)
+    return around
+
+
+@pytest.fixture
+def label(around: QWidget, qtbot: QtBot) -> NumberLabel:
+    label = NumberLabel("age", "99.9 ms", "How old it is")
+    QVBoxLayout(around).addWidget(label)
+    around.show()
+    qtbot.waitExposed(around)
+    qtbot.wait(20)
+    return label
+
+
+def test_only_a_text_wider_than_any_before_moves_what_is_beside_it(
+    label: NumberLabel, around: QWidget, qtbot: QtBot
+) -> None:
+    requests = _Requests()
+    around.installEventFilter(requests)
+    for text in ("1.0 ms", "20.5 ms", "–", "99.9 ms"):
+        label.setText(text)
+        qtbot.wait(10)
+    assert requests.count == 0
+    label.setText("12,345.6 ms")
+    qtbot.waitUntil(lambda: requests.count > 0)
+    assert label.width() >= label.fontMetrics().horizontalAdvance("12,345.6 ms")
+
+
+def test_it_shows_and_tells_its_text(label: NumberLabel) -> None:
+    unknown = label.grab().toImage()
+    assert label.text() == UNKNOWN
+    label.setText("12.3 ms")
+    assert label.text() == label.accessibleName() == "12.3 ms"
+    assert label.grab().toImage() != unknown
+    label.setText(UNKNOWN)
+    assert label.grab().toImage() == unknown
