@@ -44,7 +44,7 @@ def display(arguments: argparse.Namespace) -> None:
 
     from handcal.rig.assemble import screen_of, with_display
     from handcal.rig.display import calibrate_display, fit_homography
-    from handcal.rig.formats import read_intrinsics
+    from handcal.rig.formats import read_intrinsics, read_pose
     from handcal.rig.grid import on_display
     from handcal.rig.views import drop, image_files, read_views, used
 
@@ -52,6 +52,8 @@ def display(arguments: argparse.Namespace) -> None:
     camera = read_intrinsics(arguments.camera_intrinsics)
     viewpoint = _viewpoint(arguments, camera)
     screen = screen_of(rig, eye)
+    if arguments.view:
+        screen = replace(screen, T_V_H=read_pose(arguments.view))
     shown = grid_of(arguments, screen.width_px, screen.height_px)
     with progress() as report:
         views = read_views(image_files(arguments.images), shown.board, report)
@@ -164,6 +166,13 @@ def add_rig_file_commands(commands: Commands) -> None:
         help="what a square of the grid subtends at the --nominal-distance-m, to solve z(C0→S)",
     )
     one.add_argument("--nominal-distance-m", type=metres, default=2.0, help="of the virtual image")
+    one.add_argument(
+        "--view",
+        type=Path,
+        metavar="FILE",
+        help="T_V_H, from the headset rig to this eye's rendering camera as the headset reports "
+        "it: 4 rows of 4 numbers, metres, x right, y down, z forward; as in --rig if absent",
+    )
     one.add_argument("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out")
     add_square_option(one)
     add_board_options(one)

@@ -85,6 +85,16 @@ def test_a_display_is_calibrated_from_photographs(
     assert all(one["value"] < 1e-6 for one in differences)
 
 
+def test_the_rendering_camera_is_told_by_a_file(folder: Path, tmp_path: Path) -> None:
+    T_V_H = rigid(translation_m=[0.001, 0.0, 0.0]) @ RIG.eyes["left"].T_V_H
+    np.savetxt(tmp_path / "view.txt", T_V_H)
+    calibrate(folder, tmp_path / "a.yaml", "--distance-m", 2)
+    calibrate(folder, tmp_path / "b.yaml", "--distance-m", 2, "--view", tmp_path / "view.txt")
+    a, b = (read_rig(tmp_path / name).eyes["left"] for name in ("a.yaml", "b.yaml"))
+    np.testing.assert_allclose(b.T_V_H, T_V_H, atol=1e-12)
+    np.testing.assert_allclose(b.t_C0_V_m - a.t_C0_V_m, [-0.001, 0.0, 0.0], atol=1e-9)
+
+
 def test_a_missing_pose_is_named(folder: Path, tmp_path: Path) -> None:
     poses = tmp_path / "poses.json"
     write_tracked(poses, {"0.png": np.eye(4)})

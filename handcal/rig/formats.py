@@ -50,14 +50,23 @@ def read_intrinsics(path: Path) -> Intrinsics:
 
 
 def read_pose(path: Path) -> Float64:
-    """Read T_H_D from FileStorage or JSON.
+    """Read a rigid transform: FileStorage, the JSON of a stereo pose, or 4 rows of 4 numbers.
 
     Raises
     ------
     FileError
         If the file cannot be read, or holds no rigid transform.
     """
-    return _read(path, _pose_of_json, _pose_of_yaml)
+    try:
+        words = re.split(rb"[\s,\[\]]+", read_limited(path, MAX_BYTES))
+        numbers = [float(word) for word in words if word]
+    except ValueError:
+        return _read(path, _pose_of_json, _pose_of_yaml)
+    try:
+        require(len(numbers) == 16, "a matrix must have 4 rows of 4 numbers")
+        return _pose(np.array(numbers).reshape(4, 4))
+    except ValueError as error:
+        raise FileError(f"{path}: {error}") from error
 
 
 def read_stereo(path: Path) -> StereoCalibration:

@@ -74,6 +74,13 @@ class DisplayPage(StepPage):
             "Instead of images and poses of the board: what 'handcal rig stereo' made of the "
             "viewpoint camera, as its depth camera, and the headset's."
         )
+        files = "Matrices (*.txt *.json *.yaml *.yml)"
+        view = PathField("Rendering camera", "file", files, "As in the rig")
+        view.setToolTip(
+            "T_V_H, from the headset rig to this eye's rendering camera, as the headset reports "
+            "it: 4 rows of 4 numbers; metres; x right, y down, z forward. Otherwise it is that of "
+            "the rig to begin from."
+        )
         form = EntriesForm(
             {
                 "grid_images": ("Images of the grid", PathField("Grid images", "folder")),
@@ -81,6 +88,7 @@ class DisplayPage(StepPage):
                 "board_images": ("Images of the board", PathField("Board images", "folder")),
                 "tracked": ("Board's poses", tracked),
                 "stereo": ("or a stereo calibration", stereo),
+                "view": ("Rendering camera T_V_H", view),
                 "distance": ("Distance z(C0→S)", distance),
                 "distance_m": ("measured", distance_m),
                 "square_arcmin": ("Square's angle", arcmin),

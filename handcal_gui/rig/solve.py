@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -116,6 +116,8 @@ def solve_display(
     if not camera_file.exists():
         raise HandcalError("the viewpoint camera's intrinsics are missing: solve its step first")
     camera = read_intrinsics(camera_file)
+    view = _pose(entries.view)
+    screen = screen if view is None else replace(screen, T_V_H=view)
     place, of_place = _place(board_shots, entries, camera)
     grid = grid_of(entries, screen.width_px, screen.height_px)
     views = [view for (view,) in without(grid_shots, entries.dropped_grid)]

@@ -87,7 +87,10 @@ class TakeDialog(QDialog):
         self.shown_images: Images | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in folders}
         self._recorded = {
-            title: PathField(f"Recording or video, {title.lower()}", "either") for title in folders
+            title: PathField(
+                f"Recording or video, {title.lower()}", "either", empty="No recording or video"
+            )
+            for title in folders
         }
         self._views = {title: ImageView(title) for title in folders}
         self._found = FindingLine("taken")
@@ -251,12 +254,14 @@ class TakeDialog(QDialog):
             row = QHBoxLayout()
             row.setSpacing(SPACING_PX)
             row.addWidget(QLabel(title))
-            row.addWidget(source)
-            row.addWidget(self._recorded[title], 1)
+            row.addWidget(source, 1)
             grid.addLayout(row, 0, column)
-            grid.addWidget(self._views[title], 1, column)
+            grid.addWidget(self._recorded[title], 1, column)
+            grid.addWidget(self._views[title], 2, column)
             self._views[title].setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
-        grid.setRowStretch(1, 1)
+            self._views[title].show_text(message="No picture yet")
+        grid.setRowStretch(2, 1)
+        grid.setHorizontalSpacing(3 * SPACING_PX)
         foot = QHBoxLayout()
         foot.setSpacing(SPACING_PX)
         for widget in (self._start, self._take, self._by_itself):

@@ -74,6 +74,8 @@ class DisplayEntries:
     stereo : str
         Instead of both, the JSON of a stereo calibration with the viewpoint camera as its depth
         camera.
+    view : str
+        File of T_V_H, as the headset reports it; that of the rig if empty.
     distance : {"measured", "solved"}
         How z(C0→S) is known: as `distance_m`, or from what a square subtends.
     distance_m, square_arcmin, nominal_m : float
@@ -86,6 +88,7 @@ class DisplayEntries:
     board_images: str = ""
     tracked: str = ""
     stereo: str = ""
+    view: str = ""
     distance: Distance = "measured"
     distance_m: float = 2.0
     square_arcmin: float = 112.0

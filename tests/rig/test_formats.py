@@ -190,3 +190,17 @@ def test_what_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="5 or 8"):
         write_intrinsics(tmp_path / "camera", fourteen, "ros")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("separator", [", ", " ", "\n"])
+def test_a_pose_is_read_from_a_plain_matrix(tmp_path: Path, separator: str) -> None:
+    T = rigid([0.1, -0.2, 0.3], [0.03, 0.0, -0.05])
+    path = tmp_path / "view.txt"
+    path.write_text(str(T.tolist()).replace(", ", separator))
+    np.testing.assert_array_equal(read_pose(path), T)
+    path.write_text(str((2.0 * T).tolist()))
+    with pytest.raises(FileError, match="must be rigid"):
+        read_pose(path)
+    path.write_text("1 2 3")
+    with pytest.raises(FileError, match="4 rows of 4 numbers"):
+        read_pose(path)
