@@ -223,7 +223,7 @@ def calibrate_display(
     settings : DisplaySettings
     """
     T_V_C = screen.T_V_H @ viewpoint.T_H_C
-    R_S_C, C0_S_px = _pose_before(homography, camera, screen)
+    R_S_C, C0_S_px = pose_before(homography, camera, screen.width_px, screen.height_px)
     focal_px = -float(C0_S_px[2])  # C0's distance from S, in the display's pixels
     K = np.array(
         [
@@ -257,6 +257,19 @@ def calibrate_display(
         covariance=0.5 * (covariance + covariance.T),
         verdict=_judge(display, homography, viewpoint.verdict, turn_rad, settings),
     )
+
+
+def pose_before(
+    homography: DisplayHomography, camera: Intrinsics, width_px: int, height_px: int
+) -> tuple[Float64, Float64]:
+    """Return R_S_C by PnP, and where the camera is in S: in pixels, from the display's first."""
+    width, height = width_px - 1.0, height_px - 1.0
+    corners_px = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    seen_px = cv2.perspectiveTransform(corners_px[None], homography.H_C_S)[0]
+    undistorted = replace(camera, distortion=())
+    points_px = np.column_stack([corners_px, np.zeros(4)])
+    T_S_C = invert(plane_pose(points_px, seen_px, undistorted))
+    return T_S_C[:3, :3], T_S_C[:3, 3]
 
 
 def undistort(pixels: Float64, camera: Intrinsics) -> Float64:
@@ -298,19 +311,6 @@ def _jacobian(H: Float64, points: Float64) -> Float64:
     J[:, 0, 0:3] = J[:, 1, 3:6] = weights
     J[:, :, 6:8] = -(mapped[:, :2] / mapped[:, 2:])[:, :, None] * weights[:, None, :2]
     return J.reshape(-1, 8)
-
-
-def _pose_before(
-    homography: DisplayHomography, camera: Intrinsics, screen: Screen
-) -> tuple[Float64, Float64]:
-    """Return R_S_C by PnP, and where the camera is in S: in pixels, from the display's first."""
-    width, height = screen.width_px - 1.0, screen.height_px - 1.0
-    corners_px = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    seen_px = cv2.perspectiveTransform(corners_px[None], homography.H_C_S)[0]
-    undistorted = replace(camera, distortion=())
-    points_px = np.column_stack([corners_px, np.zeros(4)])
-    T_S_C = invert(plane_pose(points_px, seen_px, undistorted))
-    return T_S_C[:3, :3], T_S_C[:3, 3]
 
 
 def _judge(

@@ -13,7 +13,7 @@ from handcal.sim.boards import BLACK, WALL, WHITE, PictureSettings, expose, pixe
 from handcal.types import EyeDisplay, Float32, Float64, Intrinsics, UInt8
 
 _CELL_PX = 24  # of the texture
-_SHOWN_SAMPLES = 3
+_SHOWN_SAMPLES = 2
 _LEAST_LIGHT = 0.7  # on a face seen edge-on
 
 

@@ -1,0 +1,239 @@
+"""The captures of a whole cube test, rendered: as a lab would put them into folders.
+
+A camera stands in for the eye at several places of the eye box (Hu et al. 2021, assessment with
+eye-replacement camera). At each of them the display is calibrated by overlaying a hand that the
+camera sees through it; then a cube is tracked by the depth camera, and captured real and drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handcal.cube_file import write_cube
+from handcal.display import eye_projection, view_of_eye
+from handcal.errors import FileError
+from handcal.files import make_folder, write_json
+from handcal.geometry import image_points, invert, project, rigid, transform
+from handcal.image_file import write_png
+from handcal.results import SolveSettings, solve_session
+from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
+from handcal.rig.formats import write_intrinsics
+from handcal.rig.grid import Grid, draw_grid
+from handcal.sim.boards import PictureSettings
+from handcal.sim.cube import CubePainter, draw_cube
+from handcal.sim.hand import make_hand
+from handcal.sim.overlay import overlay_by_eye
+from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
+from handcal.sim.wearer import WearerSettings, draw_slip
+from handcal.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, UInt8
+
+# Where the camera is in the eye box: x right, y down.
+_POSITIONS = {
+    "centre": (0.0, 0.0),
+    "up": (0.0, -1.0),
+    "down": (0.0, 1.0),
+    "left": (-1.0, 0.0),
+    "right": (1.0, 0.0),
+}
+_NEAR_M, _FAR_M, _ASIDE_M = 0.4, 0.6, 0.02
+_EDGE_PX = 8.0
+# So turned, three faces show.
+_YAW_RAD, _PITCH_RAD, _ROLL_RAD = (0.45, 1.1), (0.3, 0.7), (-0.3, 0.3)
+_VERTICES = np.array(list(product((-0.5, 0.5), repeat=3)))
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureSettings:
+    """How the test is done.
+
+    Attributes
+    ----------
+    seed : int
+    eye : {"left", "right"}
+    poses : int
+        Of the cube at each position, 0.4 to 0.6 m away.
+    alignments : int
+        Of the hand at each position.
+    aside_m : float
+        From the middle of the eye box to the other positions.
+    place_sigma_m : float
+        How exactly the camera is put there, each axis.
+    turn_sigma_rad : float
+        How far the camera is turned against the display, about each axis.
+    points : int
+        Of the hand's clouds.
+    depth_sigma_m : float
+        Noise of the depth camera's points.
+    wearer : WearerSettings
+        How exactly the hand is overlaid.
+    cube : Cube
+    camera : Intrinsics
+        The eye-replacement camera.
+    pictures : PictureSettings
+    """
+
+    seed: int = 1
+    eye: Eye = "left"
+    poses: int = 4
+    alignments: int = 1
+    aside_m: float = 0.004
+    place_sigma_m: float = 0.001
+    turn_sigma_rad: float = 0.02
+    points: int = 5000
+    depth_sigma_m: float = 0.001
+    wearer: WearerSettings = field(default_factory=WearerSettings)
+    cube: Cube = field(default_factory=Cube)
+    camera: Intrinsics = VIEWPOINT_CAMERA
+    pictures: PictureSettings = field(default_factory=lambda: PictureSettings(samples=2))
+
+
+def write_captures(
+    folder: Path, rig: Rig, settings: CaptureSettings, report: Callable[[str, float], None]
+) -> None:
+    """Write the captures of a test, `camera.json`, `cube.json`, and the truth, `truth.json`.
+
+    The cube is drawn with the offline calibration (``virtual-before``), with φ solved from the
+    alignments (``virtual-after``), and with the true φ (``virtual-truth``), which shows what the
+    test itself cannot tell.
+
+    Parameters
+    ----------
+    folder : Path
+        Must be empty, if it exists.
+    rig : Rig
+    settings : CaptureSettings
+    report : callable
+        Told what is being done, and the share done; may raise to give up.
+
+    Raises
+    ------
+    FileError
+        If the folder is not empty, or cannot be written.
+    """
+    if any(make_folder(folder).iterdir()):
+        raise FileError(f"{folder} is not empty: give a new folder")
+    write_intrinsics(folder / "camera.json", settings.camera, "json")
+    write_cube(folder / "cube.json", settings.cube)
+    studio = _Studio(rig, settings)
+    truth = {}
+    for number, (position, aside) in enumerate(_POSITIONS.items()):
+        rng = np.random.default_rng([settings.seed, number])
+        true_m = rng.normal(settings.aside_m * np.array([*aside, 0.0]), settings.place_sigma_m)
+        solved_m = studio.calibrate(true_m, rng)
+        truth[position] = {"true_shift_m": true_m.tolist(), "solved_shift_m": solved_m.tolist()}
+        T_E_C = rigid(rng.normal(0.0, settings.turn_sigma_rad, 3), true_m)
+        shifts_m = {"before": np.zeros(3), "after": solved_m, "truth": true_m}
+        place = make_folder(folder / position)
+        write_png(place / "grid.png", studio.capture_display(studio.grid, T_E_C, rng))
+        for pose in range(settings.poses):
+            done = (number + pose / settings.poses) / len(_POSITIONS)
+            report(f"{position}, pose {pose + 1}", done)
+            images = make_folder(place / f"pose-{pose + 1}")
+            for name, image in studio.capture_cube(T_E_C, shifts_m, rng):
+                write_png(images / f"{name}.png", image)
+    write_json(folder / "truth.json", {"eye": settings.eye, "positions": truth})
+
+
+class _Studio:
+    """A headset before a camera, a hand and a cube, and whoever moves them."""
+
+    def __init__(self, rig: Rig, settings: CaptureSettings) -> None:
+        self._rig, self._settings = rig, settings
+        self._display = rig.eyes[settings.eye]
+        self._T_E_D = view_of_eye(self._display, np.eye(4)) @ rig.T_H_D
+        self._hand = make_hand(settings.seed)
+        cube, pictures = settings.cube, settings.pictures
+        self._seen_by_eye = CubePainter(cube, settings.camera, pictures)
+        self._seen_by_depth = CubePainter(cube, rig.depth_intrinsics, pictures)
+        self.grid = draw_grid(Grid(self._display.width_px, self._display.height_px))
+
+    def calibrate(self, true_m: Float64, rng: np.random.Generator) -> Float64:
+        """Return φ as solved from alignments of the hand with its cursor."""
+        settings = self._settings
+        alignments = [
+            overlay_by_eye(
+                rng,
+                self._hand,
+                self._rig,
+                {settings.eye: true_m},
+                settings.points,
+                settings.depth_sigma_m,
+                slip=draw_slip(rng, settings.wearer),
+            )
+            for _ in range(settings.alignments)
+        ]
+        return solve_session(alignments, self._rig, SolveSettings()).shifts[settings.eye].shift_m
+
+    def capture_display(self, shown: UInt8, T_E_C: Float64, rng: np.random.Generator) -> UInt8:
+        """Return what the camera sees of the display in the dark."""
+        settings = self._settings
+        return photograph_display(
+            shown,
+            self._display,
+            T_E_C[:3, :3],
+            settings.camera,
+            rng,
+            shift_m=T_E_C[:3, 3],
+            settings=settings.pictures,
+        )
+
+    def capture_cube(
+        self, T_E_C: Float64, shifts_m: Mapping[str, Float64], rng: np.random.Generator
+    ) -> Iterator[tuple[str, UInt8]]:
+        """Yield the cube captured at some pose: real, and as drawn with each φ."""
+        T_E_T, tracked = self._place_cube(T_E_C, shifts_m.values(), rng)
+        yield "real", self._seen_by_eye.paint(invert(T_E_C) @ T_E_T, rng)
+        for name, shift_m in shifts_m.items():
+            shown = draw_cube(self._settings.cube, self._display, tracked, shift_m)
+            yield f"virtual-{name}", self.capture_display(shown, T_E_C, rng)
+
+    def _place_cube(
+        self, T_E_C: Float64, shifts_m: Iterable[Float64], rng: np.random.Generator
+    ) -> tuple[Float64, Float64]:
+        """Return T_E_T, true and as tracked, of a cube that display and cameras show whole."""
+        settings, depth_camera = self._settings, self._rig.depth_intrinsics
+        while True:
+            T_E_T = self._some_pose(rng)
+            vertices_m = transform(T_E_T, settings.cube.side_m * _VERTICES)
+            if not (
+                _sees(settings.camera, T_E_C, vertices_m)
+                and _sees(depth_camera, self._T_E_D, vertices_m)
+                and all(_shows(self._display, shift_m, vertices_m) for shift_m in shifts_m)
+            ):
+                continue
+            with suppress(CubeError):
+                image = self._seen_by_depth.paint(invert(self._T_E_D) @ T_E_T, rng)
+                T_D_T = cube_pose(find_cube(image, settings.cube), settings.cube, depth_camera)
+                return T_E_T, self._T_E_D @ T_D_T
+
+    def _some_pose(self, rng: np.random.Generator) -> Float64:
+        """Return T_E_T of a cube before the display's middle, turned so that three faces show."""
+        middle_px = [(self._display.width_px - 1) / 2, (self._display.height_px - 1) / 2, 1.0]
+        ray = np.linalg.solve(eye_projection(self._display)[:, :3], middle_px)
+        depth_m = rng.uniform(_NEAR_M, _FAR_M)
+        aside_m = rng.uniform(-_ASIDE_M, _ASIDE_M, 2)
+        yaw = rng.uniform(*_YAW_RAD) * rng.choice([-1.0, 1.0])
+        turn = Rotation.from_euler("ZXY", [rng.uniform(*_ROLL_RAD), rng.uniform(*_PITCH_RAD), yaw])
+        return rigid(turn.as_matrix(), depth_m * ray / ray[2] + [*aside_m, 0.0])
+
+
+def _sees(camera: Intrinsics, T_E_camera: Float64, points_E_m: Float64) -> bool:
+    pixels = image_points(transform(invert(T_E_camera), points_E_m), camera)
+    return _within(pixels, camera.width, camera.height)
+
+
+def _shows(display: EyeDisplay, shift_m: Float64, points_E_m: Float64) -> bool:
+    pixels = project(eye_projection(display, shift_m), points_E_m)
+    return _within(pixels, display.width_px, display.height_px)
+
+
+def _within(pixels: Float64, width_px: int, height_px: int) -> bool:
+    far_px = np.array([width_px, height_px]) - _EDGE_PX
+    return bool(((pixels > _EDGE_PX) & (pixels < far_px)).all())
