@@ -6,6 +6,7 @@ Everything heavy is imported behind that window, which the program then takes ov
 from __future__ import annotations
 
 import argparse
+import ctypes
 import os
 import re
 import sys
@@ -19,7 +20,7 @@ FIRST_SIZE = QSize(1600, 1000)
 
 
 def main() -> NoReturn:
-    """Run the program; the exit status is 0, 1 if the autopilot fails, 2 for wrong arguments."""
+    """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments."""
     arguments = _parser().parse_args()
     _require_display()
     keep_window_quick()
@@ -110,9 +111,31 @@ def _size(text: str) -> QSize:
 
 def _require_display() -> None:
     """End with one line where Qt would abort."""
-    wanted = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}
-    if sys.platform.startswith("linux") and not wanted & set(os.environ):
-        _fail("there is no display; `handcal demo` does the same without one", 2)
+    others = {"WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}
+    if not sys.platform.startswith("linux") or others & set(os.environ):
+        return
+    display = os.environ.get("DISPLAY")
+    if not display:
+        _fail("there is no display; `handcal demo` does the same without one", 1)
+    if not _answers(display):
+        _fail(
+            f"no X server answers at DISPLAY={display}; start one, or let DISPLAY name one that "
+            "lets you in, or use `handcal demo`, which needs none",
+            1,
+        )
+
+
+def _answers(display: str) -> bool:
+    """Tell whether an X server lets this user in, asking as Qt will."""
+    try:
+        xcb = ctypes.CDLL("libxcb.so.1")
+    except OSError:
+        return True  # Qt names the library that is missing
+    xcb.xcb_connect.restype = ctypes.c_void_p
+    connection = ctypes.c_void_p(xcb.xcb_connect(display.encode(), None))
+    has_error = bool(xcb.xcb_connection_has_error(connection))
+    xcb.xcb_disconnect(connection)
+    return not has_error
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -136,7 +136,7 @@ class Program(QObject):
         """End what runs, and show the start page."""
         self.live.stop()
         self.review.close()
-        self.start.setEnabled(True)
+        self.start.set_opening(False)
         self.start.show_preferences(self._preferences)
         self.window.show_page("start")
 
@@ -194,6 +194,7 @@ class Program(QObject):
 
     def _connect(self, review_page: ReviewPage) -> None:
         self.start.start_requested.connect(self.start_calibration)
+        self.start.cancel_requested.connect(self.live.cancel)
         self.start.resume_requested.connect(self.resume_session)
         self.start.open_requested.connect(self.open_session)
         self.start.rig_wanted.connect(self.calibrate_rig)
@@ -248,8 +249,9 @@ class Program(QObject):
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
-        self.start.setEnabled(False)  # until the station is open, or is not
         self.live.start(open_station, self._preferences.plan)
+        self.start.set_opening(True)
+        self.window.show_page("start")
 
     def _browse(self) -> None:
         folder = QFileDialog.getExistingDirectory(
@@ -272,6 +274,8 @@ class Program(QObject):
         if why:
             self.show_start()
             self.window.banner.show_message(why)
+        elif self.window.page == "start":  # cancelled
+            self.start.set_opening(False)
 
     def _renew_key(self) -> None:
         self._pairing_key = self._file.renew_pairing_key()

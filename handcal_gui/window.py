@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from functools import partial
 from typing import Literal, Protocol
 
-from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -237,6 +237,14 @@ class MainWindow(QMainWindow):
         else:
             super().keyPressEvent(event)
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Take the keys that a floating dock has no use for, as from one in its place."""
+        is_apart = isinstance(watched, QDockWidget) and watched.window() is not self
+        if is_apart and isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
+            self.keyPressEvent(event)
+            return event.isAccepted()
+        return super().eventFilter(watched, event)
+
     def closeEvent(self, event: QCloseEvent) -> None:
         """Say so before closing."""
         self.closing.emit()
@@ -252,6 +260,7 @@ class MainWindow(QMainWindow):
             dock = QDockWidget(title, self)
             dock.setObjectName(f"{name}Dock")
             dock.setWidget(getattr(self.panels, name))
+            dock.installEventFilter(self)
             dock.visibilityChanged.connect(self._titles_timer.start)
             dock.dockLocationChanged.connect(self._titles_timer.start)
             docks[name] = dock

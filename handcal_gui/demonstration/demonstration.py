@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QApplication
 
+from handcal.errors import FileError
 from handcal.station_settings import StationSettings
 from handcal_gui.demonstration.autopilot import Autopilot
 from handcal_gui.demonstration.screenshots import Screenshots
@@ -42,6 +43,8 @@ class Demonstration(QObject):
         self._screenshots = Screenshots(program.window, screenshots) if screenshots else None
         self._tour = Tour(program, self._screenshots) if self._screenshots else None
         self._has_toured = False
+        if self._tour:
+            self._tour.failed.connect(self._give_up)
         self._autopilot = Autopilot(program.live, program.wizard_panel, self._look)
         self._autopilot.finished.connect(self._export)
         self._autopilot.stuck.connect(self._give_up)
@@ -62,7 +65,10 @@ class Demonstration(QObject):
     def _look(self, view: View) -> None:
         if self._screenshots is None or self._tour is None:
             return
-        self._screenshots.save_step(view)
+        try:
+            self._screenshots.save_step(view)
+        except FileError as error:
+            self._give_up(str(error))
         if view.step is Step.SAVE and not self._has_toured:
             self._has_toured = True
             self._autopilot.pause()

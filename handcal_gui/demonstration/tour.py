@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QTabWidget, QWidget
 
+from handcal.errors import FileError
 from handcal_gui.demonstration.screenshots import Screenshots
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
@@ -19,7 +20,6 @@ _LOOK_MS = 600
 _TURN_MS = 50
 _PATIENCE_MS = 20_000
 _STEPS = 6
-_TRIALS = 2
 
 Walk = Iterator[int]
 """What to do in pieces; each gives the milliseconds to wait before the next."""
@@ -32,7 +32,14 @@ class Tour(QObject):
     ----------
     program : Program
     screenshots : Screenshots
+
+    Attributes
+    ----------
+    failed : Signal(str)
+        A picture could not be saved, and why.
     """
+
+    failed = Signal(str)
 
     def __init__(self, program: Program, screenshots: Screenshots) -> None:
         super().__init__(program)
@@ -45,6 +52,8 @@ class Tour(QObject):
             wait_ms = next(walk)
         except StopIteration:
             then()
+        except FileError as error:
+            self.failed.emit(str(error))
         else:
             QTimer.singleShot(wait_ms, self, lambda: self.begin(walk, then))
 
@@ -113,16 +122,22 @@ class Tour(QObject):
         yield 2 * _LOOK_MS
         self._save("fine-tune-moved", panel)
         self._save("window-fine-tune")
-        for _ in range(_TRIALS):
-            yield from self._record_trial()
+        yield from self._record_trial()
+        yield _LOOK_MS
+        self._record()  # the other eye's, whose φ has not been touched: to be asked for again
+        self._save("window-trial-doubt")
+        yield from self._record_trial()
         panel.reset_action.trigger()
         yield 2 * _LOOK_MS
         self._save("fine-tune-back", panel)
 
     def _record_trial(self) -> Walk:
         wanted = self._trials() + 1
-        self._program.window.panels.trials.record_action.trigger()
+        self._record()
         yield from _until(lambda: self._trials() == wanted)
+
+    def _record(self) -> None:
+        self._program.window.panels.trials.record_action.trigger()
 
     def _trials(self) -> int:
         snapshot = self._program.live.snapshot

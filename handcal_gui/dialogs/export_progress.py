@@ -13,6 +13,7 @@ from handcal.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import named
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.numbers import counted
 
 _WHOLE = 1000
 _UNCHANGED = "the session and earlier exports are as they were"
@@ -54,7 +55,7 @@ class ExportProgress(QWidget):
         self._bar.setValue(_WHOLE)
         self._files.addItems([str(path.relative_to(folder)) for path in files])
         self._files.show()
-        count = f"{len(files)} file{'' if len(files) == 1 else 's'} in {folder}"
+        count = f"{counted(len(files), 'file')} in {folder}"
         url = QUrl.fromLocalFile(str(folder))
         self._end.show_finding(
             Finding("", Health.GOOD, count), "Open folder", lambda: QDesktopServices.openUrl(url)

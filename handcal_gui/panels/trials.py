@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
@@ -41,6 +42,8 @@ _HOW = (
     "the solved φ misses that."
 )
 
+_ZERO = "φ of the {} is as solved, so it would say 0 px. Press T again if the wearer sees no error."
+
 
 class TrialsPanel(QWidget):
     """Records trials and shows them.
@@ -50,11 +53,14 @@ class TrialsPanel(QWidget):
     record_action : QAction
     trial_requested : Signal(str, float)
         Eye, and the target's distance in metres.
+    doubted : Signal(str)
+        Why a trial is asked for only if the user asks again.
     delete_trial_requested, restore_trial_requested : Signal(int)
         The trial's number.
     """
 
     trial_requested = Signal(str, float)
+    doubted = Signal(str)
     delete_trial_requested = Signal(int)
     restore_trial_requested = Signal(int)
 
@@ -64,7 +70,7 @@ class TrialsPanel(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._snapshot: Snapshot | None = None
         self._record: SessionRecord | None = None
-        self._is_read_only = False
+        self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._fill_choices()
         self._make_record_action()
@@ -130,8 +136,18 @@ class TrialsPanel(QWidget):
             return f"The {EYE_NAMES[eye].lower()} has not been aligned."
         return ""
 
+    def _is_zero(self) -> bool:
+        """Tell whether the next trial would say that the solved φ misses nothing."""
+        procedure = self._snapshot.procedure if self._snapshot else None
+        if self._why_not() or procedure is None or procedure.results is None:
+            return False
+        eye = self._next_eye()
+        solved_m = procedure.results.shifts[eye].shift_m
+        return bool(np.allclose(procedure.applied_shift_m[eye], solved_m, rtol=0.0, atol=1e-6))
+
     def _refresh(self) -> None:
         why_not = self._why_not()
+        self._is_doubtful = self._is_doubtful and self._is_zero()
         self.record_action.setEnabled(not why_not)
         self._message.setText(why_not or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
 
@@ -141,7 +157,16 @@ class TrialsPanel(QWidget):
         self._strip.show_deletions([deletion for deletion in found if deletion.kind == "trial"])
 
     def _ask(self) -> None:
-        self.trial_requested.emit(self._next_eye(), self._depth.currentData())
+        """Ask for a trial; for one of 0 px, which may be a mistake, only if asked again."""
+        self._is_doubtful = self._is_zero() and not self._is_doubtful
+        if self._is_doubtful:
+            self.doubted.emit(_ZERO.format(EYE_NAMES[self._next_eye()].lower()))
+        else:
+            self.trial_requested.emit(self._next_eye(), self._depth.currentData())
+
+    def _choose_eye(self) -> None:
+        self._is_doubtful = False
+        self._refresh()
 
     def _fill_choices(self) -> None:
         self._eyes.setAccessibleName("Eye")
@@ -150,7 +175,7 @@ class TrialsPanel(QWidget):
             self._eyes.addItem(EYE_NAMES[eye], eye)
         self._eyes.addItem("Eyes in turn", None)
         self._eyes.setCurrentIndex(len(EYES))
-        self._eyes.currentIndexChanged.connect(self._refresh)
+        self._eyes.currentIndexChanged.connect(self._choose_eye)
         self._depth.setAccessibleName("Distance of the target")
         self._depth.setToolTip("Distance of the target from the eye, in metres")
         for depth_m in TARGET_DEPTHS_M:

@@ -12,6 +12,7 @@ from handcal.session import SessionRecord
 from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.times import local_time
 
 
@@ -76,7 +77,7 @@ class ReviewPage(QWidget):
         for name, fact in _facts(record, results, note):
             text = paragraph(f"review{name.replace(' ', '')}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            self._facts.addRow(name, text)
+            self._facts.addRow(QLabel(name, alignment=Qt.AlignmentFlag.AlignTop), text)
 
 
 def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
@@ -84,7 +85,7 @@ def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterato
     yield "Started", local_time(record.events[0].time)
     yield "Rig", record.rig.name
     state = "finished" if record.is_finished else "not finished"
-    counts = _count(len(record.alignments), "alignment"), _count(len(record.trials), "trial")
+    counts = counted(len(record.alignments), "alignment"), counted(len(record.trials), "trial")
     yield "Holds", f"{', '.join(counts)}; {state}"
     yield "Folder", str(record.path)
     for eye, verdict in results.verdicts.items() if results else ():
@@ -93,7 +94,3 @@ def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterato
         yield "Note", note
     if record.torn_bytes:
         yield "Journal", "The last line is unfinished, as after a crash."
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -70,7 +70,7 @@ class Live(QObject):
         self._is_watching = False
         panels = window.panels
         self._turns = deque((panels.cloud, panels.rotation, panels.wearer_view))
-        self._seen: set[Panel] = set()
+        self._seen: set[object] = set()  # panels
         self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
         self._complained_of = ""
         self._timer = QTimer(self)
@@ -95,6 +95,12 @@ class Live(QObject):
         self._stream.failed.connect(self._take_failure)
         self._stream.ended.connect(self._take_end)
         self._stream.start()
+
+    def cancel(self) -> None:
+        """Give up opening the station, without waiting; `ended` tells when it is closed again."""
+        if self._stream is not None:
+            self._stream.opened.disconnect(self._take_station)
+            self._stream.give_up()
 
     def stop(self) -> None:
         """End the calibration and wait for it; safe to call twice."""

@@ -71,9 +71,13 @@ class Stream(Worker):
         self._asked += 1
         return self._asked
 
+    def give_up(self) -> None:
+        """End the thread without waiting for it; `ended` tells when it has."""
+        self._closing.set()
+
     def close(self) -> None:
         """End the thread and close the station, and hear the last of it; safe to call twice."""
-        self._closing.set()
+        self.give_up()
         self.wait()
         self._hear_all()
 
@@ -81,7 +85,8 @@ class Stream(Worker):
         why = ""
         try:
             with self._open_station() as station:
-                self._say(self.opened.emit, station)
+                if not self._closing.is_set():
+                    self._say(self.opened.emit, station)
                 while not self._closing.is_set():
                     self._newest = station.step(), self._done
                     self._obey(station)

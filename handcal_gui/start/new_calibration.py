@@ -17,7 +17,7 @@ from handcal_gui.start.card import Card
 from handcal_gui.start.latest_job import LatestJob
 from handcal_gui.start.station_form import StationForm
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import main_button, named, paragraph
+from handcal_gui.widgets.fields import button, main_button, named, paragraph
 
 Check = Callable[[StationSettings, str], Mapping[Part, Finding]]
 
@@ -42,11 +42,14 @@ class NewCalibration(Card):
         Other settings are shown.
     rig_wanted : Signal()
         A rig is to be calibrated.
+    cancel_requested : Signal()
+        The station need not be opened after all.
     """
 
     start_requested = Signal(object, str)
     changed = Signal()
     rig_wanted = Signal()
+    cancel_requested = Signal()
 
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
@@ -57,6 +60,7 @@ class NewCalibration(Card):
         self.setObjectName("newCalibration")
         self._key = pairing_key
         self._starting: str | None = None
+        self._is_opening = False
         self._wearer = named(QComboBox(), "wearer", "Wearer's name or code")
         self._wearer.setLineEdit(
             QLineEdit(placeholderText="Name or code", maxLength=MAX_WEARER_CHARACTERS)
@@ -67,6 +71,11 @@ class NewCalibration(Card):
         self._problem = paragraph("startProblem")
         self._button = main_button("start", "Start calibration")
         self._button.setEnabled(False)
+        self._cancel = button("cancelOpening", "Cancel", help_text="Do not start after all (Esc)")
+        # Lest a second press of what started it cancels.
+        self._cancel.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._cancel.hide()
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._lay_out()
         self._check = LatestJob(lambda question: check(*question), self)
         self._check.answered.connect(self._take_findings)
@@ -79,6 +88,7 @@ class NewCalibration(Card):
         self._form.changed.connect(self.changed)
         self._form.rig_wanted.connect(self.rig_wanted)
         self._button.clicked.connect(self.start)
+        self._cancel.clicked.connect(self._give_up_opening)
         self.show_preferences(preferences)
 
     @property
@@ -106,7 +116,7 @@ class NewCalibration(Card):
 
     def check(self) -> None:
         """Look at the station as it is set up now, unless it may be in use or being opened."""
-        if self.isVisible() and self.isEnabled():
+        if self.isVisible() and not self._is_opening:
             self._check.ask(self._question())
 
     def start(self) -> None:
@@ -119,6 +129,20 @@ class NewCalibration(Card):
         self._button.setEnabled(False)
         self.check()
 
+    def set_opening(self, is_opening: bool) -> None:
+        """Let nothing be changed while a station is being opened, and offer to cancel that."""
+        self._is_opening = is_opening
+        self._form.setEnabled(not is_opening)
+        self._cancel.setVisible(is_opening)
+        self._cancel.setEnabled(True)
+        self._problem.setText("Opening camera and headset…" if is_opening else "")
+        if is_opening:
+            self._button.setEnabled(False)
+            self.setFocus()
+        else:
+            self._wearer.setFocus()
+            self.check()
+
     def stop(self) -> None:
         """Wait for the end of what runs in the background; before the program ends."""
         self._settle.stop()
@@ -126,9 +150,11 @@ class NewCalibration(Card):
         self._check.stop()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Start on Enter."""
+        """Start on Enter; while a station is being opened, cancel that on Esc."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self._button.click()
+        elif event.key() == Qt.Key.Key_Escape and self._is_opening:
+            self._cancel.click()
         else:
             super().keyPressEvent(event)
 
@@ -149,8 +175,8 @@ class NewCalibration(Card):
         return self._form.settings, self._key
 
     def _take_findings(self, question: object, findings: Mapping[Part, Finding]) -> None:
-        if question != self._question():
-            return  # the answer to what is shown now is on its way
+        if self._is_opening or question != self._question():
+            return  # or the answer to what is shown now is on its way
         self._form.show_findings(findings)
         broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
         self._problem.setText(f"To be mended first: {', '.join(broken)}." if broken else "")
@@ -158,6 +184,11 @@ class NewCalibration(Card):
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
             self.start_requested.emit(self._form.settings, wearer)
+
+    def _give_up_opening(self) -> None:
+        self._cancel.setEnabled(False)
+        self._problem.setText("Cancelling, once camera and headset are open…")
+        self.cancel_requested.emit()
 
     def _give_up(self, why: str) -> None:
         self._starting = None
@@ -167,6 +198,7 @@ class NewCalibration(Card):
         last = QHBoxLayout()
         last.setSpacing(SPACING_PX)
         last.addWidget(self._problem, 1)
+        last.addWidget(self._cancel)
         last.addWidget(self._button)
         self.body.addWidget(self._form)
         self.body.addLayout(last)

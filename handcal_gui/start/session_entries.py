@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handcal.errors import FileError
+from handcal.history import History
 from handcal.journal import read_journal
 from handcal.unfinished import UnfinishedSession, unfinished_sessions
+from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.times import local_time
 
 
@@ -40,15 +42,16 @@ class Offers:
 def find_offers(folder: Path, recent: Sequence[Path]) -> Offers:
     """Look through the folder of the sessions, and at those opened last; takes a while.
 
-    An unfinished session that holds nothing yet is not worth resuming.
+    A session that holds nothing is not worth either.
     """
+    offered = (_recent(path) for path in recent if path.exists())
     return Offers(
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished_sessions(folder)
             if session.problem or session.alignments or session.trials
         ),
-        recent=tuple(_recent(path) for path in recent if path.exists()),
+        recent=tuple(entry for entry in offered if entry is not None),
     )
 
 
@@ -56,17 +59,26 @@ def _unfinished(session: UnfinishedSession) -> Entry:
     if session.problem:
         text = f"{session.path.name}: {session.problem}"
         return Entry(session.path, text, is_enabled=False)
-    count = f"{session.alignments} alignment{'' if session.alignments == 1 else 's'}"
-    return Entry(session.path, f"{_title(session.wearer, session.started)} · {count}")
+    text = _text(session.wearer, session.started, session.alignments, session.trials)
+    return Entry(session.path, text)
 
 
-def _recent(path: Path) -> Entry:
+def _recent(path: Path) -> Entry | None:
+    history = History()
     try:
-        created = read_journal(path / "journal.jsonl").events[0]
-    except (FileError, IndexError) as error:
-        return Entry(path, f"{path.name}: {error or 'empty'}", is_enabled=False)
-    return Entry(path, _title(str(created.data.get("wearer", "")), created.time))
+        events = read_journal(path / "journal.jsonl").events
+        for event in events:
+            history.take(event)
+    except (FileError, ValueError) as error:
+        return Entry(path, f"{path.name}: {error}", is_enabled=False)
+    alignments, trials = history.alignments, history.trials
+    if not (alignments.kept or alignments.deleted or trials.kept or trials.deleted):
+        return None
+    text = _text(history.wearer, events[0].time, len(alignments.kept), len(trials.kept))
+    return Entry(path, text)
 
 
-def _title(wearer: str, started: str) -> str:
-    return f"{wearer or 'No name'} · {local_time(started)}"
+def _text(wearer: str, started: str, alignments: int, trials: int) -> str:
+    held = ((alignments, "alignment"), (trials, "trial"))
+    counts = ", ".join(counted(number, what) for number, what in held if number)
+    return " · ".join(filter(None, (wearer or "Without a name", local_time(started), counts)))

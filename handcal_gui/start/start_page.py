@@ -41,12 +41,15 @@ class StartPage(QWidget):
         A session's folder.
     rig_wanted : Signal()
         A rig is to be calibrated.
+    cancel_requested : Signal()
+        The station need not be opened after all.
     """
 
     start_requested = Signal(object, str)
     open_requested = Signal(object)
     resume_requested = Signal(object)
     rig_wanted = Signal()
+    cancel_requested = Signal()
 
     def __init__(
         self,
@@ -81,6 +84,7 @@ class StartPage(QWidget):
         self._find.answered.connect(self._take_offers)
         self.new.start_requested.connect(self.start_requested)
         self.new.rig_wanted.connect(self.rig_wanted)
+        self.new.cancel_requested.connect(self.cancel_requested)
         self.new.changed.connect(self._look_in_another_folder)
         self._unfinished.chosen.connect(self.resume_requested)
         self._opened.chosen.connect(self.open_requested)
@@ -100,6 +104,12 @@ class StartPage(QWidget):
     def set_pairing_key(self, pairing_key: str) -> None:
         """Take another key for network headsets."""
         self.new.set_pairing_key(pairing_key)
+
+    def set_opening(self, is_opening: bool) -> None:
+        """Offer nothing but to cancel while a station is being opened."""
+        self.new.set_opening(is_opening)
+        for card in (self._resume, self._open):
+            card.setEnabled(not is_opening)
 
     def browse(self) -> None:
         """Ask for a session's folder, to be opened."""

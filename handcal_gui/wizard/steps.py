@@ -12,6 +12,7 @@ import numpy as np
 from handcal.calibrate import State
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye
+from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.sentence import sentence
 
 EyePlan = Literal["both", "each", "left", "right"]
@@ -241,7 +242,7 @@ class Wizard:
     def _solve(self, snapshot: Snapshot) -> View:
         procedure = snapshot.procedure
         count = len(snapshot.procedure.alignments)
-        aligned = Check(f"{count} alignment{'' if count == 1 else 's'} confirmed", True)
+        aligned = Check(f"{counted(count, 'alignment')} confirmed", True)
         redo = Offer(Action.REDO, "Discard and repeat")
         if procedure.state is State.ALIGNED or procedure.results is None:
             return View(

@@ -1,4 +1,4 @@
-"""The command line: what is wrong is one line and exit status 2."""
+"""The command line: what is wrong is one line, and the exit status tells."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ START_S = 40.0
 
 
 def complaint(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *words: str
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    *words: str,
+    code: int = 2,
 ) -> str:
-    """Return the one line that the program ends with, exit status 2."""
+    """Return the one line that the program ends with."""
     monkeypatch.setattr(sys, "argv", ["handcal-gui", *words])
     with pytest.raises(SystemExit) as ended:
         app.main()
     errors = capsys.readouterr().err
-    assert ended.value.code == 2
+    assert ended.value.code == code
     assert errors.count("\n") == 1
     assert errors.startswith("handcal-gui: ")
     return errors
@@ -67,7 +70,9 @@ def test_without_a_display(
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
         monkeypatch.delenv(name, raising=False)
-    assert "handcal demo" in complaint(capsys, monkeypatch)
+    assert "handcal demo" in complaint(capsys, monkeypatch, code=1)
+    monkeypatch.setenv("DISPLAY", ":4711")
+    assert "no X server answers at DISPLAY=:4711" in complaint(capsys, monkeypatch, code=1)
 
 
 def test_help_tells_every_option(
@@ -91,6 +96,17 @@ def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -
     assert process.returncode == 2, errors
     assert errors.count("\n") == 1
     assert "file" in errors
+
+
+def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
+    (tmp_path / "pictures" / "start.png").mkdir(parents=True)
+    process = run(
+        "--screenshots", tmp_path / "pictures", "--preferences", tmp_path / "preferences.json"
+    )
+    _, errors = process.communicate(timeout=START_S)
+    assert (process.returncode, errors.count("\n")) == (1, 1), errors
+    assert "cannot write" in errors
+    assert "start.png" in errors
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what a process listens to is told by Linux")

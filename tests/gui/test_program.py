@@ -18,6 +18,7 @@ from pytestqt.qtbot import QtBot
 from handcal.calibrate import State
 from handcal.session import Session, SessionRecord
 from handcal.snapshot import Snapshot
+from handcal.station import Station
 from handcal_gui import launch
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -113,6 +114,11 @@ def live(technician: Technician, studio: Any) -> Technician:
     technician.wait_for_page("live")
     technician.wait(lambda: technician.snapshot.link.connected)
     return technician
+
+
+def can_start(technician: Technician) -> bool:
+    """Tell whether the start page offers to start a calibration."""
+    return bool(technician.child(QPushButton, "start").isEnabled())
 
 
 def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:
@@ -372,7 +378,32 @@ def test_a_session_in_use_elsewhere_cannot_be_resumed(
         technician.program.resume_session(record.path)
         technician.wait(lambda: "in use by process" in technician.banner)
         assert technician.program.window.page == "start"
-        assert technician.program.start.isEnabled()
+        technician.wait(lambda: can_start(technician))
+
+
+def test_opening_a_station_can_be_cancelled(
+    technician: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_open = threading.Event()
+
+    def open_slowly(*arguments: Any, **options: Any) -> Station:
+        assert may_open.wait(PATIENCE_MS / 1000)
+        return Station(*arguments, **options)
+
+    monkeypatch.setattr("handcal_gui.program.Station", open_slowly)
+    start = technician.program.start
+    technician.wait(lambda: can_start(technician))
+    technician.program.start_calibration(studio.settings, "Ada")
+    assert not can_start(technician)
+    QTest.keyClick(start.new, Qt.Key.Key_Return)  # the second of two in a hurry
+    QTest.keyClick(start.new, Qt.Key.Key_Escape)
+    assert not technician.child(QPushButton, "cancelOpening").isEnabled()
+    may_open.set()
+    technician.wait(lambda: can_start(technician))
+    assert technician.program.window.page == "start"
+    assert not technician.child(QPushButton, "cancelOpening").isVisible()
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
 
 
 def test_a_session_broken_off_is_offered_and_gone_on_with(
@@ -438,4 +469,4 @@ def test_an_error_that_nobody_expected_is_logged_and_told(
     assert "ZeroDivisionError: oh" in technician.banner
     assert "broke down" in caplog.text
     technician.program.show_start()
-    assert technician.program.start.isEnabled()
+    technician.wait(lambda: can_start(technician))

@@ -122,6 +122,19 @@ def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: M
     qtbot.waitUntil(lambda: has_title(window, "results"))
 
 
+def test_the_space_bar_is_the_wizards_in_a_dock_of_its_own_too(
+    qtbot: QtBot, window: MainWindow
+) -> None:
+    window.show_page("live")
+    dock = window.docks["link"]
+    dock.setFloating(True)
+    with qtbot.waitSignal(window.space_pressed, timeout=1000):
+        QTest.keyClick(dock.widget(), Qt.Key.Key_Space)
+    window.banner.show_message("Could not solve")
+    QTest.keyClick(dock.widget(), Qt.Key.Key_Escape)
+    assert window.banner.text == ""
+
+
 def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:
     window.show_page("live")
     wizard = window.centralWidget()

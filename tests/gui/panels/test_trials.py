@@ -42,6 +42,13 @@ def tried(record: SessionRecord, rig: Rig) -> SessionRecord:
     return Session.open(record.path)
 
 
+def tuned(snapshot: Callable[..., Snapshot]) -> Snapshot:
+    """Return what is there once φ of both eyes has been moved by hand."""
+    applied_m = snapshot(State.APPLIED).procedure.applied_shift_m
+    moved_m = {eye: shift_m + 1e-3 for eye, shift_m in applied_m.items()}
+    return snapshot(State.APPLIED, procedure={"applied_shift_m": moved_m})
+
+
 def label(panel: TrialsPanel, name: str) -> str:
     [label] = panel.findChildren(QLabel, name)
     return label.text()
@@ -83,7 +90,7 @@ def test_needs_the_eye_to_be_solved(
 def test_asks_for_a_trial_by_key(
     qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
 ) -> None:
-    panel.show_snapshot(snapshot(State.APPLIED))
+    panel.show_snapshot(tuned(snapshot))
     choose(panel, "Eye", "Right eye")
     choose(panel, "Distance of the target", "0.6 m")
     panel.setFocus()
@@ -99,10 +106,32 @@ def test_the_key_works_beside_the_panel(qtbot: QtBot, snapshot: Callable[..., Sn
     with qtbot.waitActive(window):
         window.show()
         window.activateWindow()
-    panel.show_snapshot(snapshot(State.APPLIED))
+    panel.show_snapshot(tuned(snapshot))
     beside.setFocus()
     with qtbot.waitSignal(panel.trial_requested):
         QTest.keyClick(beside, Qt.Key.Key_T)
+
+
+def test_a_trial_of_nothing_must_be_asked_for_twice(
+    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
+) -> None:
+    asked: list[tuple[str, float]] = []
+    panel.trial_requested.connect(lambda eye, depth_m: asked.append((eye, depth_m)))
+    panel.show_snapshot(snapshot(State.APPLIED))
+    with qtbot.waitSignal(panel.doubted) as doubted:
+        panel.record_action.trigger()
+    assert doubted.args is not None
+    assert "φ of the left eye is as solved, so it would say 0 px" in doubted.args[0]
+    choose(panel, "Eye", "Right eye")
+    assert asked == []
+    for _ in range(2):
+        panel.record_action.trigger()
+    assert asked == [("right", 0.4)]
+    panel.record_action.trigger()  # the doubt is new with every trial
+    assert len(asked) == 1
+    panel.show_snapshot(tuned(snapshot))
+    panel.record_action.trigger()
+    assert len(asked) == 2
 
 
 def test_takes_the_eyes_in_turn(
@@ -112,9 +141,9 @@ def test_takes_the_eyes_in_turn(
     tried: SessionRecord,
     rig: Rig,
 ) -> None:
-    panel.show_snapshot(snapshot(State.APPLIED))
+    panel.show_snapshot(tuned(snapshot))
     assert label(panel, "message") == "Next: left eye"
-    panel.show_snapshot(snapshot(State.APPLIED, record=tried))
+    panel.show_snapshot(replace(tuned(snapshot), record=tried))
     assert label(panel, "message") == "Next: right eye"
     with qtbot.waitSignal(panel.trial_requested) as asked:
         tool(panel, "Record trial").click()

@@ -42,14 +42,21 @@ def test_a_damaged_session_is_told_with_the_reason(tmp_path: Path, alignment: Al
     assert "rig.yaml is damaged" in entry.text
 
 
-def test_recent_sessions_that_are_gone_are_left_out(tmp_path: Path) -> None:
-    nameless = make(tmp_path, "", [], is_done=True)
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    recent = find_offers(tmp_path / "nowhere", [tmp_path / "gone", nameless, empty]).recent
+def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    nameless = make(tmp_path, "", [alignment, alignment], is_done=True)
+    with Session(nameless) as session:
+        session.delete_alignment(1)
+    unused = make(tmp_path, "Cid", [], is_done=True)
+    damaged = tmp_path / "damaged"
+    damaged.mkdir()
+    paths = [tmp_path / "gone", nameless, unused, damaged]
+    recent = find_offers(tmp_path / "nowhere", paths).recent
     assert [(entry.path, entry.is_enabled) for entry in recent] == [
         (nameless, True),
-        (empty, False),
+        (damaged, False),
     ]
-    assert recent[0].text.startswith("No name · ")
+    assert recent[0].text.startswith("Without a name · ")
+    assert recent[0].text.endswith(" · 1 alignment")
     assert "journal.jsonl" in recent[1].text

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from handcal_gui.widgets.numbers import signed
+from handcal_gui.widgets.numbers import counted, signed
 
 
 @pytest.mark.parametrize(
@@ -11,3 +11,7 @@ from handcal_gui.widgets.numbers import signed
 )
 def test_sign(value: float, decimals: int, text: str) -> None:
     assert signed(value, decimals) == text
+
+
+def test_more_than_one_is_many() -> None:
+    assert [counted(number, "trial") for number in (0, 1, 2)] == ["0 trials", "1 trial", "2 trials"]
