@@ -171,9 +171,9 @@ def convert(arguments: argparse.Namespace) -> None:
 
 def add_rig_commands(commands: Commands) -> None:
     """Add ``handcal rig board, take, camera, stereo, convert``."""
-    from handcal.rig.board_print import PAPERS
     from handcal.rig.camera import LensModel
     from handcal.rig.formats import FORMATS
+    from handcal.rig.print_page import PAPERS
     from handcal.rig.views import MAX_VIEWS
 
     one = add_command(commands, board, json=False)

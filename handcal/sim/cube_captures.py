@@ -99,8 +99,8 @@ def write_captures(
 ) -> None:
     """Write the captures of a test, `camera.json`, `cube.json`, and the truth, `truth.json`.
 
-    The cube is drawn with the offline calibration (``virtual-before``), with φ solved from the
-    alignments (``virtual-after``), and with the true φ (``virtual-truth``), which shows what the
+    The cube is drawn with the offline calibration (``virtual-offline``), with φ solved from the
+    alignments (``virtual-solved``), and with the true φ (``virtual-true``), which shows what the
     test itself cannot tell.
 
     Parameters
@@ -129,7 +129,7 @@ def write_captures(
         solved_m = studio.calibrate(true_m, rng)
         truth[position] = {"true_shift_m": true_m.tolist(), "solved_shift_m": solved_m.tolist()}
         T_E_C = rigid(rng.normal(0.0, settings.turn_sigma_rad, 3), true_m)
-        shifts_m = {"before": np.zeros(3), "after": solved_m, "truth": true_m}
+        shifts_m = {"offline": np.zeros(3), "solved": solved_m, "true": true_m}
         place = make_folder(folder / position)
         write_png(place / "grid.png", studio.capture_display(studio.grid, T_E_C, rng))
         for pose in range(settings.poses):

@@ -21,7 +21,8 @@ from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
 from handcal.image_file import write_png
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
-from handcal.rig.board_print import Paper, draw_board, write_board_pdf
+from handcal.rig.board_print import draw_board, write_board_pdf
+from handcal.rig.print_page import Paper
 from handcal.types import UInt8
 from handcal_gui.rig.draft import Draft
 from handcal_gui.start.latest_job import LatestJob

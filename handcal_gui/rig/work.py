@@ -12,8 +12,8 @@ from handcal.errors import FileError
 from handcal.files import make_folder, read_json, write_json
 from handcal.resources import resource_path
 from handcal.rig.board import Board
-from handcal.rig.board_print import Paper
 from handcal.rig.camera import LensModel
+from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.types import Rig
 
