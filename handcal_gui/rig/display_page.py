@@ -16,11 +16,11 @@ from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid
 from handcal.types import Eye
 from handcal_gui.rig.draft import Draft
-from handcal_gui.rig.form import EntriesForm
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.solve import Solved, grid_of, solve_display
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.work import DisplayEntries, Distance
+from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
 

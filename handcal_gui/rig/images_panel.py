@@ -13,11 +13,11 @@ from handcal.doctor import Finding, Health
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
 from handcal_gui.rig.coverage_map import CoverageMap
-from handcal_gui.rig.job_bar import JobBar
 from handcal_gui.rig.shot_list import ShotList
 from handcal_gui.rig.shot_view import ShotView
 from handcal_gui.rig.shots import Shot, look
 from handcal_gui.rig.solve import Solved
+from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine

@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.rig.draft import Draft
-from handcal_gui.rig.form import EntriesForm
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.solve_box import SolveBox
 from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.entries_form import EntriesForm
 
 
 class StepPage(QWidget):

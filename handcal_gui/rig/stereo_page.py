@@ -9,10 +9,11 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.rig_take import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.rig.draft import Draft
-from handcal_gui.rig.form import INTRINSICS_FILES, EntriesForm, intrinsics_field, lens_field
 from handcal_gui.rig.images_panel import ImagesPanel
+from handcal_gui.rig.lens_fields import INTRINSICS_FILES, intrinsics_field, lens_field
 from handcal_gui.rig.solve import Solved, solve_stereo
 from handcal_gui.rig.step_page import StepPage
+from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import PathField
 
 _HINT = (

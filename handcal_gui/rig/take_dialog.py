@@ -26,8 +26,8 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.views import View, view
 from handcal.rig_take import keep_imager, keep_images, see_board
-from handcal_gui.rig.job_bar import JobBar
 from handcal_gui.rig.live import Images, LiveImages
+from handcal_gui.running.job_bar import JobBar
 from handcal_gui.running.jobs import IsCancelled, Report
 from handcal_gui.start.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX

@@ -9,10 +9,11 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.doctor import Finding, Health
 from handcal_gui.rig.draft import Draft
-from handcal_gui.rig.form import INTRINSICS_FILES, EntriesForm, lens_field
 from handcal_gui.rig.images_panel import ImagesPanel
+from handcal_gui.rig.lens_fields import INTRINSICS_FILES, lens_field
 from handcal_gui.rig.solve import Solved, solve_viewpoint
 from handcal_gui.rig.step_page import StepPage
+from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import PathField
 
 _HINT = (

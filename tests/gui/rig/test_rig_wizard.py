@@ -15,11 +15,11 @@ from pytestqt.qtbot import QtBot
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
-from handcal_gui.rig.job_bar import JobBar
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import WorkFolder
+from handcal_gui.running.job_bar import JobBar
 
 BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError, FileError
-from handcal_gui.rig.job_bar import JobBar
+from handcal_gui.running.job_bar import JobBar
 from handcal_gui.running.jobs import IsCancelled, Report
 
 

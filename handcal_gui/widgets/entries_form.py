@@ -1,4 +1,4 @@
-"""The entries of a step as fields in two columns."""
+"""Some entries, kept in a dataclass, as fields in two columns."""
 
 from __future__ import annotations
 
@@ -7,39 +7,16 @@ from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QSpinBox, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QLineEdit, QSpinBox, QWidget
 
-from handcal.rig.camera import LensModel
-from handcal_gui.rig.work import DisplayEntries, StereoEntries, ViewpointEntries
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.path_field import PathField
 
-Entries = TypeVar("Entries", StereoEntries, ViewpointEntries, DisplayEntries)
-
-INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
-_LENSES: dict[LensModel, str] = {
-    "none": "No distortion",
-    "radial": "k1, k2",
-    "full": "k1, k2, p1, p2, k3",
-    "rational": "k1 to k6, p1, p2",
-}
-
-
-def intrinsics_field(name: str) -> PathField:
-    """Return a field for a file of intrinsics that are solved if there is none."""
-    field = PathField(name, "file", INTRINSICS_FILES, "Solved from the images")
-    field.setToolTip("OpenCV's FileStorage, ROS's camera_info or handcal's JSON.")
-    return field
-
-
-def lens_field() -> QComboBox:
-    """Return a choice of lens models."""
-    return choice("lens", "Lens", _LENSES, "Coefficients of distortion to solve for.")
+Entries = TypeVar("Entries")
 
 
 class EntriesForm(QWidget):
-    """Shows some fields of a dataclass of entries.
+    """Shows some fields of a dataclass: paths, choices, texts and whole numbers.
 
     Parameters
     ----------
@@ -86,7 +63,8 @@ class EntriesForm(QWidget):
 
     def take(self, entries: Entries) -> Entries:
         """Return entries with what is shown."""
-        return replace(entries, **{name: _value(field) for name, field in self._fields.items()})
+        shown = {name: _value(field) for name, field in self._fields.items()}
+        return cast(Entries, replace(cast(Any, entries), **shown))
 
 
 def _change_of(field: QWidget) -> Any:
@@ -94,6 +72,8 @@ def _change_of(field: QWidget) -> Any:
         return field.changed
     if isinstance(field, QComboBox):
         return field.currentIndexChanged
+    if isinstance(field, QLineEdit):
+        return field.textChanged
     return cast(QSpinBox, field).valueChanged
 
 
@@ -102,6 +82,8 @@ def _show(field: QWidget, value: Any) -> None:
         field.set_path(value)
     elif isinstance(field, QComboBox):
         field.setCurrentIndex(field.findData(value))
+    elif isinstance(field, QLineEdit):
+        field.setText(value)
     else:
         cast(QSpinBox, field).setValue(value)
 
@@ -111,4 +93,6 @@ def _value(field: QWidget) -> Any:
         return field.path
     if isinstance(field, QComboBox):
         return field.currentData()
+    if isinstance(field, QLineEdit):
+        return field.text().strip()
     return cast(QSpinBox, field).value()
