@@ -11,8 +11,9 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from handcal.cube_commands import add_cube_commands
 from handcal.files import make_folder
-from handcal.terminal import Commands, add_command, console, progress, save, table
+from handcal.terminal import Commands, Parser, add_command, console, progress, save, table
 
 
 def detector(arguments: argparse.Namespace) -> None:
@@ -80,6 +81,10 @@ def users(arguments: argparse.Namespace) -> None:
 
 def add_evaluate_commands(commands: Commands) -> None:
     """Add ``handcal evaluate …``."""
+    text = "The camera-based test: how far a drawn cube is from the real one."
+    cube = commands.add_parser("cube", help=text, description=text)
+    add_cube_commands(cube.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser))
+
     one = add_command(commands, detector)
     one.add_argument("--images", type=Path, required=True, help="folder of photographs")
     one.add_argument("--annotations", type=Path, required=True, help="JSON: the hands in them")
