@@ -204,13 +204,17 @@ def headset(arguments: argparse.Namespace) -> None:
 
 def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, each beside its target and a baseline of the same run."""
-    from handcal.bench import QUICK, BenchSettings, bench_table, run_bench
+    from handcal.bench import PARTS, QUICK, BenchSettings, bench_table, run_bench
 
+    if arguments.only not in ("", *PARTS):
+        fail(f"there is no part {arguments.only}; there are {', '.join(PARTS)}", 2)
     if arguments.gui:
         result = _bench_window(300 if arguments.quick else 20_000)
     else:
         with progress() as report:
-            result = run_bench(QUICK if arguments.quick else BenchSettings(), report)
+            result = run_bench(
+                QUICK if arguments.quick else BenchSettings(), report, arguments.only
+            )
     save(arguments.json, result)
     shown_table = table("what", "measured", "target", "met")
     for row in bench_table(result):
@@ -360,6 +364,7 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add(bench)
     one.add_argument("--quick", action="store_true", help="few repetitions: only a look")
+    one.add_argument("--only", metavar="PART", default="", help="one part, such as offline")
     one.add_argument(
         "--gui",
         action="store_true",

@@ -8,7 +8,7 @@ fact, to judge the result.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,21 +16,13 @@ from typing import Any, Literal
 import numpy as np
 
 from handcal.calibrate import Calibration, Observation, State
-from handcal.display import (
-    TARGET_DEPTHS_M,
-    arcmin_from_px,
-    eye_projection,
-    projection_matrix,
-    target_corners_m,
-    view_of_eye,
-)
+from handcal.display import reprojection_arcmin
 from handcal.errors import HandcalError
-from handcal.geometry import invert, project, transform
 from handcal.register.solve import solve_alignment
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station import Station
 from handcal.station_settings import StationSettings
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.types import EYES, Eye, Rig
 
 EyePlan = Literal["both", "each"]
 Report = Callable[[str, float], None]
@@ -119,41 +111,6 @@ def run_demo(
         },
         "timing_ms": _timing(calibration, rig, observations),
     }
-
-
-def reprojection_arcmin(
-    rig: Rig,
-    shifts_m: Mapping[Eye, Float64],
-    true_shifts_m: Mapping[Eye, Float64],
-    worn_rig: Rig | None = None,
-) -> float:
-    """Return the mean error seen by the true eyes, in arcmin.
-
-    At the corners of the user test's target at its three distances, tracked by the depth camera.
-
-    Parameters
-    ----------
-    rig : Rig
-        The one rendered with.
-    shifts_m : mapping of eye to (3,) float64
-        φ rendered with, from the C0 of `rig`.
-    true_shifts_m : mapping of eye to (3,) float64
-        φ of the true eyes, from the C0 of `worn_rig`.
-    worn_rig : Rig, optional
-        The true one, if it is another.
-    """
-    worn_rig = worn_rig or rig
-    corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
-    T_H_H = rig.T_H_D @ invert(worn_rig.T_H_D)  # how far off the tracked target is
-    errors = []
-    for eye in EYES:
-        worn = worn_rig.eyes[eye]
-        T_E_H = view_of_eye(worn, np.eye(4))
-        target_V_m = transform(worn.T_V_H @ T_H_H @ invert(T_E_H), corners_E_m)
-        drawn_px = project(projection_matrix(rig.eyes[eye], shifts_m[eye]), target_V_m)
-        needed_px = project(eye_projection(worn, true_shifts_m[eye]), corners_E_m)
-        errors.append(arcmin_from_px(worn, np.linalg.norm(drawn_px - needed_px, axis=1)))
-    return float(np.mean(errors))
 
 
 def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> list[Observation]:

@@ -6,13 +6,14 @@ Pixel of world point v seen from the offline viewpoint C0: ``ζ m = K H0 E0 v``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.geometry import invert, project, rigid
-from handcal.types import EyeDisplay, Float64
+from handcal.geometry import invert, project, rigid, transform
+from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig
 
 TARGET_SIDE_M = 0.08
 TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
@@ -159,3 +160,38 @@ def effect_at(
         up_arcmin=float(up_arcmin),
         size_ratio=diagonal_px[1] / diagonal_px[0],
     )
+
+
+def reprojection_arcmin(
+    rig: Rig,
+    shifts_m: Mapping[Eye, Float64],
+    true_shifts_m: Mapping[Eye, Float64],
+    worn_rig: Rig | None = None,
+) -> float:
+    """Return the mean error seen by the true eyes, in arcmin.
+
+    At the corners of the user test's target at its three distances, tracked by the depth camera.
+
+    Parameters
+    ----------
+    rig : Rig
+        The one rendered with.
+    shifts_m : mapping of eye to (3,) float64
+        φ rendered with, from the C0 of `rig`.
+    true_shifts_m : mapping of eye to (3,) float64
+        φ of the true eyes, from the C0 of `worn_rig`.
+    worn_rig : Rig, optional
+        The true one, if it is another.
+    """
+    worn_rig = worn_rig or rig
+    corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
+    T_H_H = rig.T_H_D @ invert(worn_rig.T_H_D)  # how far off the tracked target is
+    errors = []
+    for eye in EYES:
+        worn = worn_rig.eyes[eye]
+        T_E_H = view_of_eye(worn, np.eye(4))
+        target_V_m = transform(worn.T_V_H @ T_H_H @ invert(T_E_H), corners_E_m)
+        drawn_px = project(projection_matrix(rig.eyes[eye], shifts_m[eye]), target_V_m)
+        needed_px = project(eye_projection(worn, true_shifts_m[eye]), corners_E_m)
+        errors.append(arcmin_from_px(worn, np.linalg.norm(drawn_px - needed_px, axis=1)))
+    return float(np.mean(errors))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from handcal.__main__ import main
-from handcal.demo import reprojection_arcmin
+from handcal.display import reprojection_arcmin
 from handcal.geometry import rigid
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session import Session

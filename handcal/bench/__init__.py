@@ -1,6 +1,6 @@
 """How well and how fast handcal does what it promises, measured on this machine."""
 
-from handcal.bench.run import bench_table, run_bench
+from handcal.bench.run import PARTS, bench_table, run_bench
 from handcal.bench.settings import QUICK, BenchSettings
 
-__all__ = ["QUICK", "BenchSettings", "bench_table", "run_bench"]
+__all__ = ["PARTS", "QUICK", "BenchSettings", "bench_table", "run_bench"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.bench.figure import Figure
 from handcal.bench.settings import BenchSettings
+from handcal.bench.stand_in import ratio_of_means, reprojection_of_wearers
 from handcal.bench.trials import Measured, Progress
 from handcal.display import view_of_eye
 from handcal.geometry import image_points, invert, rigid
@@ -31,6 +32,7 @@ from handcal.rig.viewpoint import viewpoint_from_stereo
 from handcal.rig.views import View, view
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
+from handcal.statistics import MeanInterval
 from handcal.types import EYES, Eye, Float64, Intrinsics, Rig
 
 HEADSET_CAMERA = Intrinsics(
@@ -38,6 +40,7 @@ HEADSET_CAMERA = Intrinsics(
 )
 _MADE = "simulated"
 _CAMERA_TURN_RAD = 0.04
+_MOST_RATIO = 1.1
 # The manufacturer's figures of the example's displays: 2,456 px of focal length at 2 m.
 _KNOWN_PIXELS = DisplaySettings(pixel_m=pixel_size_m(2.0 * np.arctan(0.5 / FOCAL_PX), 1.0, Z_E_S_M))
 _FIGURES = (
@@ -106,15 +109,41 @@ def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
     runs = []
     for seed in range(settings.offline_rigs):
         runs.append(calibrate_from_photographs(example_rig(), seed))
-        progress((seed + 1) / settings.offline_rigs)
+        progress(0.5 * (seed + 1) / settings.offline_rigs)
+    ratios = _stand_in_ratios([run.rig for run in runs], settings.offline_wearers, progress)
     progress(1.0)
     figures = [
         Figure(what, max(scale * getattr(run, name) for run in runs), unit, at_most=target)
         for what, name, scale, unit, target in _FIGURES
         if runs
     ]
-    rows = [{name: getattr(run, name) for _, name, *_ in _FIGURES} for run in runs]
+    if ratios:
+        worst = max(ratios, key=lambda one: one.mean)
+        what = "offline: reprojection error, calibrated / true rig"
+        figures += [
+            Figure(what, worst.mean, "", at_most=_MOST_RATIO),
+            Figure(f"{what}: least by 95 %", worst.low, ""),
+            Figure(f"{what}: most by 95 %", worst.high, ""),
+        ]
+    rows = [
+        {name: getattr(run, name) for _, name, *_ in _FIGURES} | {"reprojection_ratio": asdict(one)}
+        for run, one in zip(runs, ratios, strict=True)
+    ]
     return Measured(figures, rows)
+
+
+def _stand_in_ratios(rigs: list[Rig], wearers: int, progress: Progress) -> list[MeanInterval]:
+    """Return, for each rig in place of the true one, the ratio of wearers' reprojection errors."""
+    if not rigs:
+        return []
+    errors = []
+    for number, rig in enumerate([example_rig(), *rigs]):
+
+        def told(share: float, number: int = number) -> None:
+            progress(0.5 + 0.5 * (number + share) / (1 + len(rigs)))
+
+        errors.append(reprojection_of_wearers(rig, example_rig(), wearers, told))
+    return [ratio_of_means(one, errors[0]) for one in errors[1:]]
 
 
 def calibrate_from_photographs(

@@ -18,7 +18,7 @@ from handcal.bench.speed import measure_speed
 from handcal.bench.trials import Measured, Progress
 from handcal.bench.wearer import measure_wearer
 
-_PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
+PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "speed": measure_speed,
     "delivery": measure_delivery,
     "wearer": measure_wearer,
@@ -32,15 +32,19 @@ _MET = {True: "met", False: "missed", None: ""}
 
 
 def run_bench(
-    settings: BenchSettings, report: Callable[[str, float], None] | None = None
+    settings: BenchSettings,
+    report: Callable[[str, float], None] | None = None,
+    only: str = "",
 ) -> dict[str, Any]:
-    """Measure everything, one part after the other.
+    """Measure everything, one part after the other, or only one of `PARTS`.
 
     Parameters
     ----------
     settings : BenchSettings
     report : callable, optional
         Is told the name of the part being measured, and the fraction of that part that is done.
+    only : str
+        A part's name; empty measures all.
 
     Returns
     -------
@@ -49,7 +53,9 @@ def run_bench(
         None without a target), and ``details`` by part.
     """
     measured: dict[str, Measured] = {}
-    for name, measure in _PARTS.items():
+    for name, measure in PARTS.items():
+        if only not in ("", name):
+            continue
 
         def progress(fraction: float, name: str = name) -> None:
             if report is not None:

@@ -29,6 +29,8 @@ class BenchSettings:
         The same for ``paper``.
     offline_rigs : int
         Rigs calibrated from rendered photographs, at some minutes each.
+    offline_wearers : int
+        Who calibrate with each of them, and with the true rig.
     """
 
     points: int = 5000
@@ -40,6 +42,7 @@ class BenchSettings:
     repeats: int = 25
     paper_repeats: int = 3
     offline_rigs: int = 1
+    offline_wearers: int = 100
 
 
 QUICK = BenchSettings(

@@ -31,6 +31,7 @@ def overlay_by_eye(
     *,
     slip: Slip = _NO_SLIP,
     drawn_shift_m: Mapping[Eye, Float64] | None = None,
+    worn_rig: Rig | None = None,
 ) -> Alignment:
     """Let a person overlay the own hand on its cursor.
 
@@ -49,36 +50,38 @@ def overlay_by_eye(
         By how much the overlay misses.
     drawn_shift_m : mapping of eye to (3,) float64, optional
         φ that the cursor is drawn with; the offline calibration by default.
+    worn_rig : Rig, optional
+        The true one, if it is another than the `rig` that the engine knows.
 
     Returns
     -------
     Alignment
         In H for W: the head keeps still.
     """
+    worn = worn_rig or rig
 
     def see(T_H_hand: Float64) -> tuple[Float64, Bool]:
         points_D_m, is_cut = visible_points(
             hand,
-            invert(rig.T_H_D) @ T_H_hand,
+            invert(worn.T_H_D) @ T_H_hand,
             points,
             rng,
-            intrinsics=rig.depth_intrinsics,
+            intrinsics=worn.depth_intrinsics,
             forearm_m=_FOREARM_M,
             depth_sigma_m=depth_sigma_m,
         )
         return transform(rig.T_H_D, points_D_m), is_cut
 
     drawn_m = {eye: np.zeros(3) for eye in EYES} | dict(drawn_shift_m or {})
-    T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
     palm_m = _PALM_H_M + rng.uniform(-1.0, 1.0, 3) * _PALM_SPREAD_M
     T_H_raised = rigid(rng.normal(0.0, _PALM_TURN_RAD, 3), palm_m)
     cursor_m, cursor_is_cut = see(T_H_raised)
     views = [
         view_through(
-            rig.eyes[eye],
+            worn.eyes[eye],
             shift_m,
             np.eye(4),
-            projection_matrix(rig.eyes[eye], drawn_m[eye]) @ rig.eyes[eye].T_V_H,
+            projection_matrix(rig.eyes[eye], drawn_m[eye]) @ worn.eyes[eye].T_V_H,
             cursor_m,
         )
         for eye, shift_m in true_shift_m.items()
@@ -86,7 +89,10 @@ def overlay_by_eye(
     turned = T_H_raised @ rigid(slip.rotation_rad)
     placed = overlay_hand(transform(invert(T_H_raised), cursor_m), turned, views)
     assert placed is not None, "the cursor is on the displays"
-    eyes_m = [transform(invert(T_E_H[eye]), m[None])[0] for eye, m in true_shift_m.items()]
+    eyes_m = [
+        transform(invert(view_of_eye(worn.eyes[eye], np.eye(4))), shift_m[None])[0]
+        for eye, shift_m in true_shift_m.items()
+    ]
     hand_m, hand_is_cut = see(misplace(placed[0], np.mean(eyes_m, axis=0), slip))
     R_D_raised = rig.T_H_D[:3, :3].T @ T_H_raised[:3, :3]
     return Alignment(
@@ -94,7 +100,7 @@ def overlay_by_eye(
         hand_m=hand_m,
         cursor_is_cut=cursor_is_cut,
         hand_is_cut=hand_is_cut,
-        T_E_W=T_E_H,
+        T_E_W={eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES},
         eyes=tuple(true_shift_m),
         rotation_rad=R_D_raised @ slip.rotation_rad,
         t_a_ns=0,
