@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import signal
 import subprocess
 import sys
-import threading
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +21,18 @@ from handcal.export.formats import FORMATS
 from handcal.files import make_folder
 from handcal.rig_commands import add_rig_commands
 from handcal.rig_file_commands import add_rig_file_commands
-from handcal.terminal import Parser, add_command, console, fail, number, progress, save, table
+from handcal.study_commands import add_study_commands
+from handcal.terminal import (
+    Parser,
+    add_command,
+    console,
+    fail,
+    number,
+    progress,
+    save,
+    table,
+    until_interrupted,
+)
 from handcal.types import METHODS
 
 if TYPE_CHECKING:
@@ -162,7 +170,7 @@ def record(arguments: argparse.Namespace) -> None:
     from handcal.record import record as record_camera
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
-    with _open_source(arguments) as camera, _until_interrupted() as is_stopped:
+    with _open_source(arguments) as camera, until_interrupted() as is_stopped:
         console.print(f"Recording {camera.name}; Ctrl+C ends it and keeps what there is.")
         try:
             with progress() as report:
@@ -376,6 +384,10 @@ def _parser() -> argparse.ArgumentParser:
     judged = commands.add_parser("evaluate", help=text, description=text)
     add_evaluate_commands(judged.add_subparsers(metavar="WHAT", required=True, parser_class=Parser))
 
+    text = "Studies on simulated wearers, in many processes, each with a report."
+    study = commands.add_parser("study", help=text, description=text)
+    add_study_commands(study.add_subparsers(metavar="STUDY", required=True, parser_class=Parser))
+
     text = "The offline calibration: boards, cameras, displays, and the rig file made of them."
     rig = commands.add_parser("rig", help=text, description=text)
     steps = rig.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
@@ -402,22 +414,6 @@ def _open_source(arguments: argparse.Namespace) -> Camera:
             return RealSenseCamera(realsense_of(arguments))
         case path:
             return open_recording(Path(path))
-
-
-@contextmanager
-def _until_interrupted() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether Ctrl+C was pressed; the second time it interrupts as ever."""
-    is_stopped = threading.Event()
-
-    def stop(*_: object) -> None:
-        is_stopped.set()
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, stop)
-    try:
-        yield is_stopped.is_set
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _rig_path(rig: Path | None) -> Path:

@@ -6,9 +6,7 @@ damaged counts as not done.
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import platform
 from collections.abc import Mapping, Sequence
@@ -18,6 +16,7 @@ from typing import Any, TypeAlias
 
 from handcal.errors import FileError
 from handcal.files import make_folder, read_json, write_atomic, write_json
+from handcal.report.rows import rows_csv
 
 Row: TypeAlias = dict[str, float | int | str | bool | None]
 """One row of a study's table; None where there is nothing to tell."""
@@ -89,13 +88,8 @@ class StudyFolder:
         write_json(self._file(number), {"sha256": _sha256(rows), "rows": rows})
 
     def write_rows(self, rows: Sequence[Row]) -> None:
-        """Write ``rows.csv``: a column for every key, in the order in which they first come."""
-        columns = list(dict.fromkeys(key for row in rows for key in row))
-        text = io.StringIO()
-        writer = csv.DictWriter(text, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        write_atomic(self._path / "rows.csv", text.getvalue().encode())
+        """Write ``rows.csv``."""
+        write_atomic(self._path / "rows.csv", rows_csv(rows))
 
     def _file(self, number: int) -> Path:
         return self._chunks / f"{number:04d}.json"
