@@ -13,6 +13,7 @@ from handcal.errors import FileError
 from handcal.files import read_limited, require_suffix, write_atomic
 from handcal.types import UInt8
 
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_FILE_BYTES = 64 * 2**20
 MAX_SIDE_PX = 8192
 _MAX_PIXELS = 16 * 2**20

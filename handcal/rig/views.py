@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import FileError, HandcalError
-from handcal.image_file import read_image
+from handcal.image_file import IMAGE_SUFFIXES, read_image
 from handcal.rig.board import Board, BoardError, BoardView, find_board
 from handcal.types import UInt8
 
 MAX_VIEWS = 500
-_SUFFIXES = frozenset({".png", ".jpg", ".jpeg"})
 _CELLS = (8, 6)
 
 
@@ -85,7 +84,7 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
             inside = sorted(path.iterdir()) if path.is_dir() else [path]
         except OSError as error:
             raise FileError(f"cannot read {path}: {error.strerror or error}") from error
-        files += [file for file in inside if file.suffix.lower() in _SUFFIXES]
+        files += [file for file in inside if file.suffix.lower() in IMAGE_SUFFIXES]
     if not files:
         raise FileError("no PNG or JPEG images are there")
     if len(files) > MAX_VIEWS:

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QGroupBox,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QPushButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QGridLayout, QGroupBox, QLabel, QPushButton, QWidget
 
 from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.widgets.fields import button
+from handcal_gui.widgets.key_field import KeyField
+
+_RENEWING = "The headset must then be given the new one."
 
 
 class PairingBox(QGroupBox):
@@ -39,39 +34,17 @@ class PairingBox(QGroupBox):
             | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
         self._address.setToolTip("Host and port that the headset must connect to, by UDP")
-        self._key = QLineEdit()
-        self._key.setObjectName("pairing-key")
-        self._key.setAccessibleName("Pairing key")
-        self._key.setReadOnly(True)
-        self._key.setToolTip(
-            "Whoever knows the key can pose as the headset: give it to the headset only"
-        )
-        self._show = _button("Show", "Show the pairing key")
-        self._show.setCheckable(True)
-        self._show.toggled.connect(self._reveal)
-        copy = _button("Copy", "Copy the pairing key to the clipboard")
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))
-        renew = _button("New key…", "Make a new key; the headset must then be given it")
+        self._key = KeyField()
+        renew = button("newKey", "New key…", "Make a new pairing key", _RENEWING)
         renew.clicked.connect(self.new_key_requested)
-        self._lay_out(self._show, copy, renew)
-        self._reveal(False)
+        self._lay_out(renew)
 
     def show_pairing(self, address: str, key: str) -> None:
         """Show an address, as host:port, and a key, hidden at first."""
         self._address.setText(address)
-        self._key.setText(key)
-        self._key.setCursorPosition(0)
-        self._show.setChecked(False)
+        self._key.set_key(key)
 
-    def _reveal(self, is_shown: bool) -> None:
-        modes = QLineEdit.EchoMode
-        self._key.setEchoMode(modes.Normal if is_shown else modes.Password)
-
-    def _lay_out(self, *buttons: QPushButton) -> None:
-        row = QHBoxLayout()
-        row.addStretch()
-        for button in buttons:
-            row.addWidget(button)
+    def _lay_out(self, renew: QPushButton) -> None:
         grid = QGridLayout(self)
         grid.setSpacing(SPACING_PX)
         key_label = QLabel("&Key")
@@ -80,12 +53,5 @@ class PairingBox(QGroupBox):
         grid.addWidget(self._address, 0, 1)
         grid.addWidget(key_label, 1, 0)
         grid.addWidget(self._key, 1, 1)
-        grid.addLayout(row, 2, 0, 1, 2)
+        grid.addWidget(renew, 2, 1, Qt.AlignmentFlag.AlignRight)
         grid.setColumnStretch(1, 1)
-
-
-def _button(text: str, tooltip: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tooltip)
-    button.setAutoDefault(False)
-    return button

@@ -25,7 +25,7 @@ from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.print_page import Paper
 from handcal.types import UInt8
 from handcal_gui.rig.draft import Draft
-from handcal_gui.start.latest_job import LatestJob
+from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (

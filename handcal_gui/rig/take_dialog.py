@@ -29,7 +29,7 @@ from handcal.rig_take import keep_imager, keep_images, see_board
 from handcal_gui.rig.live import Images, LiveImages
 from handcal_gui.running.job_bar import JobBar
 from handcal_gui.running.jobs import IsCancelled, Report
-from handcal_gui.start.latest_job import LatestJob
+from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, choice, main_button, named
 from handcal_gui.widgets.finding_line import FindingLine

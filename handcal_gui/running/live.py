@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from handcal.calibrate import Calibration, State
 from handcal.errors import FileError
 from handcal.results import SolveSettings
+from handcal.session import Session
 from handcal.snapshot import Snapshot
 from handcal.station import Station
 from handcal_gui.review.compare import Comparison
@@ -66,6 +67,7 @@ class Live(QObject):
         self._comparison = comparison
         self._solve_settings = SolveSettings()
         self._stream: Stream | None = None
+        self._is_broken = False
         self._snapshot: Snapshot | None = None
         self._is_watching = False
         panels = window.panels
@@ -86,7 +88,7 @@ class Live(QObject):
     def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
         """Run a station, after ending the present one."""
         self.stop()
-        self._is_watching = False
+        self._is_watching = self._is_broken = False
         self._doing = self._shown = 0
         self._wizard_panel.start(Wizard(plan))
         self._stream = Stream(open_station, self)
@@ -195,9 +197,7 @@ class Live(QObject):
                     "restore the trial", lambda s: s.session.restore_trial(number)
                 )
             )
-        session.notes_changed.connect(
-            lambda text: self._ask("save the notes", lambda s: s.session.save_notes(text))
-        )
+        session.notes_changed.connect(self._save_notes)
 
     def _ask(self, name: str, command: Command) -> int:
         return self._stream.ask(name, command) if self._stream is not None else 0
@@ -277,8 +277,18 @@ class Live(QObject):
         self._complained_of = name
         self._window.banner.show_message(f"Could not {name}: {why}")
 
+    def _save_notes(self, text: str) -> None:
+        """Have the engine save notes, or save them here once it has broken down."""
+        if self._is_broken and self._snapshot is not None:
+            with suppress(FileError), Session(self._snapshot.session_path) as session:
+                session.save_notes(text)
+        else:
+            self._ask("save the notes", lambda station: station.session.save_notes(text))
+
     def _take_end(self, why: str) -> None:
         self._timer.stop()
+        self._is_broken = bool(why)
+        self._window.panels.session.flush()  # what was typed in the last moment
         self.ended.emit(why)
 
 

@@ -87,10 +87,12 @@ class Stream(Worker):
             with self._open_station() as station:
                 if not self._closing.is_set():
                     self._say(self.opened.emit, station)
-                while not self._closing.is_set():
-                    self._newest = station.step(), self._done
-                    self._obey(station)
-                self._obey(station)  # what was asked for just before the end, such as notes
+                try:
+                    while not self._closing.is_set():
+                        self._newest = station.step(), self._done
+                        self._obey(station)
+                finally:
+                    self._obey(station)  # what was asked for just before the end, such as notes
         except HandcalError as error:
             why = str(error)
         except Exception as error:

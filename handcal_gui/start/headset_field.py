@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from handcal.station_settings import HeadsetKind, StationSettings
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import beside, button, choice, named, whole_number
+from handcal_gui.widgets.fields import beside, choice, named, whole_number
+from handcal_gui.widgets.key_field import KeyField
 
 _HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
 
@@ -43,18 +43,10 @@ class HeadsetField(QWidget):
         self._address = QWidget()
         address = (QLabel("at"), self._host, QLabel("port"), self._port)
         beside(self._address, *address, grows=self._host)
-        self._key = named(
-            QLineEdit(pairing_key, readOnly=True),
-            "pairingKey",
-            "Pairing key",
-            "Enter this key in the headset; whoever knows it can connect.",
-        )
-        self._reveal = button("showKey", "Show", "Show the pairing key")
-        self._reveal.setCheckable(True)
-        copy = button("copyKey", "Copy key")
+        self._key = KeyField()
+        self._key.set_key(pairing_key)
         self._pairing = QWidget()
-        pairing = (QLabel("Pairing key"), self._key, self._reveal, copy)
-        beside(self._pairing, *pairing, grows=self._key)
+        beside(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
@@ -66,10 +58,7 @@ class HeadsetField(QWidget):
         self._headset.currentIndexChanged.connect(self.changed)
         self._host.textChanged.connect(self.changed)
         self._port.valueChanged.connect(self.changed)
-        self._reveal.toggled.connect(self._show_key)
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))
         self._show_fitting()
-        self._show_key(False)
 
     def show_settings(self, settings: StationSettings) -> None:
         """Show the headset of a station."""
@@ -88,14 +77,9 @@ class HeadsetField(QWidget):
 
     def set_pairing_key(self, pairing_key: str) -> None:
         """Show another key."""
-        self._key.setText(pairing_key)
+        self._key.set_key(pairing_key)
 
     def _show_fitting(self) -> None:
         is_network = self._headset.currentData() == "network"
         self._address.setVisible(is_network)
         self._pairing.setVisible(is_network)
-
-    def _show_key(self, is_shown: bool) -> None:
-        echo = QLineEdit.EchoMode.Normal if is_shown else QLineEdit.EchoMode.Password
-        self._key.setEchoMode(echo)
-        self._reveal.setText("Hide" if is_shown else "Show")

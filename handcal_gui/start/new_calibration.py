@@ -13,8 +13,8 @@ from handcal.history import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.preflight import Part, is_ready
 from handcal.station_settings import StationSettings
 from handcal_gui.preferences import Preferences
+from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.start.card import Card
-from handcal_gui.start.latest_job import LatestJob
 from handcal_gui.start.station_form import StationForm
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, named, paragraph

@@ -371,6 +371,23 @@ def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio:
     np.testing.assert_allclose(record.fine_tuned["left"], [panel.step_m, 0.0, 0.0])
 
 
+def test_notes_outlive_an_engine_that_breaks_down(
+    live: Technician, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = live.snapshot.session_path
+    live.program.window.docks["session"].raise_()
+    live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
+    live.child(QPlainTextEdit, "").setPlainText("wears glasses")
+
+    def break_down(_station: Station) -> Snapshot:
+        raise ZeroDivisionError("oh")
+
+    monkeypatch.setattr(Station, "step", break_down)
+    live.wait_for_page("start")
+    assert "broke down" in live.banner
+    assert Session.open(path).notes == "wears glasses"
+
+
 def test_a_session_in_use_elsewhere_cannot_be_resumed(
     technician: Technician, studio: Any, record: SessionRecord
 ) -> None:

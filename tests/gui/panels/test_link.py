@@ -130,7 +130,7 @@ def test_the_history_is_of_half_a_minute(panel: LinkPanel, snapshot: Maker) -> N
 
 def test_the_key_is_hidden_until_asked_for(panel: LinkPanel) -> None:
     panel.show_pairing("192.168.1.5:50123", KEY)
-    key = panel.findChild(QLineEdit, "pairing-key")
+    key = panel.findChild(QLineEdit, "pairingKey")
     address = panel.findChild(QLabel, "pairing-address")
     assert key is not None
     assert address is not None

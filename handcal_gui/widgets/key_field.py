@@ -1,0 +1,40 @@
+"""A secret to be shown or copied on demand."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from handcal_gui.widgets.fields import beside, button, named
+
+
+class KeyField(QWidget):
+    """The pairing key, hidden until asked for."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._key = named(
+            QLineEdit(readOnly=True),
+            "pairingKey",
+            "Pairing key",
+            "Enter this key in the headset, and nowhere else: whoever knows it can connect.",
+        )
+        self._reveal = button("showKey", "Show", "Show the pairing key")
+        self._reveal.setCheckable(True)
+        copy = button("copyKey", "Copy", "Copy the pairing key")
+        beside(self, self._key, self._reveal, copy, grows=self._key)
+        self.setFocusProxy(self._key)
+        self._reveal.toggled.connect(self._show)
+        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))
+        self._show(False)
+
+    def set_key(self, key: str) -> None:
+        """Hold another key, hidden at first."""
+        self._key.setText(key)
+        self._key.setCursorPosition(0)
+        self._reveal.setChecked(False)
+
+    def _show(self, is_shown: bool) -> None:
+        modes = QLineEdit.EchoMode
+        self._key.setEchoMode(modes.Normal if is_shown else modes.Password)
+        self._reveal.setText("Hide" if is_shown else "Show")
