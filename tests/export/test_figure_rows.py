@@ -1,0 +1,82 @@
+"""The numbers behind the report's figures are those that are drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from handcal.export.figure_rows import (
+    convergence_rows,
+    overlay_rows,
+    residual_rows,
+    running_mean_rows,
+)
+from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
+from handcal.export.outcome import Outcome
+from handcal.export.report import session_report
+from handcal.geometry import transform
+
+
+def test_convergence_ends_at_what_was_solved(outcome: Outcome) -> None:
+    assert outcome.results is not None
+    rows = list(convergence_rows([1, 3], outcome.results))
+    for number, shifts in zip([1, 3], outcome.results.alignments, strict=True):
+        for eye, shift in shifts.items():
+            found = [row for row in rows if (row["alignment"], row["eye"]) == (number, eye)]
+            assert [row["iteration"] for row in found] == list(range(1, len(found) + 1))
+            np.testing.assert_allclose(
+                np.array([row["rms_mm"] for row in found], dtype=float),
+                1e3 * np.sqrt(shift.history_m2),
+            )
+
+
+def test_residuals_are_the_means_of_the_points_in_each_cell(outcome: Outcome) -> None:
+    assert outcome.results is not None
+    alignment, shift = outcome.record.alignments[0], outcome.results.alignments[0]["left"]
+    cells = residual_cells(alignment, "left", shift)
+    rows = list(residual_rows(1, {"left": cells}))
+    hand_mm = 1e3 * transform(alignment.T_E_W["left"], alignment.hand_m)[:, :2]
+    assert sum(int(row["points"] or 0) for row in rows) == len(hand_mm)
+    for row in rows:
+        low_mm = np.array([row["x_mm"], row["y_mm"]], dtype=float)
+        is_in = ((hand_mm >= low_mm - 1e-9) & (hand_mm < low_mm + CELL_MM - 1e-9)).all(axis=1)
+        inliers_m = shift.residuals_m[is_in & np.isfinite(shift.residuals_m)]
+        assert (row["points"], row["inliers"]) == (is_in.sum(), len(inliers_m))
+        if len(inliers_m):
+            assert row["mean_residual_mm"] == pytest.approx(1e3 * inliers_m.mean())
+        else:
+            assert row["mean_residual_mm"] is None
+
+
+def test_outlines_are_told_corner_by_corner() -> None:
+    square = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 0.0]])
+    rows = list(overlay_rows(3, "left", {"before": {"hand": [], "cursor": [square, square + 1]}}))
+    assert {(row["calibration"], row["of"]) for row in rows} == {("before", "cursor")}
+    assert [row["outline"] for row in rows] == [1] * 4 + [2] * 4
+    assert [[row["x_px"], row["y_px"]] for row in rows[:4]] == square.tolist()
+
+
+def test_the_outline_of_what_covers_part_of_the_display_surrounds_it(outcome: Outcome) -> None:
+    alignment, display = outcome.record.alignments[0], outcome.record.rig.eyes["left"]
+    found = overlay_outlines(display, alignment, "left", np.zeros(3))
+    assert set(found) == {"hand", "cursor"}
+    for outline in found["hand"] + found["cursor"]:
+        np.testing.assert_array_equal(outline[0], outline[-1])
+
+
+def test_the_running_mean_is_of_each_eye_alone(outcome: Outcome) -> None:
+    record = outcome.record
+    rows = list(running_mean_rows(record.trial_numbers, record.trials))
+    for eye in ("left", "right"):
+        means = [trial.error_arcmin.mean() for trial in record.trials if trial.eye == eye]
+        found = [row["mean_so_far_arcmin"] for row in rows if row["eye"] == eye]
+        np.testing.assert_allclose(np.array(found, dtype=float), np.cumsum(means) / [1, 2])
+
+
+def test_every_figure_of_the_report_has_its_numbers(outcome: Outcome) -> None:
+    figures = {figure.name: figure for figure in session_report(outcome).figures}
+    assert {name for name, figure in figures.items() if not figure.rows} <= {
+        "overlay-left",  # too sparse clouds have no outline
+        "overlay-right",
+    }
+    assert len(figures["trial-errors"].rows) == 4 * len(outcome.record.trials)
