@@ -14,8 +14,8 @@ import numpy as np
 from handcal.geometry import invert, rigid, transform
 from handcal.register.model import predict
 from handcal.sim.hand import HandModel
-from handcal.sim.raster import visible_points
-from handcal.types import Bool, Float64
+from handcal.sim.raster import D415, visible_points
+from handcal.types import Bool, Float64, Intrinsics
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +82,13 @@ class SimulatedAlignment:
 
 
 def simulate_alignment(
-    rng: np.random.Generator, hand: HandModel, angle_rad: float, settings: AlignmentSettings
+    rng: np.random.Generator,
+    hand: HandModel,
+    angle_rad: float,
+    settings: AlignmentSettings,
+    intrinsics: Intrinsics = D415,
 ) -> SimulatedAlignment:
-    """Make one alignment as in the paper's simulation.
+    """Make one alignment as in the paper's simulation, seen by a depth camera.
 
     The cursor is turned about a random axis by `angle_rad`, around a random point of its cloud.
     """
@@ -95,11 +99,21 @@ def simulate_alignment(
     T_E_W = rigid(rng.normal(0.0, 0.5, 3), rng.normal(0.0, 0.5, 3))
     shift_m = rng.uniform(-settings.shift_max_m, settings.shift_max_m, 3)
     hand_m, hand_cut = visible_points(
-        hand, T_E_hand, settings.count, rng, forearm_m=settings.hand_forearm_m
+        hand,
+        T_E_hand,
+        settings.count,
+        rng,
+        intrinsics=intrinsics,
+        forearm_m=settings.hand_forearm_m,
     )
     if settings.resample:
         source_m, cursor_cut = visible_points(
-            hand, T_E_hand, settings.count, rng, forearm_m=settings.cursor_forearm_m
+            hand,
+            T_E_hand,
+            settings.count,
+            rng,
+            intrinsics=intrinsics,
+            forearm_m=settings.cursor_forearm_m,
         )
     else:
         order = rng.permutation(len(hand_m))

@@ -53,7 +53,7 @@ _TEXTS: Mapping[str, str] = {
     "depth noise": "Independent noise on the depth of every point of both clouds.",
     "forearm": "The cursor shows 40 mm of forearm, the hand more or less of it.",
     "points": "Clouds sampled more or less densely.",
-    HANDS: "Hands of different people, from small to large, each aligned as often.",
+    HANDS: "Hands of different people, each aligned as often; by the quick methods only.",
     "wearer": (
         "One eye of a wearer who looks through the displays and puts the hand over the cursor; no "
         "solver's equation takes part. The usual errors are those of the simulated wearer."
