@@ -146,6 +146,8 @@ class Endpoint(Closable):
             while not self._closing.is_set():
                 arrived = self._transport.receive(self._wait_s())
                 with self._changed:
+                    if self._closing.is_set():
+                        return  # lest a hello that answers the good-bye be welcomed
                     for datagram, address in arrived:
                         self._take(datagram, address)
                     self._work(time.monotonic())

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -235,6 +236,29 @@ def test_a_closed_link_refuses_and_leaves_no_thread(pairing_key: bytes) -> None:
     ):
         with pytest.raises(LinkError, match="closed"):
             use()
+
+
+def test_a_hello_amid_the_good_bye_is_not_welcomed(
+    server: HeadsetServer, new_headset: NewHeadset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    headset = new_headset()
+    hello = headset.seal(pb.Envelope(hello=pb.Hello(nonce=2)))
+
+    def receive(_timeout_s: float) -> list[tuple[bytes, Any]]:
+        assert server._closing.wait(5.0)
+        return [(hello, headset.address)]
+
+    headset.send(headset.seal(KEEP_ALIVE, headset.join(), 1))
+    server.wait_connected(3.0)
+    monkeypatch.setattr(server._transport, "receive", receive)
+    server.close()
+    headset.socket.settimeout(0.2)
+    heard = []
+    with suppress(TimeoutError):
+        while True:
+            heard.append(headset.receive()[0].WhichOneof("body"))
+    assert "bye" in heard
+    assert "welcome" not in heard
 
 
 def test_who_waits_is_told_when_the_link_is_closed(server: HeadsetServer) -> None:

@@ -1,0 +1,80 @@
+"""A headset app in miniature: what the app of a real headset does, to begin one from.
+
+    HANDCAL_PAIRING_KEY=KEY python headset_example.py HOST PORT
+
+It tells its pose 60 times a second, says what it is to draw whenever that changes, and confirms an
+alignment on Enter. Ctrl+C, or the PC, ends it.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+
+import numpy as np
+
+from handcal.display import view_of_eye
+from handcal.errors import HandcalError
+from handcal.link.client import HeadsetClient, HeadsetState
+from handcal.link.pairing import read_pairing_key
+from handcal.resources import resource_path
+from handcal.rig.rig_file import read_rig
+from handcal.types import EYES, Float64
+
+RIG = read_rig(resource_path("example_rig.yaml"))
+"""Of this headset: its T_V_H and t(C0→V) belong into the confirmation."""
+PERIOD_S = 1 / 60
+
+
+def main() -> None:
+    """Connect, and go on until the PC is closed."""
+    host, port = sys.argv[1], int(sys.argv[2])
+    told = ""
+    with HeadsetClient((host, port), read_pairing_key()) as client:
+        threading.Thread(target=confirm_on_enter, args=(client,), daemon=True).start()
+        while not client.dismissed:
+            client.send_pose(pose_of_headset(), time.monotonic_ns())
+            state = client.state()
+            telling = what_to_draw(state) if client.connected else "Waiting for the PC"
+            if telling != told:
+                told = telling
+                tell(told)
+            time.sleep(PERIOD_S)
+    tell("The PC said good-bye")
+
+
+def pose_of_headset() -> Float64:
+    """Return T_W_H, which the headset's tracking knows; here it stands still."""
+    return np.eye(4)
+
+
+def what_to_draw(state: HeadsetState) -> str:
+    """Return in words what an app draws: the cursor and the live hand, for each eye with its P."""
+    cursor = "no cursor" if state.cursor_W_m is None else f"cursor {state.cursor_id}"
+    hand = "no hand" if state.live_W_m is None else f"{'red' if state.live_red else 'blue'} hand"
+    eyes = " and ".join(sorted(state.projections)) or "no eye"
+    return f"Draw {cursor}, {hand}, with new projections for {eyes}; say “{state.prompt}”"
+
+
+def confirm_on_enter(client: HeadsetClient) -> None:
+    """Confirm that the hand covers the cursor, with both eyes' views at that moment."""
+    for _line in sys.stdin:
+        t_ns, T_W_H = time.monotonic_ns(), pose_of_headset()
+        T_E_W = {eye: view_of_eye(RIG.eyes[eye], T_W_H) for eye in EYES}
+        client.confirm(T_E_W, t_ns, client.state().cursor_id)
+
+
+def tell(text: str) -> None:
+    """Write a line at once."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except HandcalError as error:
+        sys.exit(str(error))
+    except KeyboardInterrupt:
+        pass

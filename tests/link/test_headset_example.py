@@ -1,0 +1,57 @@
+"""The headset app that ships as an example, run as its reader would."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from typing import IO
+
+import numpy as np
+
+from handcal.display import view_of_eye
+from handcal.link.pairing import KEY_VARIABLE
+from handcal.link.server import Confirmation, HeadsetServer
+from handcal.resources import resource_path
+from handcal.rig.rig_file import read_rig
+
+PATIENCE_S = 20.0
+
+
+def test_the_example_draws_confirms_and_ends_with_the_pc(pairing_key: bytes) -> None:
+    with HeadsetServer(pairing_key) as server:
+        process = subprocess.Popen(
+            [sys.executable, resource_path("headset_example.py"), *map(str, server.address)],
+            env=os.environ | {KEY_VARIABLE: pairing_key.decode()},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdin is not None
+        assert process.stdout is not None
+        server.send_cursor(np.zeros((10, 3)), 7)
+        server.send_prompt("Close your left eye.", ("right",))
+        lines = []
+        while "cursor 7" not in (lines or [""])[-1] or "Close" not in lines[-1]:
+            lines.append(process.stdout.readline())
+            assert lines[-1], "the example ended"
+        confirmation = _confirm(process.stdin, server)
+    assert confirmation.cursor_id == 7
+    rig = read_rig(resource_path("example_rig.yaml"))
+    for eye, T_E_W in confirmation.T_E_W.items():
+        np.testing.assert_allclose(T_E_W, view_of_eye(rig.eyes[eye], np.eye(4)), atol=1e-9)
+    rest, _ = process.communicate(timeout=PATIENCE_S)
+    assert rest.endswith("The PC said good-bye\n")
+    assert process.returncode == 0
+
+
+def _confirm(stdin: IO[str], server: HeadsetServer) -> Confirmation:
+    """Press Enter, and return what the PC hears."""
+    stdin.write("\n")
+    stdin.flush()
+    end_s = time.monotonic() + PATIENCE_S
+    while not (heard := server.confirmations()):
+        assert time.monotonic() < end_s, "nothing was confirmed"
+        time.sleep(0.01)
+    return heard[0]
