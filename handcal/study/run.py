@@ -102,6 +102,22 @@ def run_study(
     return table
 
 
+def share_done(study: Study, folder: Path) -> float:
+    """Return which share of a study a folder holds, 0..1.
+
+    Raises
+    ------
+    FileError
+        If it holds another study, or cannot be read.
+    """
+    if not (folder / "study.json").exists():
+        return 0.0
+    chunks = _chunks(study.cases)
+    store = StudyFolder(folder, study.name, asdict(study.settings), chunks)
+    done = [store.read_chunk(number) is not None for number in range(len(chunks))]
+    return sum(done) / len(done)
+
+
 def _chunks(cases: Sequence[Case]) -> list[Sequence[Case]]:
     length = math.ceil(len(cases) / _MAX_CHUNKS) or 1
     return [cases[start : start + length] for start in range(0, len(cases), length)]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from handcal.errors import CancelledError, FileError, HandcalError
-from handcal.study.run import Case, Study, run_study
+from handcal.study.run import Case, Study, run_study, share_done
 from handcal.study.store import Row
 
 ROOT = Path(__file__).parents[2]
@@ -142,6 +142,16 @@ def test_a_study_that_is_done_is_not_done_again(tmp_path: Path) -> None:
     assert not log.exists()
 
 
+def test_how_much_of_a_study_is_done_is_told_without_a_trace(tmp_path: Path) -> None:
+    study, folder = make_study(), tmp_path / "study"
+    assert share_done(study, folder) == 0.0
+    assert not folder.exists()
+    run_study(study, folder, workers=1)
+    assert share_done(study, folder) == 1.0
+    with pytest.raises(FileError, match="another study"):
+        share_done(make_study(Settings(scale=4.0)), folder)
+
+
 def test_a_cancelled_study_goes_on(tmp_path: Path) -> None:
     log = tmp_path / "log"
     study = make_study(Settings(log=str(log)))
@@ -150,6 +160,7 @@ def test_a_cancelled_study_goes_on(tmp_path: Path) -> None:
     began = len(log_lines(log))
     kept = len(list((tmp_path / "study" / "chunks").iterdir()))
     assert 0 < kept < 30
+    assert share_done(study, tmp_path / "study") == kept / 30
     rows = run_study(study, tmp_path / "study", workers=1)
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
     assert len(log_lines(log)) - began == CASES - 3 * kept
