@@ -15,6 +15,7 @@ from handcal.export.export import ExportSettings
 from handcal.files import make_folder, read_json, write_json
 from handcal.link.pairing import read_pairing_key, write_pairing_key
 from handcal.station_settings import StationSettings
+from handcal_gui.evaluation.entries import EvaluationEntries
 from handcal_gui.wizard.steps import EyePlan
 
 Theme: TypeAlias = Literal["system", "light", "dark"]
@@ -42,6 +43,7 @@ class Preferences:
     export_folder : str
         Where the last export went; empty before the first.
     fine_tune_step_m : float
+    evaluation : EvaluationEntries
     theme : {"system", "light", "dark"}
     geometry, live_layout, review_layout : str
         Of the window and of its docks on either page, as Qt gives them, in base64.
@@ -54,6 +56,7 @@ class Preferences:
     export: ExportSettings = field(default_factory=ExportSettings)
     export_folder: str = ""
     fine_tune_step_m: float = 5e-4
+    evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
     theme: Theme = "system"
     geometry: str = ""
     live_layout: str = ""

@@ -19,6 +19,9 @@ from handcal.station_settings import StationSettings
 from handcal_gui.app import FIRST_SIZE
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.evaluation.entries import EvaluationEntries
+from handcal_gui.evaluation.offers import make_offers
+from handcal_gui.evaluation.window import EvaluationWindow
 from handcal_gui.panels.camera import CameraPanel
 from handcal_gui.panels.cloud import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel
@@ -172,6 +175,23 @@ class Program(QObject):
         wizard.open()
         return wizard
 
+    def evaluate(self) -> EvaluationWindow:
+        """Show the window of evaluations, which is opened once."""
+        opened = [one for one in self.window.findChildren(EvaluationWindow) if one.isVisible()]
+        if opened:
+            opened[0].raise_()
+            opened[0].activateWindow()
+            return opened[0]
+        entries = self._preferences.evaluation
+        if not entries.users.sessions:
+            users = replace(entries.users, sessions=self.start.new.settings.sessions)
+            entries = replace(entries, users=users)
+        window = EvaluationWindow(make_offers(), entries, self.window)
+        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        window.remembered.connect(self._remember_evaluation)
+        window.show()
+        return window
+
     def close(self) -> None:
         """Remember the window, end what runs; safe to call twice."""
         layouts = self.window.layouts()
@@ -188,6 +208,8 @@ class Program(QObject):
             dialog.stop()
         for wizard in self.window.findChildren(RigWizard):
             wizard.accept()
+        for evaluation in self.window.findChildren(EvaluationWindow):
+            evaluation.stop()
         self.live.stop()
         self.review.close()
         self.start.stop()
@@ -198,6 +220,7 @@ class Program(QObject):
         self.start.resume_requested.connect(self.resume_session)
         self.start.open_requested.connect(self.open_session)
         self.start.rig_wanted.connect(self.calibrate_rig)
+        self.start.evaluation_wanted.connect(self.evaluate)
         self.live.ended.connect(self._take_end)
         self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
         self.live.export_requested.connect(lambda: self.export())
@@ -223,6 +246,7 @@ class Program(QObject):
         add("File", "&Open session…", "Ctrl+O", self._browse)
         add("File", "&Export…", "Ctrl+E", self.export)
         add("File", "&Calibrate a rig…", "", self.calibrate_rig)
+        add("File", "E&valuate…", "", self.evaluate)
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
         add("File", "&Quit", "Ctrl+Q", self.window.close)
         add("View", "&Reset layout", "", self.window.reset_layout)
@@ -299,6 +323,9 @@ class Program(QObject):
 
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
         self._remember(replace(self._preferences, export=settings, export_folder=str(folder)))
+
+    def _remember_evaluation(self, entries: EvaluationEntries) -> None:
+        self._remember(replace(self._preferences, evaluation=entries))
 
     def _remember(self, preferences: Preferences) -> None:
         self._preferences = preferences

@@ -6,9 +6,8 @@ from PySide6.QtWidgets import QComboBox
 
 from handcal.rig.camera import LensModel
 from handcal_gui.widgets.fields import choice
-from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
-INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
 _LENSES: dict[LensModel, str] = {
     "none": "No distortion",
     "radial": "k1, k2",

@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QWidget
 from handcal.rig_take import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.images_panel import ImagesPanel
-from handcal_gui.rig.lens_fields import INTRINSICS_FILES, intrinsics_field, lens_field
+from handcal_gui.rig.lens_fields import intrinsics_field, lens_field
 from handcal_gui.rig.solve import Solved, solve_stereo
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
 _HINT = (
     "Take 20 or more pairs of images of the board, both at the same moment: near and far, all over "

@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QWidget
 from handcal.doctor import Finding, Health
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.images_panel import ImagesPanel
-from handcal_gui.rig.lens_fields import INTRINSICS_FILES, lens_field
+from handcal_gui.rig.lens_fields import lens_field
 from handcal_gui.rig.solve import Solved, solve_viewpoint
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
 _HINT = (
     "Take 20 or more images of the board with the viewpoint camera, its focus fixed as it will be "

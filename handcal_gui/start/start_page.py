@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QVBoxLayout, QWidget
 
@@ -23,7 +23,7 @@ FindOffers = Callable[[Path, Sequence[Path]], Offers]
 
 
 class StartPage(QWidget):
-    """Offers the three ways to begin.
+    """Offers the ways to begin.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ class StartPage(QWidget):
         A station that has just been found ready, and the wearer.
     open_requested, resume_requested : Signal(Path)
         A session's folder.
-    rig_wanted : Signal()
-        A rig is to be calibrated.
+    rig_wanted, evaluation_wanted : Signal()
+        A rig is to be calibrated; studies and tests are to be made.
     cancel_requested : Signal()
         The station need not be opened after all.
     """
@@ -49,6 +49,7 @@ class StartPage(QWidget):
     open_requested = Signal(object)
     resume_requested = Signal(object)
     rig_wanted = Signal()
+    evaluation_wanted = Signal()
     cancel_requested = Signal()
 
     def __init__(
@@ -79,6 +80,11 @@ class StartPage(QWidget):
         browse = button("browse", "Choose folder…")
         self._opened.add_button(browse)
         self._open.body.addWidget(self._opened, 1)
+        self._evaluate = Card(
+            "Evaluate", "Simulated studies, the cube test, and the user test.", "check"
+        )
+        evaluate = button("evaluate", "Evaluate…", help_text="How good calibrations are")
+        self._evaluate.body.addWidget(evaluate, 0, Qt.AlignmentFlag.AlignRight)
         self._lay_out()
         self._find = LatestJob(lambda question: find_offers(*question), self)
         self._find.answered.connect(self._take_offers)
@@ -89,6 +95,7 @@ class StartPage(QWidget):
         self._unfinished.chosen.connect(self.resume_requested)
         self._opened.chosen.connect(self.open_requested)
         browse.clicked.connect(self.browse)
+        evaluate.clicked.connect(self.evaluation_wanted)
         self.show_preferences(preferences)
 
     def show_preferences(self, preferences: Preferences) -> None:
@@ -150,6 +157,7 @@ class StartPage(QWidget):
         right.setSpacing(2 * SPACING_PX)
         right.addWidget(self._resume, 1)
         right.addWidget(self._open, 1)
+        right.addWidget(self._evaluate)
         grid = QGridLayout(self)
         grid.setContentsMargins(*4 * (3 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)

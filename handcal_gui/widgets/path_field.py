@@ -9,6 +9,9 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
 from handcal_gui.widgets.fields import beside, button
 
+INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
+"""Pattern of the files that hold a camera's intrinsics."""
+
 
 class PathField(QWidget):
     """A line with a button beside it, or two where file and folder will both do.

@@ -1,0 +1,99 @@
+"""What was entered for each evaluation, to be proposed again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from PySide6.QtCore import QStandardPaths
+
+from handcal.types import Eye
+
+Size: TypeAlias = Literal["full", "quick"]
+
+
+def _folder(name: str) -> str:
+    documents = QStandardPaths.StandardLocation.DocumentsLocation
+    return str(Path(QStandardPaths.writableLocation(documents)) / "handcal evaluations" / name)
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseEntries:
+    """What the noise study is to do.
+
+    Attributes
+    ----------
+    size : {"full", "quick"}
+    seed : int
+    processes : int
+        On this computer; 0 for one on each core.
+    scheduler : str
+        Address of a Dask scheduler that does the work instead; empty for none.
+    output : str
+    """
+
+    size: Size = "full"
+    seed: int = 1
+    processes: int = 0
+    scheduler: str = ""
+    output: str = field(default_factory=lambda: _folder("noise"))
+
+
+@dataclass(frozen=True, slots=True)
+class MethodEntries:
+    """What the method comparison is to do; fields as in `NoiseEntries`."""
+
+    wearers: int = 100
+    seed: int = 1
+    processes: int = 0
+    scheduler: str = ""
+    output: str = field(default_factory=lambda: _folder("methods"))
+
+
+@dataclass(frozen=True, slots=True)
+class CubeEntries:
+    """What the cube test looks at; paths.
+
+    Attributes
+    ----------
+    captures : str
+        Folder; empty to have the simulator render them.
+    cube, camera : str
+        Files; those in the folder of captures if empty.
+    rig : str
+        The example's if empty.
+    eye : {"left", "right"}
+    square_px : int
+        Of the grid on the display.
+    seed : int
+        Of what is rendered.
+    output : str
+    """
+
+    captures: str = ""
+    cube: str = ""
+    camera: str = ""
+    rig: str = ""
+    eye: Eye = "left"
+    square_px: int = 80
+    seed: int = 1
+    output: str = field(default_factory=lambda: _folder("cube"))
+
+
+@dataclass(frozen=True, slots=True)
+class UserEntries:
+    """What the user test looks at: a folder of sessions, or a session."""
+
+    sessions: str = ""
+    output: str = field(default_factory=lambda: _folder("users"))
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationEntries:
+    """Everything entered for evaluations."""
+
+    noise: NoiseEntries = field(default_factory=NoiseEntries)
+    methods: MethodEntries = field(default_factory=MethodEntries)
+    cube: CubeEntries = field(default_factory=CubeEntries)
+    users: UserEntries = field(default_factory=UserEntries)

@@ -1,0 +1,36 @@
+"""How long something will yet take, judged by what it has taken so far."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+_MINUTE_S = 60.0
+
+
+class TimeLeft:
+    """Tells the time left from the share done.
+
+    Parameters
+    ----------
+    begun : float
+        Share that was done before.
+    clock : callable
+        Gives seconds.
+    """
+
+    def __init__(self, begun: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._begun = begun
+        self._clock = clock
+        self._start_s = clock()
+
+    def at(self, share: float) -> str:
+        """Return the time left as people say it; empty while nothing is done."""
+        if share <= self._begun:
+            return ""
+        elapsed_s = self._clock() - self._start_s
+        left_s = elapsed_s * (1.0 - share) / (share - self._begun)
+        if left_s < _MINUTE_S:
+            return "less than a minute left"
+        hours, minutes = divmod(round(left_s / _MINUTE_S), 60)
+        return f"about {f'{hours} h ' if hours else ''}{minutes} min left"
