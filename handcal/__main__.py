@@ -131,7 +131,7 @@ def export(arguments: argparse.Namespace) -> None:
             tuple(arguments.format or FORMATS), arguments.near_m, arguments.far_m
         )
     except ValueError as error:
-        raise HandcalError(str(error)) from error
+        fail(str(error), 2)
     record = Session.open(arguments.session)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
     with progress() as report:
@@ -351,7 +351,9 @@ def _parser() -> argparse.ArgumentParser:
     port = number(int, 1, 65535)
     one.add_argument("--port", type=port, required=True, help="where the PC listens")
     one.add_argument(
-        "--scene-port", type=port, required=True, help="where the simulated camera listens"
+        "--scene-port",
+        type=port,
+        help="where a simulated camera listens on this computer; without, none sees the wearer",
     )
     one.add_argument("--host", default="127.0.0.1", help="the PC")
     one.add_argument("--key-file", type=Path, help="pairing key; else in HANDCAL_PAIRING_KEY")

@@ -175,6 +175,11 @@ class Calibration:
     resume : SessionRecord or None
         What `session` holds, to go on with.
 
+    Raises
+    ------
+    ProcedureError
+        If what is to be gone on with was solved once, but cannot be any more.
+
     Attributes
     ----------
     state : State
@@ -499,7 +504,10 @@ class Calibration:
         self._shelf.deleted = dict(record.deleted)
         self._shift_m |= record.applied_shift_m
         if record.is_solved:
-            self._solve()
+            try:
+                self._solve()
+            except ValueError as error:
+                raise ProcedureError(f"{record.path} cannot be gone on with: {error}") from error
             self.state = State.APPLIED if record.is_applied else State.SOLVED
         elif record.alignments:
             self.state = State.ALIGNED

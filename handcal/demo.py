@@ -87,7 +87,7 @@ def run_demo(
         reorder=settings.reorder,
         sessions=str(output),
     )
-    with Station(station_settings) as station:
+    with Station(station_settings, "Simulated wearer") as station:
         report("Connecting to the virtual headset", 0.0)
         observations = _follow_plan(station, settings, report)
         statistics = station.step().link

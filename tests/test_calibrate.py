@@ -36,7 +36,7 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import EYES, Eye, Float64, Frame, Intrinsics, Projection, UInt16
+from handcal.types import EYES, Alignment, Eye, Float64, Frame, Intrinsics, Projection, UInt16
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -913,6 +913,15 @@ def test_a_calibration_goes_on_where_its_program_was_killed(stage: Stage, sessio
     record = Session.open(session.path)
     assert record.alignment_numbers == (1, 2, 3)
     session.close()
+
+
+def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
+    server: HeadsetServer, session: Session, alignment: Alignment
+) -> None:
+    session.save_alignment(alignment)  # of a few points
+    session.save_results({})
+    with pytest.raises(ProcedureError, match=r"cannot be gone on with: .* points"):
+        Calibration(RIG, server, session, SETTINGS, Session.open(session.path))
 
 
 def test_a_full_session_says_so_before_the_wearer_aligns(

@@ -263,8 +263,8 @@ def test_doctor_fails_only_for_what_must_be_mended(
         ("segment --color a.png", "required: --depth, --intrinsics, --output"),
         ("solve", "required: session"),
         ("solve somewhere --method fast", "invalid choice: 'fast'"),
-        ("headset --port 0 --scene-port 1", "'0' is no whole number from 1 to 65535"),
-        ("headset --port 5000", "required: --scene-port"),
+        ("headset --port 0", "'0' is no whole number from 1 to 65535"),
+        ("headset", "required: --port"),
         ("record", "required: output"),
         ("record a --seconds 0", "'0' is no number from 0.01"),
         ("record a --profile 640x480", "invalid choice: '640x480'"),
@@ -290,9 +290,9 @@ def test_misuse_is_one_line_and_exit_code_2(
         ("demo --rig nowhere.yaml --output out", "cannot read nowhere.yaml"),
         ("demo --rig text.txt --output out", "text.txt"),
         ("demo --output text.txt", "cannot create the folder text.txt: File exists"),
-        ("headset --port 5000 --scene-port 5001", "no pairing key: set HANDCAL_PAIRING_KEY"),
-        ("headset --port 5000 --scene-port 5001 --key-file none", "cannot read none"),
-        ("headset --port 5000 --scene-port 5001 --key-file text.txt", "has 6 bytes; take one of"),
+        ("headset --port 5000", "no pairing key: set HANDCAL_PAIRING_KEY"),
+        ("headset --port 5000 --key-file none", "cannot read none"),
+        ("headset --port 5000 --key-file text.txt", "has 6 bytes; take one of"),
     ],
 )
 def test_failure_is_one_line_and_exit_code_1(
@@ -342,7 +342,9 @@ def test_a_session_is_exported_in_the_formats_asked_for(
         "trials.csv",
     ]
     arguments = "export", session.path, "--output", output
-    assert "near_m < far_m is needed" in fails(*arguments, "--near-m", 2, "--far-m", 1)[1]
+    code, error = fails(*arguments, "--near-m", 2, "--far-m", 1)
+    assert code == 2
+    assert "near_m < far_m is needed" in error
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,8 +37,8 @@ class HeadsetSettings:
         The rig that the headset goes by, the PC's.
     host, port : str, int
         Where the PC listens.
-    scene_port : int
-        Where the synthetic camera listens, on this machine.
+    scene_port : int or None
+        Where the synthetic camera listens, on this machine; None if there is none.
     seed : int
         Of the wearer, the wearer's hand and the tracking noise.
     worn_rig_path : str
@@ -59,7 +60,7 @@ class HeadsetSettings:
 
     rig_path: str
     port: int
-    scene_port: int
+    scene_port: int | None = None
     host: str = "127.0.0.1"
     seed: int = 0
     worn_rig_path: str = ""
@@ -99,6 +100,7 @@ def run_headset(
     rng = np.random.default_rng(settings.seed)
     clock_ns = _clock(settings)
     start_s = heard_s = next_s = time.monotonic()
+    port = settings.scene_port
     end_s = start_s + settings.duration_s if settings.duration_s is not None else np.inf
     with (
         HeadsetClient(
@@ -107,13 +109,14 @@ def run_headset(
             lambda: clock_ns(time.monotonic_ns()),
             impairment=settings.impairment,
         ) as client,
-        ScenePublisher(settings.scene_port) as scene,
+        nullcontext() if port is None else ScenePublisher(port) as scene,
     ):
         while not is_stopped() and not client.dismissed and next_s < end_s:
             t_ns = time.monotonic_ns()
             view = _view(client.state(), rig, t_ns / 1e9 - start_s)
             action = wearer.step(view)
-            scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
+            if scene is not None:
+                scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
             T_W_H = action.T_W_H @ _tracking_error(rng, settings)
             client.send_pose(T_W_H, clock_ns(t_ns))
             if action.confirm:
