@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from handcal.terminal import (
     number,
     progress,
     save,
+    table,
     until_interrupted,
 )
 
@@ -37,10 +38,69 @@ def noise(arguments: argparse.Namespace) -> None:
     _run(arguments, noise_study(settings), lambda rows: noise_report(settings, rows))
 
 
+def methods(arguments: argparse.Namespace) -> None:
+    """Compare calibration methods on the same simulated wearers."""
+    from handcal.study.methods import QUICK_METHODS, MethodSettings, methods_study
+    from handcal.study.methods_report import methods_report
+    from handcal.study.wearer_noise import fit_noise
+
+    settings = replace(
+        QUICK_METHODS if arguments.quick else MethodSettings(),
+        seed=arguments.seed,
+    )
+    if arguments.wearers is not None:
+        settings = replace(settings, wearers=arguments.wearers)
+    if arguments.fit_noise is not None:
+        with progress() as say:
+            found = fit_noise(
+                settings,
+                arguments.fit_noise,
+                lambda scale, mean_arcmin: say(f"Noise {scale:.2f}: {mean_arcmin:.1f}′", 0.0),
+            )
+        console.print(
+            f"Noise {found.scale:.2f}: the paper's method errs by "
+            f"{found.mean_arcmin:.1f} ± {found.sd_arcmin:.1f}′ (± SD)"
+        )
+        settings = replace(settings, noise_scale=found.scale)
+    _run(arguments, methods_study(settings), lambda rows: methods_report(settings, rows))
+
+
+def recorded(arguments: argparse.Namespace) -> None:
+    """Run SPAAM and INDICA on the public recordings of Itoh and Klinker."""
+    from handcal.study.recorded import evaluate_recordings, read_recordings
+
+    results = evaluate_recordings(read_recordings(arguments.folder))
+    save(arguments.json, {name: asdict(result) for name, result in results.items()})
+    shown = table("", "SPAAM", "authors'", "apart", "recycled", "full", "pointing σ")
+    for name, found in results.items():
+        shown.add_row(
+            name,
+            *(f"{found.spaam_px:.2f}", f"{found.authors_spaam_px:.2f}"),
+            f"{found.difference_px:.5f}",
+            *(f"{found.recycled_px:.2f}", f"{found.full_px:.2f}"),
+            f"{found.pointing_sigma_arcmin:.1f}′",
+        )
+    console.print("Mean errors of SPAAM, ours and the authors', and of INDICA's two setups, in px.")
+    console.print(shown)
+
+
 def add_study_commands(commands: Commands) -> None:
     """Add ``handcal study …``."""
-    for command in (noise,):
+    data = add_command(commands, recorded)
+    data.add_argument("folder", type=Path, help="of github.com/YutaItoh/HMD-Calibration: dataset")
+    for command in (noise, methods):
         one = add_command(commands, command)
+        if command is methods:
+            one.add_argument(
+                "--wearers", type=number(int, 2, 100_000), metavar="N", help="of each population"
+            )
+            one.add_argument(
+                "--fit-noise",
+                type=number(int, 2, 1000),
+                metavar="N",
+                help="search first, with so many wearers, for the noise at which the paper's "
+                "method errs as published",
+            )
         one.add_argument(
             "--output",
             type=Path,

@@ -29,6 +29,10 @@ from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
 Projections: TypeAlias = Mapping[Eye, Float64]
 """Pixels from points in H, (3, 4), for each eye."""
 
+PAPER = "rcICP (the paper's), 1"
+HANDCAL_BOTH, HANDCAL_EACH = "handcal, both eyes,", "handcal, each eye,"
+"""With the number of alignments behind."""
+
 _SPAAM_COUNTS = 6, 12, 25
 _STEREO_COUNTS = 12, 25
 _HAND_COUNTS = 1, 2, 3, 5
@@ -72,7 +76,7 @@ class MethodSettings:
     wearers: int = 100
     eye_distance_sigmas_m: tuple[float, ...] = (0.0, 0.002)
     noise_scale: float = 1.0
-    points: int = 1000
+    points: int = 1500
     depth_sigma_m: float = 0.001
     hands: int = 10
     pointing_sigma_arcmin: float = 5.9
@@ -80,6 +84,10 @@ class MethodSettings:
     corner_sigma_m: float = 0.001
     eye_tracker_sigma_m: tuple[float, float, float] = (0.0021, 0.0008, 0.002)
     seed: int = 1
+
+
+QUICK_METHODS = MethodSettings(wearers=3, points=300)
+"""A look whether everything runs; its figures say little."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +133,7 @@ def compare_methods(settings: MethodSettings, case: Case) -> list[Row]:
     seeds = np.random.SeedSequence([settings.seed, int(case["wearer"]), 1]).spawn(4)
     generators = [np.random.default_rng(seed) for seed in seeds]
     calibrations = [
-        Calibration("no calibration", 0, 0.0, _rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))),
+        Calibration("no calibration", 0, 0.0, rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))),
         *_by_points(wearer, generators[0], settings),
         *_by_cubes(wearer, generators[1], placement, settings),
         *_by_both_eyes(wearer, generators[2], placement, settings),
@@ -199,8 +207,8 @@ def _meet(eyes_m: Sequence[Float64], rays: Sequence[Float64]) -> Float64:
     return nearest
 
 
-def _rendered(wearer: StudyWearer, shift_m: Mapping[Eye, Float64]) -> Projections:
-    """Return what the rig renders with for given eye shifts."""
+def rendered(wearer: StudyWearer, shift_m: Mapping[Eye, Float64]) -> Projections:
+    """Return what the rig renders with for given eye shifts φ, (3,) each."""
     return {
         eye: eye_projection(wearer.rig.eyes[eye], shift_m[eye]) @ wearer.T_E_H(eye) for eye in EYES
     }
@@ -248,7 +256,7 @@ def _by_points(
         found_px = pixels[eye][some][:_JUN_COUNT]
         eyes_m[eye] = solve_eye_from_points(points_E_m, found_px, wearer.rig.eyes[eye])
     count = 2 * _JUN_COUNT
-    found = _rendered(wearer, eyes_m)
+    found = rendered(wearer, eyes_m)
     yield Calibration(f"fingertip, eye only, {_JUN_COUNT}", count, _seconds(count), found)
     yield Calibration("INDICA, recycled", 0, 0.0, _indica(wearer, rng, settings))
 
@@ -285,7 +293,7 @@ def _by_cubes(
         align_cube(wearer, rng, placement, settings.corner_sigma_m) for _ in range(_MPAAM_CUBES)
     ]
     tracked_m, shown_m = (np.concatenate(side) for side in zip(*cubes, strict=True))
-    offline = _rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))
+    offline = rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))
     for model in FEWEST_PAIRS:
         T = solve_mpaam(tracked_m, shown_m, model)
         found = {eye: P @ T for eye, P in offline.items()}
@@ -305,13 +313,13 @@ def _by_both_eyes(
     for count, (alignment, shift_m) in enumerate(fused, 1):
         if count == 1:
             solved = solve_alignment(alignment, wearer.rig, "paper")
-            found = _rendered(wearer, {eye: solved[eye].shift_m for eye in EYES})
+            found = rendered(wearer, {eye: solved[eye].shift_m for eye in EYES})
             seconds = _seconds(1, by_hand=True) + _PAPER_SOLVES_S
-            yield Calibration("rcICP (the paper's), 1", 1, seconds, found)
+            yield Calibration(PAPER, 1, seconds, found)
         if count in _HAND_COUNTS:
             seconds = _seconds(count, by_hand=True)
-            found = _rendered(wearer, shift_m)
-            yield Calibration(f"handcal, both eyes, {count}", count, seconds, found)
+            found = rendered(wearer, shift_m)
+            yield Calibration(f"{HANDCAL_BOTH} {count}", count, seconds, found)
 
 
 def _by_each_eye(
@@ -326,8 +334,8 @@ def _by_each_eye(
         count, half = divmod(done, 2)
         if not half and count in _HAND_COUNTS:
             seconds = _seconds(done, by_hand=True)
-            found = _rendered(wearer, shift_m)
-            yield Calibration(f"handcal, each eye, {count}", done, seconds, found)
+            found = rendered(wearer, shift_m)
+            yield Calibration(f"{HANDCAL_EACH} {count}", done, seconds, found)
 
 
 def _align_in_turn(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -16,10 +15,11 @@ from handcal.display import TARGET_SIDE_M, eye_projection, projection_matrix, vi
 from handcal.geometry import invert, project, rigid, transform
 from handcal.register.guard import GuardSettings
 from handcal.rig.example import example_rig
-from handcal.sim.hand import HandModel, make_hand
+from handcal.sim.hand import HandModel
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import misplace, overlay_hand, view_through
 from handcal.sim.wearer import WearerSettings, draw_eyes, draw_slip
+from handcal.study.trials import study_hand
 from handcal.types import EYES, Alignment, Eye, Float64, Rig
 
 _REACH_M = 0.35, 0.70
@@ -66,7 +66,7 @@ class StudyWearer:
 
 def draw_wearer(rng: np.random.Generator, hand_seed: int, placement: WearerSettings) -> StudyWearer:
     """Draw a wearer: where the headset sits, and the eyes behind it."""
-    return StudyWearer(example_rig(), _hand(hand_seed), draw_eyes(rng, placement))
+    return StudyWearer(example_rig(), study_hand(hand_seed), draw_eyes(rng, placement))
 
 
 def align_hand(
@@ -222,8 +222,3 @@ def _edge_points_m() -> Float64:
     ]
     along = np.linspace(0.0, 1.0, _EDGE_POINTS)[:, None]
     return np.concatenate([a + along * (b - a) for a, b in ends])
-
-
-@lru_cache
-def _hand(seed: int) -> HandModel:
-    return make_hand(seed)

@@ -1,0 +1,52 @@
+"""What others published of these methods, as Hu et al. 2021 collected it (their tables 2 and 3).
+
+Conditions differ between studies: displays, distances, users and what counts as truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedReprojection:
+    """Reprojection error in arcmin: median, quartiles, extremes."""
+
+    study: str
+    median: float
+    q1: float
+    q3: float
+    min: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedMisalignment:
+    """Misalignment at arm's reach; x, y, z are "mean ± sd" in mm."""
+
+    study: str
+    alignments: str
+    error: str
+
+
+REPROJECTION = (
+    PublishedReprojection("Hu et al. 2021, rcICP, 1", 10.87, 8.18, 13.18, 5.55, 17.16),
+    PublishedReprojection("Itoh & Klinker 2014, SPAAM", 11.76, 10.25, 13.26, 7.11, 16.67),
+    PublishedReprojection("Itoh & Klinker 2014, INDICA", 14.49, 12.10, 16.08, 10.42, 17.32),
+    PublishedReprojection("Moser & Swan 2016, stylus, 25", 9.57, 6.13, 14.80, 0.66, 13.09),
+    PublishedReprojection("Moser & Swan 2016, finger, 25", 16.98, 10.83, 25.51, 0.93, 46.87),
+)
+"""The row on SPAAM is in the paper's source, not in its table. The stylus's third quartile is above
+its maximum as printed."""
+
+MISALIGNMENT = (
+    PublishedMisalignment(
+        "Hu et al. 2021", "1, hand", "x 0.85 ± 0.52, y 0.88 ± 0.53, z 2.85 ± 2.03"
+    ),
+    PublishedMisalignment(
+        "Azimi et al. 2017", "4 × 5, cube", "x 0.94 ± 0.74, y 0.83 ± 0.63, z 3.51 ± 2.67"
+    ),
+    PublishedMisalignment("Guo et al. 2019", "5, box", "6.83"),
+    PublishedMisalignment("Jun & Kim 2016", "8, fingertip", "about 10"),
+)
+"""Of cameras or users; not of the same quantity."""
