@@ -12,13 +12,14 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera_options import add_realsense_options, realsense_of
 from handcal.errors import FileError, HandcalError
 from handcal.evaluate_commands import add_evaluate_commands
 from handcal.export.formats import FORMATS
 from handcal.files import make_folder
+from handcal.hand.settings import Roi
 from handcal.rig_commands import add_rig_commands
 from handcal.rig_file_commands import add_rig_file_commands
 from handcal.study_commands import add_study_commands
@@ -74,11 +75,12 @@ def demo(arguments: argparse.Namespace) -> None:
 def segment(arguments: argparse.Namespace) -> None:
     """Segment the hand in one image pair: hand.ply, contour.ply, mask, overlay and hand.json."""
     from handcal.camera.images import read_frame
-    from handcal.hand.segment import SegmentSettings, segment_hand
+    from handcal.detector import make_finder
+    from handcal.hand.settings import SegmentSettings
     from handcal.segmentation_file import write_segmentation
 
     frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)
-    cloud = segment_hand(frame, SegmentSettings())
+    cloud = make_finder(SegmentSettings(roi=arguments.roi)).find(frame)
     write_segmentation(cloud, frame, make_folder(arguments.output))
     console.print(
         f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
@@ -144,14 +146,14 @@ def replay(arguments: argparse.Namespace) -> None:
     """Play a recording and segment the hand in every frame."""
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.recordings import open_recording
-    from handcal.hand.segment import SegmentSettings
+    from handcal.hand.settings import SegmentSettings
     from handcal.replay import replay as play
 
     shown_table = table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
     rows: list[dict[str, Any]] = []
     playback = PlaybackSettings(real_time=arguments.real_time)
     with open_recording(arguments.recording, playback) as camera:
-        for step in play(camera, SegmentSettings()):
+        for step in play(camera, SegmentSettings(roi=arguments.roi)):
             rows.append(_replay_row(step))
             shown = list(rows[-1].values())[:-1]
             shown_table.add_row(*map(_cell, shown))
@@ -310,6 +312,7 @@ def _parser() -> argparse.ArgumentParser:
         help="JSON with width, height, fx, fy, cx, cy and depth_scale (metres a unit)",
     )
     one.add_argument("--output", type=Path, required=True, help="folder for the results")
+    _add_roi(one)
 
     one = add(solve)
     one.add_argument("session", type=Path, help="a session's folder")
@@ -332,6 +335,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument(
         "--real-time", action="store_true", help="at the recorded pace, dropping frames"
     )
+    _add_roi(one)
 
     one = add(record)
     one.add_argument("output", type=Path, help="a .db3 file, or a new folder")
@@ -396,6 +400,15 @@ def _parser() -> argparse.ArgumentParser:
     add_rig_commands(steps)
     add_rig_file_commands(steps)
     return parser
+
+
+def _add_roi(command: Parser) -> None:
+    command.add_argument(
+        "--roi",
+        choices=get_args(Roi),
+        default="detector",
+        help="look for the hand where the detector sees it in the colour image, or by depth alone",
+    )
 
 
 def _open_source(arguments: argparse.Namespace) -> Camera:

@@ -27,10 +27,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
+from handcal.detector import make_finder
 from handcal.display import projection_matrix, view_of_eye
 from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
 from handcal.geometry import invert, transform
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.history import MAX_ALIGNMENTS, Shelf, read_shifts
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
@@ -211,6 +212,7 @@ class Calibration:
         self._session = session
         self._settings = settings or CalibrationSettings()
         self._clock = FrameClock(self._settings.camera_latency_s)
+        self._finder = make_finder(self._settings.segment)
         self._hands: deque[PlacedHand] = deque()
         self._unplaced: deque[tuple[HandCloud, int]] = deque()
         self._seen_ns = 0
@@ -267,7 +269,7 @@ class Calibration:
         problem = ""
         cloud: HandCloud | None = None
         try:
-            cloud = segment_hand(frame, self._settings.segment)
+            cloud = self._finder.find(frame)
             self._unplaced.append((cloud, self._seen_ns))
         except HandError as error:
             problem = str(error)

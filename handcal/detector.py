@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from functools import cache
 
 import numpy as np
 
+from handcal.errors import FileError
 from handcal.hand.detect import DetectSettings, HandDetector
+from handcal.hand.finder import HandFinder
+from handcal.hand.settings import SegmentSettings
 from handcal.resources import resource_path
 
 FLOAT_MODEL, INTEGER_MODEL = "hand_detector.onnx", "hand_detector_int8.onnx"
@@ -14,6 +18,25 @@ FLOAT_MODEL, INTEGER_MODEL = "hand_detector.onnx", "hand_detector_int8.onnx"
 _RUNS = 5
 _GAIN_MIN = 1.2  # less is not worth the integers' rounding
 _IMAGE = np.zeros((720, 1280, 3), np.uint8)
+
+
+def make_finder(settings: SegmentSettings) -> HandFinder:
+    """Return what finds the hand in a camera's frames, as the settings say.
+
+    With the depth image alone where the detector cannot be loaded; ``handcal doctor`` tells why.
+    """
+    if settings.roi == "depth":
+        return HandFinder(settings)
+    try:
+        return HandFinder(settings, _shipped())
+    except FileError:
+        return HandFinder(settings)
+
+
+@cache
+def _shipped() -> HandDetector:
+    """Load the detector once; it remembers no image."""
+    return load_detector()
 
 
 def load_detector(settings: DetectSettings | None = None) -> HandDetector:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from handcal.camera.sdk_devices import Device, connected_devices
 from handcal.camera.usb import explain_absence
+from handcal.detector import load_detector
 from handcal.errors import HandcalError
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
@@ -69,6 +70,7 @@ def examine() -> list[Finding]:
         _python(),
         *_packages(),
         _examples(),
+        _hand_detector(),
         _network(),
         _pairing(),
         *_cameras(),
@@ -102,6 +104,15 @@ def _examples() -> Finding:
         return read_rig(resource_path("example_rig.yaml")).name
 
     return _try("Example rig", read, "install handcal again")
+
+
+def _hand_detector() -> Finding:
+    try:
+        detector = load_detector()
+    except HandcalError as error:
+        advice = "hands are found by depth alone; install handcal again"
+        return Finding("Hand detector", Health.LIMITED, str(error), advice)
+    return Finding("Hand detector", Health.GOOD, f"runs {detector.model.name}")
 
 
 def _network() -> Finding:

@@ -10,9 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.camera.camera import Camera
+from handcal.detector import make_finder
 from handcal.errors import CameraEndError, HandError
 from handcal.geometry import transform
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.register.rigid import RigidSettings, register_rigid
 from handcal.register.surface import Surface, describe_surface
 from handcal.types import Float64, Frame, HandCloud, freeze
@@ -79,6 +80,7 @@ def replay(camera: Camera, settings: SegmentSettings) -> Iterator[ReplayStep]:
     CameraError
         As `Camera.read`, except for the end of a recording.
     """
+    finder = make_finder(settings)
     previous: Surface | None = None
     while True:
         try:
@@ -87,7 +89,7 @@ def replay(camera: Camera, settings: SegmentSettings) -> Iterator[ReplayStep]:
             return
         start_s = time.perf_counter()
         try:
-            hand = segment_hand(frame, settings)
+            hand = finder.find(frame)
             segment_s = time.perf_counter() - start_s
             surface = describe_surface(
                 hand.points_m.astype(np.float64), hand.is_cut, RigidSettings().max_points

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from handcal import detector
-from handcal.detector import load_detector
+from handcal.detector import load_detector, make_finder
+from handcal.errors import FileError, HandError
 from handcal.evaluate.annotations import read_image
-from handcal.hand.detect import HandDetector, overlaps
-from handcal.types import UInt8
+from handcal.hand.detect import Detections, HandDetector, overlaps
+from handcal.hand.settings import Roi, SegmentSettings
+from handcal.types import Frame, Intrinsics, UInt8
 
 
 @pytest.mark.parametrize(
@@ -41,3 +43,42 @@ def test_real_hands_are_found(hands: HandDetector, shared_data: Path) -> None:
     for name, shot in shots.items():
         found = hands.detect(read_image(folder / f"{name}_color.jpg")).boxes_px
         assert overlaps(found, np.array([shot["hand_box"]])).max() >= 0.5
+
+
+class Eyes:
+    """A detector that sees nothing, and counts its looks."""
+
+    looks = 0
+
+    def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
+        self.looks += 1
+        return Detections(np.empty((0, 4)), np.empty(0))
+
+
+def look(settings: SegmentSettings) -> None:
+    camera = Intrinsics(width=64, height=36, fx=50.0, fy=50.0, cx=31.5, cy=17.5)
+    depth, color = np.full((36, 64), 2000, np.uint16), np.zeros((36, 64, 3), np.uint8)
+    with pytest.raises(HandError, match="no hand-sized thing"):
+        make_finder(settings).find(Frame(0, 0, 0, depth, 0.001, camera, color, camera))
+
+
+@pytest.mark.parametrize(("roi", "looks"), [("detector", 1), ("depth", 0)])
+def test_the_detector_is_asked_where_the_settings_say_so(
+    monkeypatch: pytest.MonkeyPatch, roi: Roi, looks: int
+) -> None:
+    eyes = Eyes()
+    monkeypatch.setattr(detector, "_shipped", lambda: eyes)
+    look(SegmentSettings(roi=roi))
+    assert eyes.looks == looks
+
+
+def test_depth_decides_where_the_detector_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+
+    def missing() -> HandDetector:
+        tried.append(1)
+        raise FileError("no model")
+
+    monkeypatch.setattr(detector, "_shipped", missing)
+    look(SegmentSettings())
+    assert tried

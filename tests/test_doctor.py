@@ -25,6 +25,12 @@ def fail_with(error: Exception) -> object:
     return fail
 
 
+@pytest.fixture(autouse=True)
+def quick_detector(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare each test the trial of both models."""
+    monkeypatch.setattr(doctor, "load_detector", lambda: SimpleNamespace(model=Path("some.onnx")))
+
+
 def of(what: str) -> Finding:
     findings = [finding for finding in examine() if finding.what == what]
     assert len(findings) == 1
@@ -52,6 +58,17 @@ def test_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "version", fail_with(error))
     assert of("scipy") == Finding(
         "scipy", Health.BROKEN, "not installed", "run bash installer/run.sh, or pip install handcal"
+    )
+
+
+def test_a_missing_hand_detector_leaves_the_depth(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert of("Hand detector") == Finding("Hand detector", Health.GOOD, "runs some.onnx")
+    monkeypatch.setattr(doctor, "load_detector", fail_with(FileError("no model")))
+    assert of("Hand detector") == Finding(
+        "Hand detector",
+        Health.LIMITED,
+        "no model",
+        "hands are found by depth alone; install handcal again",
     )
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import onnxruntime
 
 from handcal.errors import FileError
 from handcal.types import Float32, Float64, UInt8, freeze
@@ -70,33 +69,42 @@ class HandDetector:
         ONNX, as `handcal.train` exports it.
     settings : DetectSettings, optional
 
+    Attributes
+    ----------
+    model : Path
+
     Raises
     ------
     FileError
-        If the model cannot be loaded.
+        If the model cannot be loaded, or onnxruntime not be imported.
     """
 
     def __init__(self, model: Path, settings: DetectSettings | None = None) -> None:
+        self.model = model
         self._settings = settings or DetectSettings()
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1
-        options.log_severity_level = 3
         try:
+            import onnxruntime
+
+            options = onnxruntime.SessionOptions()
+            options.intra_op_num_threads = 1
+            options.log_severity_level = 3
             self._session = onnxruntime.InferenceSession(
                 model, options, providers=["CPUExecutionProvider"]
             )
         except Exception as error:  # onnxruntime's exceptions have no common base
             raise FileError(f"cannot load the hand detector {model}: {error}") from error
 
-    def detect(self, color: UInt8) -> Detections:
+    def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
         """Find the hands in an image.
 
         Parameters
         ----------
         color : (H, W, 3) uint8
             RGB.
+        pixels : int, optional
+            In place of the settings' `pixels`; at least 1024.
         """
-        canvas, scale = letterbox(color, self._settings.pixels)
+        canvas, scale = letterbox(color, pixels or self._settings.pixels)
         [raw] = self._session.run(["raw"], {"image": canvas[None]})
         boxes, scores = decode(raw, canvas.shape[:2], self._settings)
         return Detections(boxes / scale, scores)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeAlias
 
 import cv2
@@ -12,7 +12,7 @@ from handcal.geometry import camera_matrix, image_points, invert, transform
 from handcal.hand.detect import Detections, overlaps
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
-from handcal.types import Bool, Float64, Frame, UInt8
+from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 
 Wanted: TypeAlias = Literal["nearest", "left", "right"]
 
@@ -26,8 +26,8 @@ _SHIFTS = 3
 class Detector(Protocol):
     """Finds hands in a colour image."""
 
-    def detect(self, color: UInt8) -> Detections:
-        """Return the hands in an (H, W, 3) RGB image."""
+    def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
+        """Return the hands in an (H, W, 3) RGB image, looked at with about so many pixels."""
         ...
 
 
@@ -39,8 +39,14 @@ class RoiSettings:
     ----------
     wanted : {"nearest", "left", "right"}
         Which of several hands, as seen in the image.
+    sure_min : float
+        Hands whose score is below this share of the surest one's are not considered.
     check_s : float
-        The detector looks again at a hand that has been followed for so long.
+        The detector looks again at a hand that has been followed for so long,
+    check_margin : float
+        at its surroundings only, so many times its box's longer side on each side,
+    check_pixels : int
+        and with so few pixels, because this goes on all the time.
     search_s : float
         While there is none, the detector looks this often.
     misses : int
@@ -52,7 +58,10 @@ class RoiSettings:
     """
 
     wanted: Wanted = "nearest"
+    sure_min: float = 0.7
     check_s: float = 0.19
+    check_margin: float = 0.5
+    check_pixels: int = 25_600
     search_s: float = 0.06
     misses: int = 2
     filled_min: float = 0.25
@@ -64,6 +73,7 @@ class RoiSettings:
 class _Track:
     """A hand in the depth image: its box, its depth, and its mass's place and size in the box."""
 
+    score: float
     box: Float64
     depth_m: float
     offset: Float64
@@ -100,6 +110,8 @@ class RoiFinder:
         """Return the hand's box in the depth image; None if none is in sight or without colour."""
         if frame.color is None:
             return None
+        if self._looked_ns is not None and frame.t_camera_ns < self._looked_ns:
+            self._track = self._looked_ns = None  # a recording has begun again
         cloud = _CoarseCloud(frame, self._gate_m)
         self._track = self._track and cloud.follow(self._track)
         wait_s = self._settings.search_s
@@ -112,23 +124,40 @@ class RoiFinder:
 
     def _look(self, color: UInt8, cloud: _CoarseCloud) -> None:
         """Let the detector confirm the track, drop it, or begin one."""
+        if self._track is not None:
+            confirmed = self._confirm(self._track, color, cloud)
+            self._misses = 0 if confirmed else self._misses + 1
+            if self._misses < self._settings.misses:
+                self._track = confirmed or self._track
+                return
+        self._misses = 0
+        height, width = color.shape[:2]
+        hands = self._hands(color, (0, 0, width, height), None, cloud)
+        least = self._settings.sure_min * max((hand.score for hand in hands), default=0.0)
+        sure = [hand for hand in hands if hand.score >= least]
+        self._track = min(sure, key=self._order, default=None)
+
+    def _confirm(self, track: _Track, color: UInt8, cloud: _CoarseCloud) -> _Track | None:
+        """Return the track as the detector sees it, None if it sees no hand there."""
+        part = cloud.surroundings(track, self._settings.check_margin)
+        hands = self._hands(color, part, self._settings.check_pixels, cloud)
+        return next((hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP), None)
+
+    def _hands(
+        self, color: UInt8, part: Box, pixels: int | None, cloud: _CoarseCloud
+    ) -> list[_Track]:
+        """Return the plausible hands that the detector sees in a part of the image."""
+        x0, y0, x1, y1 = part
+        found = self._detector.detect(color[y0:y1, x0:x1], pixels)
+        boxes = found.boxes_px + np.array([x0, y0, x0, y0])
         hands: list[_Track] = []
-        for box in self._detector.detect(color).boxes_px:
-            hand = cloud.track(box)
+        for box, score in zip(boxes, found.scores, strict=True):
+            hand = cloud.track(box, float(score))
             if hand is None or not self._is_plausible(hand, cloud):
                 continue
             if not any(_on_one_hand(hand, surer) for surer in hands):
                 hands.append(hand)
-        if self._track is not None:
-            same = [hand for hand in hands if _overlap(hand, self._track) >= _SAME_OVERLAP]
-            self._misses = 0 if same else self._misses + 1
-            if same:
-                self._track = same[0]
-            elif self._misses >= self._settings.misses:
-                self._track = None
-        if self._track is None:
-            self._misses = 0
-            self._track = min(hands, key=self._order, default=None)
+        return hands
 
     def _is_plausible(self, track: _Track, cloud: _CoarseCloud) -> bool:
         """Tell whether what is in a box is of a hand's size and fills it as a hand does."""
@@ -161,7 +190,7 @@ class _CoarseCloud:
         self._px = _STEP_PX * np.column_stack([self._columns, self._rows]).astype(np.float64)
         self._depth_m = self._view.depth[self._rows, self._columns] * self._view.scale_m
 
-    def track(self, color_box: Float64) -> _Track | None:
+    def track(self, color_box: Float64, score: float) -> _Track | None:
         """Return the nearest thing in a box of the colour image."""
         inside = _inside(self._color_px(), color_box)
         if np.count_nonzero(inside) < _PIXELS_MIN:
@@ -169,9 +198,9 @@ class _CoarseCloud:
         nearest_m = np.quantile(self._depth_m[inside], 0.1)
         inside &= self._depth_m < nearest_m + _DEPTH_SPREAD_M
         depth_m = float(np.median(self._depth_m[inside]))
-        box = self._depth_box(color_box, depth_m)
+        box = self._in_depth(color_box, depth_m)
         offset = self._px[inside].mean(0) - _center(box)
-        return _Track(box, depth_m, offset, int(np.count_nonzero(inside)))
+        return _Track(score, box, depth_m, offset, int(np.count_nonzero(inside)))
 
     def follow(self, track: _Track) -> _Track | None:
         """Move a track's box with the mass in it; None if most of that is gone."""
@@ -184,7 +213,17 @@ class _CoarseCloud:
                 return None
             shift = px[inside].mean(0) - track.offset - _center(box)
             box = box + np.tile(shift, 2)
-        return _Track(box, float(np.median(depth_m[inside])), track.offset, track.pixels)
+        return replace(track, box=box, depth_m=float(np.median(depth_m[inside])))
+
+    def surroundings(self, track: _Track, margin: float) -> Box:
+        """Return the part of the colour image about a track."""
+        box = self._in_color(track.box, track.depth_m)
+        wider = margin * (box[2:] - box[:2]).max()
+        size = self._color_camera.width, self._color_camera.height
+        low = np.floor(box[:2] - wider).clip(0, np.subtract(size, 1))
+        high = np.ceil(box[2:] + wider).clip(low + 1, size)
+        x0, y0, x1, y1 = np.concatenate([low, high]).astype(int).tolist()
+        return x0, y0, x1, y1
 
     def clip(self, box: Float64) -> Box | None:
         """Return a box in whole pixels within the depth image, None if it is outside."""
@@ -200,17 +239,28 @@ class _CoarseCloud:
         points_m = deproject(self._view, self._rows, self._columns).T
         return image_points(transform(self._T_C_D, points_m), self._color_camera)
 
-    def _depth_box(self, color_box: Float64, depth_m: float) -> Float64:
+    def _in_depth(self, color_box: Float64, depth_m: float) -> Float64:
         """Return a box of the colour image in the depth image, for things at a depth."""
         if self._aligned:
             return color_box
-        rays = cv2.undistortPoints(
-            color_box.reshape(2, 1, 2),
-            camera_matrix(self._color_camera),
-            np.array(self._color_camera.distortion),
-        )
-        corners_m = np.column_stack([rays.reshape(2, 2), np.ones(2)]) * depth_m
-        return image_points(transform(invert(self._T_C_D), corners_m), self.camera).ravel()
+        return _moved(color_box, depth_m, self._color_camera, self.camera, invert(self._T_C_D))
+
+    def _in_color(self, box: Float64, depth_m: float) -> Float64:
+        """Return a box of the depth image in the colour image, for things at a depth."""
+        if self._aligned:
+            return box
+        return _moved(box, depth_m, self.camera, self._color_camera, self._T_C_D)
+
+
+def _moved(
+    box: Float64, depth_m: float, camera: Intrinsics, other: Intrinsics, T_other_camera: Float64
+) -> Float64:
+    """Return where another camera shows what is at a depth in a box of a camera's image."""
+    rays = cv2.undistortPoints(
+        box.reshape(2, 1, 2), camera_matrix(camera), np.array(camera.distortion)
+    )
+    corners_m = np.column_stack([rays.reshape(2, 2), np.ones(2)]) * depth_m
+    return image_points(transform(T_other_camera, corners_m), other).ravel()
 
 
 def _inside(px: Float64, box: Float64) -> Bool:

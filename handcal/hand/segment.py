@@ -13,7 +13,7 @@ from handcal.hand.surface import behind_nearest
 from handcal.hand.view import Box, Pixels, deproject, pixels_of, view_depth
 from handcal.types import Bool, Float32, Frame, HandCloud, Intrinsics, UInt8
 
-__all__ = ["SegmentSettings", "segment_hand"]
+__all__ = ["SegmentSettings", "segment_hand", "segmented_window"]
 
 # The hand is located on a grid of about this pitch at this depth.
 _COARSE_PITCH_M = 0.002
@@ -45,23 +45,30 @@ def segment_hand(frame: Frame, settings: SegmentSettings, roi_px: Box | None = N
         If `roi_px` does not overlap the image.
     """
     camera = frame.depth_intrinsics
-    window = _window(roi_px, camera, settings.roi_margin)
-    step_px = max(1, round(_COARSE_PITCH_M * camera.fx / _COARSE_DEPTH_M))
-    located = locate_hand(view_depth(frame, window, step_px), settings)
+    window = segmented_window(roi_px, camera, settings)
+    located = locate_hand(view_depth(frame, window, _coarse_step_px(camera)), settings)
     return _cloud(frame, mask_hand(frame, located, settings), settings)
 
 
-def _window(roi_px: Box | None, camera: Intrinsics, margin: float) -> Box:
-    """Return the part of the image to look at."""
+def segmented_window(roi_px: Box | None, camera: Intrinsics, settings: SegmentSettings) -> Box:
+    """Return the part of the depth image that `segment_hand` looks at.
+
+    It lies on the coarse grid of the whole image, so that the same hand is found in both.
+    """
     if roi_px is None:
         return 0, 0, camera.width, camera.height
     x0, y0, x1, y1 = roi_px
-    wider, higher = round(margin * (x1 - x0)), round(margin * (y1 - y0))
-    x0, y0 = max(0, x0 - wider), max(0, y0 - higher)
+    wider, higher = (round(settings.roi_margin * side) for side in (x1 - x0, y1 - y0))
+    step_px = _coarse_step_px(camera)
+    x0, y0 = (max(0, low) // step_px * step_px for low in (x0 - wider, y0 - higher))
     x1, y1 = min(camera.width, x1 + wider), min(camera.height, y1 + higher)
     if x0 >= x1 or y0 >= y1:
         raise ValueError(f"the region of interest {roi_px} is empty or outside the depth image")
     return x0, y0, x1, y1
+
+
+def _coarse_step_px(camera: Intrinsics) -> int:
+    return max(1, round(_COARSE_PITCH_M * camera.fx / _COARSE_DEPTH_M))
 
 
 def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 # About: fewer cannot be registered, and more than 50,000 not be sent to the headset.
 _LEAST_POINTS, _MOST_POINTS = 200, 40_000
+
+Roi = Literal["detector", "depth"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +17,9 @@ class SegmentSettings:
 
     Attributes
     ----------
+    roi : {"detector", "depth"}
+        Where to look: where the hand detector sees a hand in the colour image, if there is one, or
+        for the nearest hand-sized thing in the whole depth image.
     depth_min_m, depth_max_m : float
         Depth gate: within arm's reach and the camera's range (paper, section on segmentation).
     edge_jump_m : float
@@ -38,6 +44,7 @@ class SegmentSettings:
         If the gate is empty, or `points` is too few to register or too many to send.
     """
 
+    roi: Roi = "detector"
     depth_min_m: float = 0.35
     depth_max_m: float = 0.70
     edge_jump_m: float = 0.02

@@ -13,7 +13,7 @@ from handcal.types import UInt8
 class Seer:
     """A detector that sees the hand, and another that is not there."""
 
-    def detect(self, color: UInt8) -> Detections:
+    def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
         assert color.shape == (96, 128, 3)
         return Detections(
             np.array([[10.0, 10.0, 60.0, 60.0], [70.0, 70.0, 90.0, 90.0]]), np.array([0.9, 0.8])

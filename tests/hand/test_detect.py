@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,12 @@ def test_overlap_is_intersection_over_union() -> None:
     box = np.array([[0.0, 0.0, 2.0, 2.0]])
     others = np.array([[0.0, 0.0, 2.0, 2.0], [1.0, 0.0, 3.0, 2.0], [5.0, 5.0, 6.0, 6.0]])
     assert overlaps(box, others) == pytest.approx(np.array([[1.0, 1 / 3, 0.0]]))
+
+
+def test_says_that_onnxruntime_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(FileError, match="onnxruntime"):
+        HandDetector(tmp_path / "any.onnx")
 
 
 def test_says_which_model_cannot_be_loaded(tmp_path: Path) -> None:
