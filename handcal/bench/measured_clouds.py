@@ -11,13 +11,12 @@ from handcal.bench.trials import (
     Measured,
     Progress,
     collect_errors,
-    floor_error_m,
     mean_length_mm,
     run_trials,
-    solve_trial,
     trial_alignment,
 )
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
+from handcal.study.trials import floor_error_m, solve_trial
 
 _FOREARM_M = 0.02, 0.06
 _CUT_SIGMA_M = 0.0015

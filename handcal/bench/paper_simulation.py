@@ -20,12 +20,11 @@ from handcal.bench.trials import (
     Measured,
     Progress,
     collect_errors,
-    floor_error_m,
     mean_length_mm,
-    solve_trial,
     trial_alignment,
 )
 from handcal.sim.alignments import AlignmentSettings
+from handcal.study.trials import floor_error_m, solve_trial
 from handcal.types import METHODS, Float64
 
 _SLOW = "paper", "linear"

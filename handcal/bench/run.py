@@ -13,6 +13,7 @@ from handcal.bench.delivery import measure_delivery
 from handcal.bench.measured_clouds import measure_covariance, measure_cuts
 from handcal.bench.offline import measure_offline
 from handcal.bench.paper_simulation import measure_paper_simulation
+from handcal.bench.scale import measure_scale
 from handcal.bench.settings import BenchSettings
 from handcal.bench.speed import measure_speed
 from handcal.bench.trials import Measured, Progress
@@ -26,6 +27,7 @@ PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "covariance": measure_covariance,
     "offline": measure_offline,
     "paper_simulation": measure_paper_simulation,
+    "scale": measure_scale,
 }
 _LIBRARIES = ("handcal", "numpy", "scipy", "opencv-python-headless", "open3d-cpu", "open3d")
 _MET = {True: "met", False: "missed", None: ""}

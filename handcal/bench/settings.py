@@ -31,6 +31,8 @@ class BenchSettings:
         Rigs calibrated from rendered photographs, at some minutes each.
     offline_wearers : int
         Who calibrate with each of them, and with the true rig.
+    study_trials : int
+        Alignments of each value in a small noise study, done twice; none of it if 0.
     """
 
     points: int = 5000
@@ -43,6 +45,7 @@ class BenchSettings:
     paper_repeats: int = 3
     offline_rigs: int = 1
     offline_wearers: int = 100
+    study_trials: int = 8
 
 
 QUICK = BenchSettings(
@@ -55,5 +58,6 @@ QUICK = BenchSettings(
     repeats=3,
     paper_repeats=1,
     offline_rigs=0,
+    study_trials=0,
 )
 """A look whether everything runs, in some seconds; its figures say little."""

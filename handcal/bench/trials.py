@@ -6,18 +6,16 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import product
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from handcal.bench.figure import Figure
-from handcal.register.model import fit_shift
-from handcal.register.solve import solve_eye_shift
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment, simulate_alignment
-from handcal.sim.hand import HandModel, make_hand
-from handcal.types import EyeShift, Float64, Method
+from handcal.sim.hand import HandModel
+from handcal.study.trials import study_hand
+from handcal.types import Float64
 
 Task = TypeVar("Task")
 Case = TypeVar("Case")
@@ -71,39 +69,15 @@ def collect_errors(
     }
 
 
-@lru_cache
-def _make_hand(seed: int) -> HandModel:
-    return make_hand(seed)
-
-
 def trial_hand(trial: int) -> HandModel:
     """Return the hand of a trial: some people, who come again."""
-    return _make_hand(trial % _HANDS)
+    return study_hand(trial % _HANDS)
 
 
 def trial_alignment(trial: int, angle_deg: float, making: AlignmentSettings) -> SimulatedAlignment:
     """Return the alignment of a trial; at other angles it is the same but for the angle."""
     rng = np.random.default_rng(trial)
     return simulate_alignment(rng, trial_hand(trial), np.radians(angle_deg), making)
-
-
-def solve_trial(made: SimulatedAlignment, method: Method) -> EyeShift:
-    """Solve a simulated alignment."""
-    return solve_eye_shift(
-        made.cursor_m,
-        made.hand_m,
-        display_distance_m=made.display_distance_m,
-        T_E_W=made.T_E_W,
-        method=method,
-        cursor_cut=made.cursor_cut,
-        hand_cut=made.hand_cut,
-    )
-
-
-def floor_error_m(made: SimulatedAlignment, *, exact: bool) -> Float64:
-    """Return the error of φ, (3,), that remains when all pairs are known and free of noise."""
-    known = made.known_cursor_m, made.known_hand_m
-    return fit_shift(*known, made.display_distance_m, exact=exact) - made.shift_m
 
 
 def mean_length_mm(errors_m: Float64) -> float:

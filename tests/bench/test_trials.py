@@ -1,16 +1,9 @@
 import numpy as np
 import pytest
 
-from handcal.bench.trials import (
-    Errors,
-    collect_errors,
-    floor_error_m,
-    mean_length_mm,
-    run_trials,
-    solve_trial,
-    trial_alignment,
-)
+from handcal.bench.trials import Errors, collect_errors, mean_length_mm, run_trials, trial_alignment
 from handcal.sim.alignments import AlignmentSettings
+from handcal.study.trials import floor_error_m, solve_trial
 
 SMALL = AlignmentSettings(count=300)
 
