@@ -71,7 +71,7 @@ class Live(QObject):
         self._snapshot: Snapshot | None = None
         self._is_watching = False
         panels = window.panels
-        self._turns = deque((panels.cloud, panels.rotation, panels.wearer_view))
+        self._turns: deque[Panel] = deque((panels.cloud, panels.rotation, panels.wearer_view))
         self._seen: set[object] = set()  # panels
         self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
         self._complained_of = ""

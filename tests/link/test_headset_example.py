@@ -32,7 +32,7 @@ def test_the_example_draws_confirms_and_ends_with_the_pc(pairing_key: bytes) -> 
         assert process.stdout is not None
         server.send_cursor(np.zeros((10, 3)), 7)
         server.send_prompt("Close your left eye.", ("right",))
-        lines = []
+        lines: list[str] = []
         while "cursor 7" not in (lines or [""])[-1] or "Close" not in lines[-1]:
             lines.append(process.stdout.readline())
             assert lines[-1], "the example ended"
