@@ -112,11 +112,11 @@ class Calibration:
 
 
 def methods_study(settings: MethodSettings) -> Study:
-    """Return the study."""
+    """Return the study: each wearer in every population before the next."""
     cases: list[Case] = [
-        {"eye_distance_sigma_mm": 1e3 * sigma_m, "wearer": wearer}
-        for sigma_m in settings.eye_distance_sigmas_m
+        {"wearer": wearer, "eye_distance_sigma_mm": 1e3 * sigma_m}
         for wearer in range(settings.wearers)
+        for sigma_m in settings.eye_distance_sigmas_m
     ]
     return Study("methods", settings, cases, compare_methods)
 

@@ -1,9 +1,11 @@
+import json
 from pathlib import Path
 from shutil import copytree
 
 import numpy as np
 import pytest
 
+from handcal.__main__ import main
 from handcal.errors import FileError
 from handcal.study.methods import MethodSettings
 from handcal.study.recorded import evaluate_recordings, read_recordings
@@ -80,3 +82,19 @@ def test_damaged_files_are_named(
 def test_another_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="the data set is incomplete"):
         read_recordings(tmp_path)
+
+
+def test_the_command_tells_every_recording(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file = tmp_path / "recorded.json"
+    arguments = "handcal", "study", "recorded", str(folder), "--json", str(file)
+    monkeypatch.setattr("sys.argv", arguments)
+    main()
+    shown = capsys.readouterr().out
+    assert len(json.loads(file.read_text())) == 11
+    assert "authors'" in shown
+    assert "8.5′" in shown
