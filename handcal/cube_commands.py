@@ -23,11 +23,9 @@ if TYPE_CHECKING:
     from handcal.types import Rig
 
 _SHOWN = (
-    ("err_t_x_mm", "x, mm"),
-    ("err_t_y_mm", "y, mm"),
-    ("err_t_z_mm", "z, mm"),
-    ("err_t_xy_mm", "xy, mm"),
     ("err_t_xy_arcmin", "xy, arcmin"),
+    ("err_t_xy_mm", "xy, mm"),
+    ("err_t_z_mm", "z, mm"),
     ("err_R_deg", "rotation, °"),
 )
 

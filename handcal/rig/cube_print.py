@@ -20,12 +20,12 @@ _PLACES = {
     "top": (1, 0),
     "bottom": (1, 2),
 }
-_LINE_M = 0.0002
+_LINE_M, _MARK_SHARE = 0.0002, 0.15
 _TAB_M = 0.008
 
 
 def write_cube_pdf(path: Path, cube: Cube, paper: Paper = "a4") -> None:
-    """Write the cube's net as a PDF page at its true size, thin lines where to cut and to fold.
+    """Write the cube's net as a PDF page at its true size, marks where to cut and to fold.
 
     Raises
     ------
@@ -68,13 +68,17 @@ def _tabs(side_m: float) -> list[Float64]:
 
 
 def _outline(first_m: Float64, last_m: Float64) -> Float64:
-    """Return four thin lines just within a rectangle."""
+    """Return the ends of four thin lines just within a rectangle.
+
+    Whole lines around a marker are a square as well, which OpenCV may take instead of the marker.
+    """
     (left, top), (right, bottom) = first_m, last_m
+    across, down = (_MARK_SHARE * (last_m - first_m)).tolist()
     return np.array(
         [
-            [left, top, right, top + _LINE_M],
-            [left, bottom - _LINE_M, right, bottom],
-            [left, top, left + _LINE_M, bottom],
-            [right - _LINE_M, top, right, bottom],
+            [x, y, x + length, y + height]
+            for length, height in ((across, _LINE_M), (_LINE_M, down))
+            for x in (left, right - length)
+            for y in (top, bottom - height)
         ]
     )

@@ -34,14 +34,15 @@ from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 from handcal.sim.wearer import WearerSettings, draw_slip
 from handcal.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, UInt8
 
-# Where the camera is in the eye box: x right, y down.
-_POSITIONS = {
+POSITIONS = {
     "centre": (0.0, 0.0),
     "up": (0.0, -1.0),
     "down": (0.0, 1.0),
     "left": (-1.0, 0.0),
     "right": (1.0, 0.0),
 }
+"""Where the camera may be in the eye box: x right, y down."""
+
 _NEAR_M, _FAR_M, _ASIDE_M = 0.4, 0.6, 0.02
 _EDGE_PX = 8.0
 # So turned, three faces show.
@@ -57,6 +58,8 @@ class CaptureSettings:
     ----------
     seed : int
     eye : {"left", "right"}
+    positions : tuple of str
+        Of the camera; names in `POSITIONS`.
     poses : int
         Of the cube at each position, 0.4 to 0.6 m away.
     alignments : int
@@ -81,6 +84,7 @@ class CaptureSettings:
 
     seed: int = 1
     eye: Eye = "left"
+    positions: tuple[str, ...] = tuple(POSITIONS)
     poses: int = 4
     alignments: int = 1
     aside_m: float = 0.004
@@ -123,9 +127,10 @@ def write_captures(
     write_cube(folder / "cube.json", settings.cube)
     studio = _Studio(rig, settings)
     truth = {}
-    for number, (position, aside) in enumerate(_POSITIONS.items()):
+    for number, position in enumerate(settings.positions):
         rng = np.random.default_rng([settings.seed, number])
-        true_m = rng.normal(settings.aside_m * np.array([*aside, 0.0]), settings.place_sigma_m)
+        middle_m = settings.aside_m * np.array([*POSITIONS[position], 0.0])
+        true_m = rng.normal(middle_m, settings.place_sigma_m)
         solved_m = studio.calibrate(true_m, rng)
         truth[position] = {"true_shift_m": true_m.tolist(), "solved_shift_m": solved_m.tolist()}
         T_E_C = rigid(rng.normal(0.0, settings.turn_sigma_rad, 3), true_m)
@@ -133,7 +138,7 @@ def write_captures(
         place = make_folder(folder / position)
         write_png(place / "grid.png", studio.capture_display(studio.grid, T_E_C, rng))
         for pose in range(settings.poses):
-            done = (number + pose / settings.poses) / len(_POSITIONS)
+            done = (number + pose / settings.poses) / len(settings.positions)
             report(f"{position}, pose {pose + 1}", done)
             images = make_folder(place / f"pose-{pose + 1}")
             for name, image in studio.capture_cube(T_E_C, shifts_m, rng):

@@ -1,0 +1,60 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.cube_file import read_cube
+from handcal.errors import FileError
+from handcal.evaluate.cube_test import judge_captures
+from handcal.files import read_json
+from handcal.rig.example import example_rig
+from handcal.rig.formats import read_intrinsics
+from handcal.rig.grid import Grid
+from handcal.sim.cube_captures import CaptureSettings, write_captures
+from handcal.types import Intrinsics, Rig
+
+CAMERA = Intrinsics(640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
+SETTINGS = CaptureSettings(positions=("left",), poses=1, points=1000, camera=CAMERA)
+GRID = Grid(634, 360)
+
+
+def small_rig() -> Rig:
+    """Return the example with displays half as fine."""
+    rig = example_rig()
+    half = np.diag([0.5, 0.5, 1.0])
+    eyes = {
+        eye: replace(display, K=half @ display.K, width_px=GRID.width_px, height_px=GRID.height_px)
+        for eye, display in rig.eyes.items()
+    }
+    return replace(rig, eyes=eyes)
+
+
+def test_a_calibrated_display_draws_the_cube_where_it_is(tmp_path: Path) -> None:
+    write_captures(tmp_path, small_rig(), SETTINGS, lambda _what, _share: None)
+    names = {path.name for path in (tmp_path / "left" / "pose-1").iterdir()}
+    virtual = {f"virtual-{drawn}.png" for drawn in ("offline", "solved", "true")}
+    assert names == {"real.png"} | virtual
+    cube, camera = read_cube(tmp_path / "cube.json"), read_intrinsics(tmp_path / "camera.json")
+    assert camera == CAMERA
+    test = judge_captures(tmp_path, cube, camera, GRID)
+    assert not test.left_out
+    errors = {
+        row["drawn"]: {name: float(row[name]) for name in row if name.endswith(("_mm", "_deg"))}
+        for row in test.rows
+    }
+    # What is left with the true φ is the test's own: tracking and finding corners.
+    assert errors["true"]["err_t_xy_mm"] < 0.15
+    assert errors["true"]["err_R_deg"] < 0.3
+    assert errors["true"]["err_t_xy_mm"] < errors["solved"]["err_t_xy_mm"] < 2.0
+    # About 4 mm to the left, seen on a display at 2 m from half a metre.
+    true_m = read_json(tmp_path / "truth.json")["positions"]["left"]["true_shift_m"]
+    factor = 1.0 - 1e-3 * errors["offline"]["depth_mm"] / 2.0
+    expected_mm = 1e3 * factor * np.linalg.norm(true_m[:2])
+    assert errors["offline"]["err_t_xy_mm"] == pytest.approx(expected_mm, rel=0.1)
+
+
+def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "note.txt").touch()
+    with pytest.raises(FileError, match="not empty"):
+        write_captures(tmp_path, small_rig(), SETTINGS, lambda _what, _share: None)
