@@ -52,7 +52,7 @@ class SegmentSettings:
     forearm_m: float = 0.02
     cut_band_m: float = 0.004
     hole_area_m2: float = 1e-4
-    roi_margin: float = 0.25
+    roi_margin: float = 0.4
     points: int = 5000
 
     def __post_init__(self) -> None:
