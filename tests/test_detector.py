@@ -1,15 +1,16 @@
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from handcal import detector
 from handcal.detector import load_detector, make_finder
 from handcal.errors import FileError, HandError
-from handcal.evaluate.annotations import read_image
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.settings import Roi, SegmentSettings
+from handcal.image_file import read_image
 from handcal.types import Frame, Intrinsics, UInt8
 
 
@@ -41,7 +42,9 @@ def test_real_hands_are_found(hands: HandDetector, shared_data: Path) -> None:
     folder = shared_data / "rgbd" / "color_aligned_640"
     shots = json.loads((folder / "meta.json").read_text())
     for name, shot in shots.items():
-        found = hands.detect(read_image(folder / f"{name}_color.jpg")).boxes_px
+        found = hands.detect(
+            read_image(folder / f"{name}_color.jpg", cv2.IMREAD_COLOR_RGB)
+        ).boxes_px
         assert overlaps(found, np.array([shot["hand_box"]])).max() >= 0.5
 
 

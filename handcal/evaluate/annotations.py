@@ -15,6 +15,7 @@ import numpy as np
 
 from handcal.errors import FileError
 from handcal.files import read_json
+from handcal.image_file import read_image
 from handcal.types import Bool, Float64, UInt8
 
 
@@ -43,10 +44,30 @@ class Photo:
 
     @property
     def relative_sizes(self) -> Float64:
-        """(M,) float64: square root of each box's share of the image."""
-        sides = self.boxes[:, 2:] - self.boxes[:, :2]
+        """(M,) float64: `relative_sizes_of` the hands."""
+        return self.relative_sizes_of(self.boxes)
+
+    def relative_sizes_of(self, boxes: Float64) -> Float64:
+        """Return the square root of each box's (N, 4) share of the image, (N,)."""
+        sides = boxes[:, 2:] - boxes[:, :2]
         sizes: Float64 = np.sqrt(np.prod(sides, axis=1) / (self.width * self.height))
         return sizes
+
+    def read(self) -> UInt8:
+        """Return the photograph, (height, width, 3) RGB.
+
+        Raises
+        ------
+        FileError
+            If it cannot be read, or is of another size than was annotated.
+        """
+        image: UInt8 = read_image(self.path, cv2.IMREAD_COLOR_RGB)
+        height, width = image.shape[:2]
+        if (width, height) != (self.width, self.height):
+            raise FileError(
+                f"{self.path} is {width}x{height} pixels, annotated as {self.width}x{self.height}"
+            )
+        return image
 
 
 def read_annotations(images: Path, annotations: Path) -> list[Photo]:
@@ -59,7 +80,7 @@ def read_annotations(images: Path, annotations: Path) -> list[Photo]:
     """
     try:
         return [_photo(images / name, entry) for name, entry in read_json(annotations).items()]
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise FileError(f"{annotations} is not a file of hand annotations: {error!r}") from error
 
 
@@ -68,25 +89,10 @@ def _photo(path: Path, entry: dict[str, Any]) -> Photo:
     width, height = int(entry["width"]), int(entry["height"])
     if width < 1 or height < 1:
         raise ValueError(f"{path.name} is {width}x{height} pixels large")
+    boxes = np.array([hand["box"] for hand in hands], np.float64).reshape(-1, 4)
+    quads = np.array([hand["quad"] for hand in hands], np.float64).reshape(-1, 4, 2)
+    if not (np.isfinite(boxes).all() and np.isfinite(quads).all()):
+        raise ValueError(f"{path.name} has a hand that is nowhere")
     return Photo(
-        path,
-        width,
-        height,
-        np.array([hand["box"] for hand in hands], np.float64).reshape(-1, 4),
-        np.array([hand["quad"] for hand in hands], np.float64).reshape(-1, 4, 2),
-        np.array([hand["large"] for hand in hands], bool),
+        path, width, height, boxes, quads, np.array([hand["large"] for hand in hands], bool)
     )
-
-
-def read_image(path: Path, flags: int = cv2.IMREAD_COLOR_RGB) -> UInt8:
-    """Return an image, by default as (h, w, 3) RGB.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read.
-    """
-    image = cv2.imread(str(path), flags)
-    if image is None:
-        raise FileError(f"cannot read the image {path}")
-    return image.astype(np.uint8, copy=False)

@@ -9,13 +9,12 @@ import cv2
 import numpy as np
 
 from handcal.errors import FileError
-from handcal.evaluate.annotations import Photo, read_image
-from handcal.evaluate.precision import ImageResult
+from handcal.evaluate.annotations import Photo
+from handcal.evaluate.precision import MATCH_OVERLAP, ImageResult
 from handcal.files import write_atomic
 from handcal.hand.detect import DetectSettings, overlaps
 from handcal.types import Float64, UInt8
 
-_OVERLAP = 0.5
 _COLUMNS = 6
 _TILE_PX = 240
 _MISSED, _FALSE, _FOUND = (255, 60, 60), (255, 200, 0), (60, 220, 60)
@@ -45,8 +44,8 @@ def contact_sheet(
     for photo, result in zip(photos, results, strict=True):
         found = result.boxes[result.scores >= score_min]
         overlap = overlaps(found, photo.boxes)
-        missed = photo.boxes[overlap.max(0, initial=0.0) < _OVERLAP]
-        false = found[overlap.max(1, initial=0.0) < _OVERLAP]
+        missed = photo.boxes[overlap.max(0, initial=0.0) < MATCH_OVERLAP]
+        false = found[overlap.max(1, initial=0.0) < MATCH_OVERLAP]
         if len(missed) or len(false):
             failures.append((_area(missed) + _area(false), photo, found, missed, false))
     failures.sort(key=lambda failure: -failure[0])
@@ -83,7 +82,7 @@ def _area(boxes: Float64) -> float:
 
 def _tile(photo: Photo, found: Float64, missed: Float64, false: Float64) -> UInt8:
     scale = _TILE_PX / max(photo.width, photo.height)
-    image = cv2.resize(read_image(photo.path), None, fx=scale, fy=scale)
+    image = cv2.resize(photo.read(), None, fx=scale, fy=scale)
     for boxes, color, text in (
         (found, _FOUND, ""),
         (missed, _MISSED, "missed"),

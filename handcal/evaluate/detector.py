@@ -8,8 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from handcal.evaluate.annotations import Photo, read_image
-from handcal.evaluate.precision import ImageResult, PrecisionRecall, precision_recall
+from handcal.evaluate.annotations import Photo
+from handcal.evaluate.precision import (
+    MATCH_OVERLAP,
+    ImageResult,
+    PrecisionRecall,
+    precision_recall,
+)
+from handcal.hand.detect import overlaps
 from handcal.hand.roi import Detector
 
 SCORE_MIN = 0.02
@@ -30,7 +36,7 @@ def detect_all(
     """
     results = []
     for number, photo in enumerate(photos, 1):
-        found = detector.detect(read_image(photo.path))
+        found = detector.detect(photo.read())
         results.append(ImageResult(found.boxes_px, found.scores, photo.boxes))
         if report is not None:
             report(number / len(photos))
@@ -42,19 +48,34 @@ def summary(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str
 
     The keys are ``ap50``, ``ap50_large`` (the data set's own rule), and ``ap50_rel15`` and
     ``ap50_rel25`` (hands whose box's share of the image is that number squared, or more). None
-    where there is no such hand.
+    where there is no such hand. As in COCO's area ranges, of the last two a smaller box that is on
+    no hand is not false either.
     """
-    counted = {
-        "ap50": [np.ones(len(photo.boxes), bool) for photo in photos],
-        "ap50_large": [photo.large for photo in photos],
-        "ap50_rel15": [photo.relative_sizes >= 0.15 for photo in photos],
-        "ap50_rel25": [photo.relative_sizes >= 0.25 for photo in photos],
-    }
+    everything = [np.ones(len(photo.boxes), bool) for photo in photos]
+    large = [photo.large for photo in photos]
     precisions = {
-        name: precision_recall(zip(results, chosen, strict=True)).average_precision
-        for name, chosen in counted.items()
+        "ap50": precision_recall(zip(results, everything, strict=True)),
+        "ap50_large": precision_recall(zip(results, large, strict=True)),
+        "ap50_rel15": _of_size(photos, results, 0.15),
+        "ap50_rel25": _of_size(photos, results, 0.25),
     }
-    return {name: None if math.isnan(ap) else ap for name, ap in precisions.items()}
+    return {
+        name: None if math.isnan(curve.average_precision) else curve.average_precision
+        for name, curve in precisions.items()
+    }
+
+
+def _of_size(
+    photos: Sequence[Photo], results: Sequence[ImageResult], size_min: float
+) -> PrecisionRecall:
+    """Return the curve over hands of a relative size, smaller boxes left out unless on a hand."""
+    judged = []
+    for photo, result in zip(photos, results, strict=True):
+        on_hand = overlaps(result.boxes, result.hands).max(1, initial=0.0) >= MATCH_OVERLAP
+        kept = on_hand | (photo.relative_sizes_of(result.boxes) >= size_min)
+        found = ImageResult(result.boxes[kept], result.scores[kept], result.hands)
+        judged.append((found, photo.relative_sizes >= size_min))
+    return precision_recall(judged)
 
 
 def evaluation(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, Any]:

@@ -10,7 +10,8 @@ import numpy as np
 from handcal.hand.detect import overlaps
 from handcal.types import Bool, Float64
 
-_OVERLAP = 0.5
+MATCH_OVERLAP = 0.5
+"""Intersection over union from which on a box is taken to be on a hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,9 +84,9 @@ def _matches(result: ImageResult, counted: Bool) -> Float64:
     hit = np.zeros(len(result.boxes))
     for box in np.argsort(-result.scores, kind="stable"):
         candidates = np.where(free, overlap[box], 0.0)
-        if candidates.size and candidates.max() >= _OVERLAP:
+        if candidates.size and candidates.max() >= MATCH_OVERLAP:
             free[np.argmax(candidates)] = False
             hit[box] = 1.0
-        elif (overlap[box][~counted] >= _OVERLAP).any():
+        elif (overlap[box][~counted] >= MATCH_OVERLAP).any():
             hit[box] = np.nan
     return hit

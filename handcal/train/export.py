@@ -24,7 +24,7 @@ from onnxruntime.quantization.shape_inference import quant_pre_process
 from torch import Tensor, nn
 
 from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
-from handcal.evaluate.annotations import Photo, read_annotations, read_image
+from handcal.evaluate.annotations import Photo, read_annotations
 from handcal.hand.detect import DetectSettings, letterbox
 from handcal.train.loop import read_average
 from handcal.train.model import HandNet
@@ -44,8 +44,7 @@ def main() -> None:
     export_float(net, arguments.output / FLOAT_MODEL)
     train = arguments.data / "train"
     photos = read_annotations(train, train / "annotations.json")
-    chosen = photos[:: len(photos) // _CALIBRATED]
-    export_integer(arguments.output / FLOAT_MODEL, arguments.output / INTEGER_MODEL, chosen)
+    export_integer(arguments.output / FLOAT_MODEL, arguments.output / INTEGER_MODEL, photos)
 
 
 class _Camera(nn.Module):
@@ -83,7 +82,7 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
     ----------
     float_path, path : Path
     photos : sequence of Photo
-        From which the ranges of all values between the layers are taken.
+        A few hundred of them give the ranges of all values between the layers.
     """
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
@@ -91,7 +90,7 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
         quantize_static(
             str(prepared),
             str(path),
-            _Calibration(photos),
+            _Calibration(photos[:: max(1, len(photos) // _CALIBRATED)]),
             quant_format=QuantFormat.QDQ,
             per_channel=True,
             activation_type=QuantType.QUInt8,
@@ -111,7 +110,7 @@ class _Calibration(CalibrationDataReader):  # type: ignore[misc]
     @staticmethod
     def _read(photos: Sequence[Photo]) -> Iterator[dict[str, Any]]:
         for photo in photos:
-            canvas, _ = letterbox(read_image(photo.path), DetectSettings().pixels)
+            canvas, _ = letterbox(photo.read(), DetectSettings().pixels)
             yield {"image": np.ascontiguousarray(canvas[None])}
 
 

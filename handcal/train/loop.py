@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader
 
 from handcal.errors import FileError
-from handcal.evaluate.annotations import Photo, read_image
+from handcal.evaluate.annotations import Photo
 from handcal.evaluate.detector import SCORE_MIN, summary
 from handcal.evaluate.precision import ImageResult
 from handcal.hand.detect import DetectSettings, decode, letterbox, points
@@ -148,7 +148,7 @@ class Training:
         settings = DetectSettings(score_min=SCORE_MIN)
         results = []
         for photo in photos:
-            canvas, scale = letterbox(read_image(photo.path), settings.pixels)
+            canvas, scale = letterbox(photo.read(), settings.pixels)
             image = torch.from_numpy(canvas).to(self._device).permute(2, 0, 1)[None].float()
             with torch.inference_mode():
                 raw = net(image)[0].float().cpu().numpy()

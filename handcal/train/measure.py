@@ -14,6 +14,7 @@ import numpy as np
 from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
 from handcal.evaluate.annotations import read_annotations
 from handcal.evaluate.detector import SCORE_MIN, detect_all, summary
+from handcal.evaluate.precision import MATCH_OVERLAP
 from handcal.hand.detect import DetectSettings, HandDetector, overlaps
 from handcal.resources import resource_path
 from handcal.sim.hand import HandSettings
@@ -22,7 +23,6 @@ from handcal.sim.room import make_room
 from handcal.train.simulated import Picture, picture
 from handcal.types import UInt8
 
-_OVERLAP = 0.5
 # Luminance of the skin in even light that parts three groups of about the same size.
 _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
 _RUNS = 50
@@ -71,7 +71,7 @@ def simulated(detector: HandDetector, pictures: list[Picture]) -> dict[str, Any]
     tones: dict[str, list[bool]] = {tone: [] for tone in _TONES}
     for drawn in pictures:
         boxes = detector.detect(drawn.color).boxes_px[:1]
-        found = bool((overlaps(boxes, drawn.box[None]) >= _OVERLAP).any())
+        found = bool((overlaps(boxes, drawn.box[None]) >= MATCH_OVERLAP).any())
         luminance = drawn.skin @ [0.299, 0.587, 0.114]
         tone = [name for name, least in _TONES.items() if luminance >= least][-1]
         tones[tone].append(found)

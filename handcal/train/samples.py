@@ -12,8 +12,9 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from handcal.evaluate.annotations import Photo, read_image
+from handcal.evaluate.annotations import Photo
 from handcal.files import read_json
+from handcal.image_file import read_image
 from handcal.train.augment import (
     blemish,
     box_corners,
@@ -108,7 +109,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
     def _photographed(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
         photo = self._photos[int(np.searchsorted(self._bounds, rng.random()))]
         warp = self._view(rng, photo)
-        image = self._warped(read_image(photo.path), warp)
+        image = self._warped(photo.read(), warp)
         return image, self._clipped(transform_corners(warp, photo.quads))
 
     def _view(self, rng: np.random.Generator, photo: Photo) -> Float64:

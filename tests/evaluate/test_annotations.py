@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handcal.errors import FileError
-from handcal.evaluate.annotations import read_annotations, read_image
+from handcal.evaluate.annotations import Photo, read_annotations
 
 HAND = {"box": [10, 20, 30, 60], "quad": [[10, 20], [30, 20], [30, 60], [10, 60]], "large": True}
 
@@ -15,6 +15,10 @@ def write(folder: Path, content: object) -> Path:
     path = folder / "annotations.json"
     path.write_text(json.dumps(content))
     return path
+
+
+def photo(path: Path, width: int, height: int) -> Photo:
+    return Photo(path, width, height, np.empty((0, 4)), np.empty((0, 4, 2)), np.empty(0, bool))
 
 
 def test_reads_what_the_data_set_says(tmp_path: Path) -> None:
@@ -42,6 +46,8 @@ def test_a_photograph_may_hold_no_hand(tmp_path: Path) -> None:
         {"width": "wide", "height": 80, "hands": []},
         {"width": 100, "height": 80, "hands": [HAND | {"box": [1, 2, 3]}]},
         {"width": 0, "height": 80, "hands": []},
+        {"width": float("inf"), "height": 80, "hands": []},
+        {"width": 100, "height": 80, "hands": [HAND | {"box": [0, 0, float("nan"), 9]}]},
     ],
 )
 def test_refuses_other_files(tmp_path: Path, entry: object) -> None:
@@ -49,13 +55,15 @@ def test_refuses_other_files(tmp_path: Path, entry: object) -> None:
         read_annotations(tmp_path, write(tmp_path, {"a.jpg": entry}))
 
 
-def test_reads_images_as_rgb(tmp_path: Path) -> None:
-    red = np.zeros((4, 4, 3), np.uint8)
+def test_reads_photographs_as_rgb(tmp_path: Path) -> None:
+    red = np.zeros((4, 5, 3), np.uint8)
     red[..., 0] = 255
     cv2.imwrite(str(tmp_path / "red.png"), red[..., ::-1])
-    assert (read_image(tmp_path / "red.png") == red).all()
+    assert (photo(tmp_path / "red.png", 5, 4).read() == red).all()
+    with pytest.raises(FileError, match="5x4 pixels, annotated as 50x40"):
+        photo(tmp_path / "red.png", 50, 40).read()
 
 
-def test_names_the_image_it_cannot_read(tmp_path: Path) -> None:
+def test_names_the_photograph_it_cannot_read(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"no\.jpg"):
-        read_image(tmp_path / "no.jpg")
+        photo(tmp_path / "no.jpg", 5, 4).read()

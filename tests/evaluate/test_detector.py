@@ -43,6 +43,13 @@ def test_each_number_counts_its_own_hands(photo: Photo) -> None:
     assert small_found == {"ap50": 0.5, "ap50_large": 0.0, "ap50_rel15": 0.0, "ap50_rel25": 0.0}
 
 
+def test_a_false_box_counts_among_hands_of_its_size_and_smaller(photo: Photo) -> None:
+    false = [80.0, 60.0, 96.0, 76.0]  # 18 % of the image's side
+    result = ImageResult(np.array([false, LARGE]), np.array([0.9, 0.8]), photo.boxes)
+    wrong = summary([photo], [result])
+    assert (wrong["ap50_rel15"], wrong["ap50_rel25"]) == (0.5, 1.0)
+
+
 def test_no_hand_no_number(photo: Photo) -> None:
     nothing = Photo(photo.path, 100, 80, np.zeros((0, 4)), np.zeros((0, 4, 2)), np.zeros(0, bool))
     assert set(summary([nothing], [found([LARGE], nothing)]).values()) == {None}

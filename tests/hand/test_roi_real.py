@@ -8,9 +8,9 @@ import numpy as np
 
 from handcal.camera.images import read_depth
 from handcal.detector import load_detector
-from handcal.evaluate.annotations import read_image
 from handcal.hand.roi import RoiFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.image_file import read_image
 from handcal.types import Frame, Intrinsics
 
 SETTINGS = SegmentSettings()
@@ -24,7 +24,7 @@ def test_real_hands_are_segmented_where_the_detector_saw_them(shared_data: Path)
     for name, shot in shots.items():
         camera = Intrinsics(640, 480, *shot["intrinsics"])
         depth = read_depth(folder / f"{name}_depth.png", camera)
-        color = read_image(folder / f"{name}_color.jpg")
+        color = read_image(folder / f"{name}_color.jpg", cv2.IMREAD_COLOR_RGB)
         frame = Frame(0, 0, 0, depth, shot["depth_unit_m"], camera, color, camera)
         roi_px = RoiFinder(detector, SETTINGS).find(frame)
         assert roi_px is not None
