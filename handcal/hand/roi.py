@@ -20,7 +20,7 @@ _STEP_PX = 8  # of the depth image: fine enough to tell where a hand is
 _PIXELS_MIN = 6
 _DEPTH_SPREAD_M = 0.10  # of one hand
 _SAME_OVERLAP = 0.3
-_SHIFTS = 3
+_SHIFTS, _STILL_PX = 3, 1.0
 
 
 class Detector(Protocol):
@@ -212,7 +212,9 @@ class _CoarseCloud:
             if np.count_nonzero(inside) < max(_PIXELS_MIN, track.pixels / 2):
                 return None
             shift = px[inside].mean(0) - track.offset - _center(box)
-            box = box + np.tile(shift, 2)
+            box = box + np.concatenate([shift, shift])
+            if np.abs(shift).max() < _STILL_PX:
+                break
         return replace(track, box=box, depth_m=float(np.median(depth_m[inside])))
 
     def surroundings(self, track: _Track, margin: float) -> Box:

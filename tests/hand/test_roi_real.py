@@ -8,8 +8,10 @@ import numpy as np
 
 from handcal.camera.images import read_depth
 from handcal.detector import load_detector
+from handcal.hand.detect import overlaps
+from handcal.hand.finder import HandFinder
 from handcal.hand.roi import RoiFinder
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.image_file import read_image
 from handcal.types import Frame, Intrinsics
 
@@ -28,7 +30,8 @@ def test_real_hands_are_segmented_where_the_detector_saw_them(shared_data: Path)
         frame = Frame(0, 0, 0, depth, shot["depth_unit_m"], camera, color, camera)
         roi_px = RoiFinder(detector, SETTINGS).find(frame)
         assert roi_px is not None
-        cloud = segment_hand(frame, SETTINGS, roi_px)
+        assert overlaps(np.array([roi_px], float), np.array([shot["hand_box"]]))[0, 0] >= 0.5
+        cloud = HandFinder(SETTINGS, detector).find(frame)
         truth = cv2.imread(str(folder / f"{name}_handmask.png"), cv2.IMREAD_GRAYSCALE)
         assert truth is not None
         gated = (truth > 0) & (depth >= 350) & (depth <= 700)
