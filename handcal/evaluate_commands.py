@@ -51,6 +51,7 @@ def users(arguments: argparse.Namespace) -> None:
     """Evaluate the user test over sessions: how far calibrations miss what the wearers see."""
     from handcal.evaluate.user_test import evaluate_user_test, read_user_test
     from handcal.evaluate.user_test_report import user_test_report
+    from handcal.report.cells import interval_ends, mean_sd
     from handcal.report.write import write_report
 
     with progress() as report:
@@ -63,13 +64,12 @@ def users(arguments: argparse.Namespace) -> None:
     save(arguments.json, asdict(result))
     shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")
     for name, errors in (*result.by_wearer.items(), ("all", result.total)):
-        mean, interval = errors.arcmin, errors.interval_arcmin
         shown_table.add_row(
             escape(name),
             str(errors.calibrations),
             str(errors.trials),
-            f"{mean.mean:.2f} ± {mean.sd:.2f}",
-            f"{interval.low:.2f} to {interval.high:.2f}" if interval else "–",
+            mean_sd(errors.arcmin),
+            interval_ends(errors.interval_arcmin),
         )
     console.print(shown_table)
     for path, why in result.left_out.items():

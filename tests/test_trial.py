@@ -7,7 +7,7 @@ import pytest
 
 from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, update_matrix
 from handcal.rig.example import example_rig
-from handcal.trial import Trial, make_trial, read_trial, summarise, trial_json
+from handcal.trial import Trial, calibration_numbers, make_trial, read_trial, summarise, trial_json
 from handcal.types import EYES, Float64
 
 RIG = example_rig()
@@ -117,3 +117,14 @@ def test_no_trials_have_no_statistics() -> None:
     assert statistics.total is None
     assert not statistics.by_eye
     assert not statistics.by_depth_m
+
+
+def test_trials_of_one_calibration_are_told_from_others() -> None:
+    trials = [
+        make_trial(RIG.eyes[eye], eye, depth_m, calibrated_m, ADJUSTED_M)
+        for calibrated_m in (CALIBRATED_M, CALIBRATED_M + 1e-9, CALIBRATED_M)
+        for eye in EYES
+        for depth_m in (0.4, 0.6)
+    ]
+    assert calibration_numbers(trials) == (1, 1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1)
+    assert calibration_numbers([]) == ()

@@ -58,7 +58,8 @@ def draw_corners(
         of_eye = [row for row in rows if row["eye"] == eye]
         truth, drawn = (_points(of_eye, name) for name in ("truth", "drawn"))
         style: dict[str, Any] = {"linestyle": "none", "rasterized": len(rows) > _MOST_POINTS}
-        display.plot(*truth.T, marker="+", color="black", markersize=3, zorder=3, **style)
+        cross: dict[str, Any] = {"marker": "+", "markersize": 3, "markeredgewidth": 0.5}
+        display.plot(*truth.T, color="black", zorder=3, **cross, **style)
         style |= {"marker": MARKERS[eye], "color": COLORS[eye], "markersize": 2.5, "label": eye}
         display.plot(*drawn.T, alpha=0.6, **style)
         offsets.plot(*(drawn - truth).T, alpha=0.6, **style)

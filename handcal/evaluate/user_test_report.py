@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from handcal.evaluate.user_test import CornerRow, GroupErrors, UserTest, UserTestResult
 from handcal.evaluate.user_test_figures import draw_corners, draw_wearers
 from handcal.export.figures import draw_trial_errors
+from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Row, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
-from handcal.statistics import MeanInterval
 from handcal.trial import calibration_numbers
 
 # Wearers in one figure, and the height of each.
@@ -43,8 +43,8 @@ def user_test_report(test: UserTest, result: UserTestResult) -> Report:
         title="User test",
         subject=f"{_count(len(result.by_wearer), 'wearer')}, "
         f"{_count(len(test.sessions), 'session')}, {_count(total.trials, 'trial')}",
-        lead=f"{_mean(total)} Of all corners: {total.arcmin.mean:.2f} ± {total.arcmin.sd:.2f} "
-        f"arcmin, {total.px.mean:.2f} ± {total.px.sd:.2f} px (± SD).",
+        lead=f"{_mean(total)} Of all corners: {mean_sd(total.arcmin)} arcmin, "
+        f"{mean_sd(total.px)} px (± SD).",
         sections=list(_sections(test, result)),
     )
 
@@ -132,7 +132,7 @@ def _corners(test: UserTest) -> Section:
         "how far each drawn corner is from its true place.",
         lambda axes: draw_corners(axes, test.corners, sizes_px),
         test.corners,
-        height_mm=80.0,
+        height_mm=72.0,
         columns=2,
     )
     return Section("Where corners are drawn", [figure])
@@ -144,7 +144,7 @@ def _published(result: UserTestResult) -> Section:
         "this test",
         f"{found.median:.2f}",
         f"{found.q1:.2f}–{found.q3:.2f}",
-        f"{found.min:.2f}–{found.max:.2f}",
+        extremes(found),
     )
     columns = [
         Column("study", "left"),
@@ -200,11 +200,11 @@ def _table(of: str, groups: Mapping[str, GroupErrors]) -> Table:
             name,
             str(group.calibrations),
             str(group.corners),
-            f"{group.px.mean:.2f}\u00a0±\u00a0{group.px.sd:.2f}",
-            f"{group.arcmin.mean:.2f}\u00a0±\u00a0{group.arcmin.sd:.2f}",
-            _range(group.interval_arcmin),
-            f"{group.arcmin.median:.2f} ({group.arcmin.q1:.2f}–{group.arcmin.q3:.2f})",
-            f"{group.arcmin.min:.2f}–{group.arcmin.max:.2f}",
+            mean_sd(group.px),
+            mean_sd(group.arcmin),
+            interval_ends(group.interval_arcmin),
+            median_quartiles(group.arcmin),
+            extremes(group.arcmin),
         ]
         for name, group in groups.items()
     ]
@@ -239,12 +239,8 @@ def _mean(total: GroupErrors) -> str:
         return "One calibration was tested, so how far another would differ is not known."
     return (
         f"Mean reprojection error over {found.clusters} {total.unit}s {found.mean:.2f} arcmin, "
-        f"{100 * found.level:g} % interval {_range(found)}."
+        f"{100 * found.level:g} % interval {interval_ends(found)}."
     )
-
-
-def _range(interval: MeanInterval | None) -> str:
-    return f"{interval.low:.2f}\u00a0to\u00a0{interval.high:.2f}" if interval else "–"
 
 
 def _count(number: int, what: str) -> str:

@@ -20,6 +20,7 @@ from handcal.export.figures import ResidualCells
 from handcal.export.outcome import Origin, Outcome
 from handcal.export.tables import parameter_rows, trial_rows
 from handcal.register.verdict import expected_error_arcmin
+from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.results import Results
@@ -332,9 +333,9 @@ def _user_test(outcome: Outcome) -> Section:
             Column("number"),
             Column("corners"),
             Column("mean ± SD, px"),
-            Column("median (min–max), px"),
             Column("mean ± SD, arcmin"),
-            Column("median (min–max), arcmin"),
+            Column("median (quartiles), arcmin"),
+            Column("min–max, arcmin"),
         ],
         [[name, *_error_cells(errors)] for name, errors in groups.items()],
         "Reprojection error; each corner of the target counts once.",
@@ -371,7 +372,7 @@ def _interval(outcome: Outcome) -> str:
     found = mean_interval(errors, calibrations)
     return (
         f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
-        f"({100 * found.level:g} % interval {found.low:.2f} to {found.high:.2f})."
+        f"({100 * found.level:g} % interval {interval_ends(found)})."
     )
 
 
@@ -409,14 +410,10 @@ def _error_cells(errors: ErrorStatistics) -> list[str]:
     return [
         str(errors.trials),
         str(errors.corners),
-        *(
-            cell
-            for spread in (errors.px, errors.arcmin)
-            for cell in (
-                f"{spread.mean:.2f} ± {spread.sd:.2f}",
-                f"{spread.median:.2f} ({spread.min:.2f}–{spread.max:.2f})",
-            )
-        ),
+        mean_sd(errors.px),
+        mean_sd(errors.arcmin),
+        median_quartiles(errors.arcmin),
+        extremes(errors.arcmin),
     ]
 
 

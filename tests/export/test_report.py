@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from handcal.export.report import session_report
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.pdf import compose, write_pdf
 from handcal.session import SessionRecord
+from handcal.trial import Trial
 
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
 
@@ -71,6 +73,22 @@ def test_nothing_overlaps_or_leaves_its_page(pages: list[Figure]) -> None:
             for other in boxes[:number]:
                 overlap = Bbox.intersection(box, other)
                 assert overlap is None or min(overlap.width, overlap.height) < 1.5
+
+
+def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: Outcome) -> None:
+    def said(trials: Sequence[Trial]) -> str:
+        record = replace(outcome.record, trials=tuple(trials))
+        report = session_report(replace(outcome, record=record))
+        (test,) = (section for section in report.sections if section.title == "User test")
+        return next(item for item in test.items if isinstance(item, str))
+
+    trials = list(outcome.record.trials)
+    assert "no interval" in said(trials)
+    again = replace(trials[-1], calibrated_shift_m=np.zeros(3), error_arcmin=np.full(4, 20.0))
+    first = np.mean([trial.error_arcmin.mean() for trial in trials[:-1]])
+    assert said([*trials[:-1], again]).startswith(
+        f"Mean over 2 calibrations of this wearer: {(first + 20.0) / 2.0:.2f} arcmin (95 % interval"
+    )
 
 
 @pytest.mark.parametrize("text", HOSTILE)

@@ -1,0 +1,27 @@
+"""Statistics as the texts of a table's cells, which no line break parts."""
+
+from __future__ import annotations
+
+from handcal.statistics import MeanInterval, Summary
+
+NOTHING = "–"
+
+
+def mean_sd(summary: Summary) -> str:
+    """Return the mean ± one standard deviation."""
+    return f"{summary.mean:.2f}\u00a0±\u00a0{summary.sd:.2f}"
+
+
+def median_quartiles(summary: Summary) -> str:
+    """Return the median, and the quartiles in parentheses."""
+    return f"{summary.median:.2f}\u00a0({summary.q1:.2f}–{summary.q3:.2f})"
+
+
+def extremes(summary: Summary) -> str:
+    """Return the least and the largest."""
+    return f"{summary.min:.2f}–{summary.max:.2f}"
+
+
+def interval_ends(interval: MeanInterval | None) -> str:
+    """Return the ends of an interval, or a dash for none."""
+    return f"{interval.low:.2f}\u00a0to\u00a0{interval.high:.2f}" if interval else NOTHING
