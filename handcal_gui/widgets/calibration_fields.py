@@ -9,6 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QWidget
 
 from handcal.calibrate import CalibrationSettings
+from handcal.hand.settings import Roi
 from handcal.types import Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import choice, number
@@ -26,11 +27,17 @@ _METHOD_HELP = (
     "As in the paper: Hu et al. 2021; slow.\n"
     "Rigid ICP: the paper's baseline."
 )
+_ROIS: dict[Roi, str] = {"detector": "Colour and depth", "depth": "Depth alone"}
+_ROI_HELP = (
+    "How the hand is found.\n"
+    "Colour and depth: the hand detector says where to look first.\n"
+    "Depth alone: the nearest hand-sized thing."
+)
 _GATE_M = 0.05
 
 
 class CalibrationFields(QWidget):
-    """Rotation guard, depth gate and solver.
+    """Rotation guard, depth gate, what finds the hand, and solver.
 
     Attributes
     ----------
@@ -55,6 +62,7 @@ class CalibrationFields(QWidget):
         self._far = number(
             "gateFar", 0.15, 2.00, 0.05, " m", "What is farther from the camera is not seen."
         )
+        self._roi = choice("roi", "Hand found by", _ROIS, _ROI_HELP)
         self._method = choice("method", "Solver", _METHODS, _METHOD_HELP)
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
@@ -62,18 +70,21 @@ class CalibrationFields(QWidget):
         self.add_row("Rotation guard", self._guard)
         self.add_row("Depth gate from", self._near)
         self.add_row("Depth gate to", self._far)
+        self.add_row("Hand found by", self._roi)
         self.add_row("Solver", self._method)
         self._near.valueChanged.connect(self._push_far)
         self._far.valueChanged.connect(self._push_near)
         for field in (self._guard, self._near, self._far):
             field.valueChanged.connect(self.changed)
-        self._method.currentIndexChanged.connect(self.changed)
+        for chosen in (self._roi, self._method):
+            chosen.currentIndexChanged.connect(self.changed)
 
     def show_settings(self, settings: CalibrationSettings) -> None:
         """Show settings."""
         self._guard.setValue(float(np.degrees(settings.guard.limit_rad)))
         self._far.setValue(settings.segment.depth_max_m)
         self._near.setValue(settings.segment.depth_min_m)
+        self._roi.setCurrentIndex(self._roi.findData(settings.segment.roi))
         self._method.setCurrentIndex(self._method.findData(settings.solve.method))
 
     def take(self, settings: CalibrationSettings) -> CalibrationSettings:
@@ -82,7 +93,10 @@ class CalibrationFields(QWidget):
             settings,
             guard=replace(settings.guard, limit_rad=float(np.radians(self._guard.value()))),
             segment=replace(
-                settings.segment, depth_min_m=self._near.value(), depth_max_m=self._far.value()
+                settings.segment,
+                roi=self._roi.currentData(),
+                depth_min_m=self._near.value(),
+                depth_max_m=self._far.value(),
             ),
             solve=replace(settings.solve, method=self._method.currentData()),
         )

@@ -229,6 +229,7 @@ def test_every_choice_reaches_the_settings(
     for name, value in (("guard", 12.0), ("gateFar", 0.3), ("gateNear", 0.2), ("loss", 5.0)):
         find(page, QDoubleSpinBox, name).setValue(value)
     choose(page, "method", "paper")
+    choose(page, "roi", "depth")
     settings = page.new.settings
     calibration = settings.calibration
     assert settings == StationSettings(
@@ -247,6 +248,7 @@ def test_every_choice_reaches_the_settings(
     )
     assert calibration.guard.limit_rad == pytest.approx(0.2094395)
     assert (calibration.segment.depth_min_m, calibration.segment.depth_max_m) == (0.2, 0.3)
+    assert calibration.segment.roi == "depth"
     assert calibration.solve.method == "paper"
     qtbot.waitUntil(lambda: inspector.asked[-1] == (settings, KEY))
     assert inspector.folders[-1] == Path("/Session folder")
