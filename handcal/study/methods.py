@@ -102,7 +102,8 @@ class Calibration:
     wearer_s : float
         Of the wearer's time.
     projections : mapping of eye to (3, 4) float64, or None
-        None if the method refused the alignments.
+        None if the method refused the alignments. One that puts the target behind an eye counts
+        as refused too.
     """
 
     method: str
@@ -139,7 +140,7 @@ def compare_methods(settings: MethodSettings, case: Case) -> list[Row]:
         *_by_both_eyes(wearer, generators[2], placement, settings),
         *_by_each_eye(wearer, generators[3], placement, settings),
     ]
-    return [row for found in calibrations for row in _judge(wearer, found, case)]
+    return [row for found in calibrations for row in judge(wearer, found, case)]
 
 
 def study_wearer(settings: MethodSettings, case: Case) -> tuple[StudyWearer, WearerSettings]:
@@ -160,7 +161,7 @@ def study_wearer(settings: MethodSettings, case: Case) -> tuple[StudyWearer, Wea
 def target_errors(wearer: StudyWearer, projections: Projections, depth_m: float) -> dict[str, Any]:
     """Return the errors at the target's corners: arcmin in each eye, and mm in space.
 
-    The target is straight ahead of the middle of the viewpoints.
+    The target is straight ahead of the middle of the viewpoints. NaN if it is drawn behind an eye.
     """
     viewpoints_m = [invert(wearer.T_E_H(eye))[:3, 3] for eye in EYES]
     corners_m = target_corners_m(depth_m) + np.mean(viewpoints_m, axis=0)
@@ -182,20 +183,22 @@ def target_errors(wearer: StudyWearer, projections: Projections, depth_m: float)
     return errors
 
 
-def _judge(wearer: StudyWearer, found: Calibration, case: Case) -> Iterator[Row]:
-    for depth_m in TARGET_DEPTHS_M:
-        row: Row = {
-            **case,
-            "method": found.method,
-            "alignments": found.alignments,
-            "wearer_s": found.wearer_s,
-            "depth_m": depth_m,
-        }
-        yield row | (
-            {"refused": True}
-            if found.projections is None
-            else {"refused": False} | target_errors(wearer, found.projections, depth_m)
-        )
+def judge(wearer: StudyWearer, found: Calibration, case: Case) -> list[Row]:
+    """Return a row for each distance of the target: what a calibration errs there."""
+    row: Row = {
+        **case,
+        "method": found.method,
+        "alignments": found.alignments,
+        "wearer_s": found.wearer_s,
+    }
+    if found.projections is not None:
+        errors = [target_errors(wearer, found.projections, depth_m) for depth_m in TARGET_DEPTHS_M]
+        if all(np.isfinite(list(at_depth.values())).all() for at_depth in errors):
+            return [
+                row | {"refused": False, "depth_m": depth_m} | at_depth
+                for depth_m, at_depth in zip(TARGET_DEPTHS_M, errors, strict=True)
+            ]
+    return [row | {"refused": True, "depth_m": depth_m} for depth_m in TARGET_DEPTHS_M]
 
 
 def _meet(eyes_m: Sequence[Float64], rays: Sequence[Float64]) -> Float64:
@@ -240,9 +243,22 @@ def _by_points(
         except ValueError:
             stereo = None
         yield Calibration(f"Stereo-SPAAM, {count}", count, _seconds(count), stereo)
+    yield from _by_fingertips(wearer, rng, settings)
+    yield Calibration("INDICA, recycled", 0, 0.0, _indica(wearer, rng, settings))
+
+
+def _by_fingertips(
+    wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
+) -> Iterator[Calibration]:
+    """SPAAM of fingertips, and the eye alone from some of them."""
     tips = {
         eye: align_points(
-            wearer, rng, _MOSER_COUNT, [eye], sigma_arcmin, settings.fingertip_sigma_m
+            wearer,
+            rng,
+            _MOSER_COUNT,
+            [eye],
+            settings.pointing_sigma_arcmin,
+            settings.fingertip_sigma_m,
         )
         for eye in EYES
     }
@@ -258,7 +274,6 @@ def _by_points(
     count = 2 * _JUN_COUNT
     found = rendered(wearer, eyes_m)
     yield Calibration(f"fingertip, eye only, {_JUN_COUNT}", count, _seconds(count), found)
-    yield Calibration("INDICA, recycled", 0, 0.0, _indica(wearer, rng, settings))
 
 
 def _spaam(pairs: Mapping[Eye, tuple[Float64, Mapping[Eye, Float64]]]) -> Projections | None:

@@ -9,8 +9,10 @@ from handcal.study import wearer_noise
 from handcal.study.methods import (
     HANDCAL_EACH,
     PAPER,
+    Calibration,
     MethodSettings,
     compare_methods,
+    judge,
     methods_study,
     rendered,
     study_wearer,
@@ -111,6 +113,13 @@ def test_a_wrong_eye_distance_is_seen_in_depth() -> None:
     }
     errors = target_errors(wearer, rendered(wearer, apart), 0.5)
     assert errors["z_mm"] > 5.0 * errors["x_mm"]
+
+
+def test_a_projection_that_puts_the_target_behind_the_eye_counts_as_refused() -> None:
+    wearer, _ = study_wearer(ERRORLESS, CASE)
+    behind = Calibration("behind", 1, 1.0, {eye: -wearer.sees(eye) for eye in EYES})
+    rows = judge(wearer, behind, CASE)
+    assert [row["refused"] for row in rows] == [True] * 3
 
 
 def test_points_are_on_the_displays_and_err_as_told() -> None:
