@@ -87,7 +87,7 @@ def noise_report(settings: NoiseSettings, rows: Sequence[Row]) -> Report:
         sections=[
             Section("", [facts(_counts(settings, rows) | made_with()), _METHODS, _INTERVALS]),
             Section("The paper's findings and these", [_published(sections["rotation"])]),
-            *(_section(settings, name, points) for name, points in sections.items()),
+            *(_section(settings, name, points) for name, points in sections.items() if points),
             Section("Settings", settings_items(asdict(settings), "study.json")),
         ],
     )
