@@ -149,11 +149,10 @@ def evaluate_recordings(data: RecordedSet) -> dict[str, RecordedResult]:
 
     Raises
     ------
-    ValueError
+    FileError
         If a recording's alignments do not tell a projection.
     """
-    base = data.recordings[BASE]
-    P_base = solve_spaam(base.points_m, base.pixels)
+    P_base = _solve(BASE, data.recordings[BASE])
     K, R, viewpoint_m = split_projection(P_base)
     # How far the eye is before the display, along the base's axes as the authors take it.
     distance_m = -float((R @ viewpoint_m)[2] + data.T_S_W[2, 3])
@@ -167,16 +166,22 @@ def evaluate_recordings(data: RecordedSet) -> dict[str, RecordedResult]:
         T_V_H=np.eye(4),
     )
     return {
-        name: _evaluate(recording, P_base, display, data)
+        name: _evaluate(recording, _solve(name, recording), P_base, display, data)
         for name, recording in data.recordings.items()
     }
 
 
+def _solve(name: str, recording: Recording) -> Float64:
+    try:
+        return solve_spaam(recording.points_m, recording.pixels)
+    except ValueError as error:
+        raise FileError(f"recording {name}: {error}") from error
+
+
 def _evaluate(
-    recording: Recording, P_base: Float64, display: EyeDisplay, data: RecordedSet
+    recording: Recording, P: Float64, P_base: Float64, display: EyeDisplay, data: RecordedSet
 ) -> RecordedResult:
     points_m, distance_m = recording.points_m, display.z_C0_S_m
-    P = solve_spaam(points_m, recording.pixels)
     recycled = solve_indica_recycled(P_base, distance_m, recording.eye_m)
     full = solve_indica_full(data.focal_px_m, data.centre_px, data.T_S_W, recording.eye_m)
     spaam_px = _errors_px(P, recording)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from handcal.display import TARGET_DEPTHS_M
+from handcal.errors import HandcalError
 from handcal.register.solve import solve_alignment
 from handcal.study.methods import MethodSettings, rendered, study_wearer, target_errors
 from handcal.study.wearers import align_hand
@@ -66,7 +67,7 @@ def fit_noise(
 
     Raises
     ------
-    ValueError
+    HandcalError
         If no scale from 0 to 3 gives it.
     """
     tried: dict[float, Float64] = {}
@@ -79,7 +80,9 @@ def fit_noise(
 
     if excess(_SCALES[0]) > 0.0 or excess(_SCALES[1]) < 0.0:
         means = ", ".join(f"{errors.mean():.1f}′ at {scale:g}" for scale, errors in tried.items())
-        raise ValueError(f"no scale gives the paper's {PAPER_MEAN_ARCMIN}′: {means}")
+        raise HandcalError(
+            f"no noise gives the paper's {PAPER_MEAN_ARCMIN}′ ({means}); try more wearers"
+        )
     scale = float(brentq(excess, *_SCALES, xtol=_NEAR_ENOUGH))
     nearest = min(tried, key=lambda found: abs(found - scale))
     errors = tried[nearest]

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.errors import HandcalError
 from handcal.geometry import project
 from handcal.methods.spaam import solve_spaam
 from handcal.study import wearer_noise
@@ -163,7 +164,7 @@ def test_the_noise_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_noise_that_cannot_explain_the_paper_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wearer_noise, "_errors_arcmin", lambda *_: np.array([20.0]))
-    with pytest.raises(ValueError, match=r"no scale gives the paper's 10.79′: 20.0′ at 0"):
+    with pytest.raises(HandcalError, match=r"no noise gives the paper's 10.79′ \(20.0′ at 0"):
         fit_noise(MethodSettings(), 2)
 
 

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
 
@@ -77,6 +78,13 @@ def test_damaged_files_are_named(
         (copy / file).write_text(content)
     with pytest.raises(FileError, match=message):
         read_recordings(copy)
+
+
+def test_a_recording_that_tells_no_projection_is_named(folder: Path) -> None:
+    data = read_recordings(folder)
+    short = replace(data.recordings["7"], points_m=np.ones((3, 3)), pixels=np.ones((3, 2)))
+    with pytest.raises(FileError, match="recording 7: points_m has 3 points"):
+        evaluate_recordings(replace(data, recordings={**data.recordings, "7": short}))
 
 
 def test_another_folder_is_refused(tmp_path: Path) -> None:
