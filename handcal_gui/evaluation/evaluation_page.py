@@ -54,6 +54,7 @@ class EvaluationPage(QWidget):
     Attributes
     ----------
     busy_changed : Signal(bool)
+    form : EntriesForm
     """
 
     busy_changed = Signal(bool)
@@ -64,15 +65,15 @@ class EvaluationPage(QWidget):
         self._entries = entries
         self._standing: Standing | None = None
         self._failure = self._waits_for = ""
-        self._form = offer.form()
-        self._form.show_entries(entries)
+        self.form = offer.form()
+        self.form.show_entries(entries)
         self._button = main_button("run", "Run")
         self._bar = JobBar()
         self._found = FindingLine("standing")
         self._results = ResultsView()
         self._look = LatestJob(self._stand, self)
         self._lay_out(offer.question)
-        self._form.changed.connect(self._take_entries)
+        self.form.changed.connect(self._take_entries)
         self._button.clicked.connect(self.run)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
@@ -120,7 +121,7 @@ class EvaluationPage(QWidget):
         self._ask()
 
     def _take_entries(self) -> None:
-        self._entries = self._form.take(self._entries)
+        self._entries = self.form.take(self._entries)
         self._failure = ""
         self._results.show_outcome(None)
         self._ask()
@@ -152,7 +153,7 @@ class EvaluationPage(QWidget):
         self._refresh()
 
     def _change_busy(self, is_busy: bool) -> None:
-        self._form.setEnabled(not is_busy)
+        self.form.setEnabled(not is_busy)
         self._ask()
         self.busy_changed.emit(is_busy)
 
@@ -187,7 +188,7 @@ class EvaluationPage(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX)
         layout.addWidget(paragraph("question", question))
-        layout.addWidget(self._form)
+        layout.addWidget(self.form)
         layout.addLayout(row)
         layout.addWidget(self._found)
         layout.addWidget(self._results, 1)

@@ -80,8 +80,13 @@ def _users(entries: UserEntries, checkpoint: Checkpoint) -> Report:
 
 
 def _noise_form() -> EntriesForm:
-    sizes = {"full": "Full", "quick": "Quick: a look whether everything runs"}
-    return EntriesForm({"size": ("Size", choice("size", "Size", sizes)), **_study_fields()})
+    size = choice(
+        "size",
+        "Size",
+        {"full": "Full", "quick": "Quick look"},
+        "A quick look's numbers say little.",
+    )
+    return EntriesForm({"size": ("Size", size), **_study_fields()})
 
 
 def _methods_form() -> EntriesForm:

@@ -20,7 +20,7 @@ from handcal_gui.widgets.sentence import sentence
 
 
 class ResultsView(QWidget):
-    """Shows the finding, the first table, and each figure as it was written."""
+    """Shows the finding, the first section's tables, and each figure as it was written."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -54,8 +54,9 @@ class ResultsView(QWidget):
         self._folder = outcome.folder
         self._path.setText(str(outcome.folder))
         self._lead.setText(outcome.report.lead)
-        if table := _key_table(outcome.report):
-            self._add("Numbers", _table_page(table))
+        tables = _key_tables(outcome.report)
+        for number, table in enumerate(tables, 1):
+            self._add(f"Numbers {number}" if len(tables) > 1 else "Numbers", _table_page(table))
         for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
             title = sentence(figure.name.replace("-", " "))
             self._add(title, _figure_page(title, figure, picture))
@@ -94,11 +95,13 @@ class ResultsView(QWidget):
         self._stack.addWidget(shown)
 
 
-def _key_table(report: Report) -> Table | None:
-    """Return the first table with a head."""
-    items = (item for section in report.sections for item in section.items)
-    tables = (item for item in items if isinstance(item, Table))
-    return next((table for table in tables if any(one.title for one in table.columns)), None)
+def _key_tables(report: Report) -> list[Table]:
+    """Return the tables with a head, of the first section that has any."""
+    for section in report.sections:
+        tables = [item for item in section.items if isinstance(item, Table)]
+        if shown := [table for table in tables if any(one.title for one in table.columns)]:
+            return shown
+    return []
 
 
 def _table_page(table: Table) -> QWidget:

@@ -93,7 +93,9 @@ class SimulatedStudy:
             return Standing(_note(f"{folder} holds all of this study"), "Show results")
         if share:
             advice = "what is done is not done again"
-            return Standing(_note(f"{folder} holds {share:.0%} of this study", advice), "Go on")
+            return Standing(
+                _note(f"{folder} holds {100 * share:.0f} % of this study", advice), "Go on"
+            )
         return Standing(_ready())
 
     def run(self, entries: Any, tell: Tell, is_cancelled: IsCancelled) -> Outcome:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -83,6 +83,13 @@ class NumberTable(QTableWidget):
         """Share what room there is."""
         super().resizeEvent(event)
         self._fit_columns()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Let the headers follow when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            quiet(self.horizontalHeader())
+            quiet(self.verticalHeader())
 
     def _fit_columns(self) -> None:
         """Give each column what is in it needs, and an equal share of what is left."""
