@@ -29,17 +29,18 @@ def refine_corners(gray: UInt8, corners_px: Float64, cells: int) -> Float64:
         Along each side of the marker, its border included.
     """
     exact = gray.astype(np.float32)  # shades between those of pixels are not rounded
-    edges = [_line(exact, corners_px[i], corners_px[(i + 1) % 4], cells) for i in range(4)]
+    edges = [_line(exact, np.roll(corners_px, -i, axis=0), cells) for i in range(4)]
     meeting = np.cross(np.roll(edges, 1, axis=0), edges)
     return np.asarray(meeting[:, :2] / meeting[:, 2:])
 
 
-def _line(gray: Float32, start_px: Float64, end_px: Float64, cells: int) -> Float64:
-    """Return the line (a, b, c), a x + b y + c = 0, where it is steepest across an edge."""
-    along = end_px - start_px
-    length_px = float(np.linalg.norm(along))
-    across = np.array([-along[1], along[0]]) / length_px
-    reach_px = min(_MOST_PX, _CELLS * length_px / cells)
+def _line(gray: Float32, corners_px: Float64, cells: int) -> Float64:
+    """Return the line (a, b, c), a x + b y + c = 0, where the edge between the first two is."""
+    start_px = corners_px[0]
+    along = corners_px[1] - start_px
+    across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    height_px = np.abs((corners_px[2:] - start_px) @ across).min()
+    reach_px = min(_MOST_PX, _CELLS * height_px / cells)
     offsets_px = np.arange(-reach_px, reach_px + _STEP_PX, _STEP_PX)
     on_edge = start_px + _ALONG[:, None] * along
     places = on_edge[:, None] + offsets_px[:, None] * across

@@ -2,8 +2,12 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.geometry import image_points, rigid, transform
+from handcal.rig.cube import Cube, corners_m
 from handcal.rig.marker_corners import refine_corners
-from handcal.types import Float64, UInt8
+from handcal.sim.boards import PictureSettings
+from handcal.sim.cube import CubePainter
+from handcal.types import Float64, Intrinsics, UInt8
 
 TRUE_PX = np.array([[60.3, 52.7], [148.2, 61.4], [141.1, 150.9], [49.8, 139.6]])
 
@@ -31,3 +35,18 @@ def test_blur_does_not_move_the_corners(blur_px: float) -> None:
 def test_a_square_without_contrast_is_left_about_where_it_was() -> None:
     flat: Float64 = refine_corners(np.full((200, 200), 127, np.uint8), TRUE_PX, 6)
     np.testing.assert_allclose(flat, TRUE_PX, atol=1e-6)
+
+
+def test_a_marker_seen_from_the_side_keeps_its_corners() -> None:
+    """Its cells are narrow across the long edges: only the border's counts there."""
+    cube = Cube()
+    camera = Intrinsics(640, 360, 1000.0, 1000.0, 320.0, 180.0)
+    pose = rigid([0.0, 0.0, 0.1], [0.0, 0.0, 0.55]) @ rigid([0.35, 0.0, 0.0])
+    image = CubePainter(cube, camera, PictureSettings(noise=0.0)).paint(
+        pose, np.random.default_rng(1)
+    )
+    top_px = image_points(transform(pose, corners_m(cube, [4])), camera)
+    height_px = np.ptp(top_px[:, 1])
+    assert height_px < 40
+    found_px = refine_corners(image, top_px + 0.3, 6)
+    np.testing.assert_allclose(found_px, top_px, atol=0.25)
