@@ -332,7 +332,15 @@ def show_views(views: Iterable[View], residuals_px: Mapping[str, float]) -> None
 
 def _conclude(rms_px: float, worst: WorstView, verdict: CalibrationVerdict) -> None:
     console.print(f"RMS {rms_px:.3f} px. Worst: {worst.name}, {worst.rms_px:.2f} px: {worst.why}")
-    console.print(f"{verdict.name}: {verdict.reason}")
+    show_verdict(verdict)
+
+
+def show_verdict(verdict: CalibrationVerdict) -> None:
+    """Print a verdict; HandcalError if it is bad, so that nothing is written."""
+    text = f"{verdict.name}: {verdict.reason}"
+    if verdict.name == "bad":
+        raise HandcalError(text)
+    console.print(text)
 
 
 def _write(

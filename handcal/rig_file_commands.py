@@ -14,6 +14,7 @@ from handcal.rig_commands import (
     add_square_option,
     board_of,
     grid_of,
+    show_verdict,
     show_views,
 )
 from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
@@ -67,7 +68,7 @@ def display(arguments: argparse.Namespace) -> None:
         f"z(C0→S) {result.display.z_C0_S_m:.3f} m; C0 at {place_mm} mm in V; the display is turned "
         f"by {np.degrees(result.turn_rad):.2f}° against V; RMS {homography.rms_px:.3f} px"
     )
-    console.print(f"{result.verdict.name}: {result.verdict.reason}")
+    show_verdict(result.verdict)
     _write(arguments.output, with_display(rig, eye, result))
 
 
@@ -76,9 +77,11 @@ def make(arguments: argparse.Namespace) -> None:
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
 
+    stereo = read_stereo(arguments.stereo)
+    show_verdict(stereo.verdict)
     rig = with_stereo(
         _read_rig(arguments.rig),
-        read_stereo(arguments.stereo),
+        stereo,
         depth_intrinsics=read_intrinsics(arguments.depth_intrinsics)
         if arguments.depth_intrinsics
         else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,7 @@ from handcal.__main__ import main
 from handcal.geometry import rigid
 from handcal.image_file import read_image
 from handcal.rig.board import Board, find_board
-from handcal.rig.formats import read_intrinsics, read_pose, write_pose
+from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
 from handcal.sim.boards import BoardPainter, board_poses
 from handcal.types import Float64, Intrinsics
 
@@ -100,6 +101,28 @@ def test_camera_then_stereo_then_conversion(
     np.testing.assert_allclose(read_pose(tmp_path / "converted"), found, atol=1e-12)
 
 
+def test_what_is_bad_is_not_written(
+    rig: Callable[..., None],
+    folders: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    depth, headset = folders
+    for number in range(5):  # paired with one another's
+        shutil.copy(headset / f"headset{number}.png", tmp_path / f"{(number + 1) % 5}.png")
+    write_intrinsics(tmp_path / "camera.json", CAMERA, "json")
+    given = [f"--{one}-intrinsics" for one in ("depth", "headset")]
+    with pytest.raises(SystemExit) as ended:
+        rig(
+            *("stereo", "--depth", depth, "--headset", tmp_path, *CHECKERBOARD),
+            *(word for option in given for word in (option, tmp_path / "camera.json")),
+            *("--output", tmp_path / "stereo.json"),
+        )
+    assert ended.value.code == 1
+    assert "bad: corners are" in capsys.readouterr().err
+    assert not (tmp_path / "stereo.json").exists()
+
+
 def test_a_board_without_a_file_is_misuse(
     rig: Callable[..., None], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,6 +140,10 @@ def test_a_board_without_a_file_is_misuse(
         (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
         (("camera", "nowhere"), "no PNG or JPEG images"),
         (("camera", "{depth}", "--drop", "x.png"), "there is no image x.png to drop"),
+        (
+            ("stereo", "--depth", "{depth}", "--headset", "{depth}", *CHECKERBOARD),
+            "both cameras' images are the same",
+        ),
         (("camera", "{depth}"), "found in 0 of 5 images used, at least 3 are needed; mostly: a"),
         (("stereo", "--depth", "{depth}", "--headset", "{depth}", "--format", "ros"), "no pose"),
         (("convert", "{pose}", "out", "--format", "ros"), "no pose between cameras"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from handcal.errors import HandcalError
-from handcal.rig.board_trouble import MIN_CORNERS, why_not_found
+from handcal.rig.board_trouble import MIN_CORNERS, why_not_found, why_not_plain
 from handcal.types import Float32, Float64, UInt8, freeze
 
 BoardKind: TypeAlias = Literal["charuco", "checkerboard"]
@@ -151,7 +151,8 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     ids, pixels = ids[fits], pixels[fits]
     if board.kind == "checkerboard" and _goes_on(gray, ids, pixels, board):
         columns, rows = board.squares
-        raise BoardError(f"the checkerboard goes on: it has more squares than {columns}×{rows}")
+        goes_on = f"the checkerboard goes on: it has more squares than {columns}×{rows}"
+        raise BoardError(why_not_plain(gray) or goes_on)
     pixels = _refine(gray, pixels, board)
     return BoardView(
         points_m=corners_m(board)[ids],

@@ -60,10 +60,16 @@ def light_trouble(gray: UInt8) -> str:
     return "the image is too bright" if low > 195 else "the image has no contrast"
 
 
-def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
+def why_not_plain(gray: UInt8) -> str:
+    """Return that a checkerboard that was found has markers; an empty text if it has none."""
     seen = _markers_of_some_family(gray)
-    if seen:
-        return f"a board with markers ({seen}) is seen, not a plain checkerboard"
+    return f"a board with markers ({seen}) is seen, not a plain checkerboard" if seen else ""
+
+
+def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
+    markers = why_not_plain(gray)
+    if markers:
+        return markers
     other = _checkerboard_size(gray)
     if other and other != tuple(sorted(board.squares)):
         return (

@@ -54,8 +54,9 @@ class CameraSettings:
         Share of the image's cells that must have had a corner.
     good_spread_rad : float
         How far the boards' normals must spread about their mean, RMS.
-    max_focal_sigma : float
-        Relative standard deviation of the focal lengths.
+    max_focal_sigma, bad_focal_sigma : float
+        Relative standard deviation of the focal lengths: up to which they are good, and from which
+        on they are as good as unknown.
     max_rms_px : float
         Above, something is wrong: board, focus or exposure.
     """
@@ -65,6 +66,7 @@ class CameraSettings:
     good_coverage: float = 0.6
     good_spread_rad: float = 0.2
     max_focal_sigma: float = 0.001
+    bad_focal_sigma: float = 0.03
     max_rms_px: float = 1.0
 
 
@@ -254,13 +256,16 @@ def _judge(
             f"corners are {rms_px:.2f} px off, more than {settings.max_rms_px:g}: check that the "
             f"board is flat and focus fixed; drop the worst image, {worst.name}: {worst.why}",
         )
-    if covariance is None or spread_rad < settings.good_spread_rad / 4:
+    focal_sigma = np.inf
+    if covariance is not None:
+        sigmas = np.sqrt(np.diag(covariance)[:2]) / [intrinsics.fx, intrinsics.fy]
+        focal_sigma = float(sigmas.max())
+    if focal_sigma > settings.bad_focal_sigma or spread_rad < settings.good_spread_rad / 4:
         return CalibrationVerdict(
             "bad",
             "all views show the board at nearly one angle, which does not tell the focal length: "
             "tilt it by 20° to 45° to every side",
         )
-    focal_sigma = float((np.sqrt(np.diag(covariance)[:2]) / [intrinsics.fx, intrinsics.fy]).max())
     wanting = []
     if len(poses) < settings.good_views:
         wanting.append(f"{len(poses)} views, {settings.good_views} are better")

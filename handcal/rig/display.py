@@ -21,7 +21,7 @@ from handcal.rig.covariance import clustered_covariance
 from handcal.rig.grid import GridView
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose, plane_pose
-from handcal.rig.views import ViewsError
+from handcal.rig.views import ViewsError, require_size
 from handcal.rig.worst import rms
 from handcal.types import EyeDisplay, Float64, Intrinsics, freeze
 
@@ -184,12 +184,7 @@ def fit_homography(
     """
     if not views:
         raise ViewsError("no image shows the grid: darken the room, or focus on the display")
-    for name, view in views.items():
-        if view.size != (camera.width, camera.height):
-            raise ViewsError(
-                f"{name} has {view.size[0]}×{view.size[1]} pixels, the viewpoint camera's "
-                f"calibration {camera.width}×{camera.height}: take all at one resolution"
-            )
+    require_size({name: view.size for name, view in views.items()}, camera)
     display_px = np.concatenate([view.display_px for view in views.values()])
     pixels = np.concatenate([undistort(view.pixels, camera) for view in views.values()])
     of_view = np.repeat(np.arange(len(views)), [len(view.pixels) for view in views.values()])

@@ -139,10 +139,12 @@ def calibrate_stereo(
     ViewsError
         If fewer than `MIN_PAIRS` pairs show the board to both cameras, the images are of mixed
         resolutions or not of the size of given intrinsics, the cameras are swapped, one's images
-        are mirrored, or nothing can be solved.
+        are mirrored, both's are the same, or nothing can be solved.
     """
     settings = settings or StereoSettings()
     both = _found_by_both(pairs)
+    if all(np.array_equal(pair.depth.pixels, pair.headset.pixels) for pair in both.values()):
+        raise ViewsError("both cameras' images are the same: choose each camera's own")
     _check_sizes(both, depth, headset)
     lens = settings.camera.lens
     free = solved_columns(lens)

@@ -15,7 +15,7 @@ from handcal.rig.board import BoardView
 from handcal.rig.covariance import clustered_covariance
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import View, ViewsError, used
+from handcal.rig.views import View, ViewsError, require_size, used
 from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, freeze
 
@@ -105,8 +105,9 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
     Raises
     ------
     ViewsError
-        If there are too few views.
+        If there are too few views, or one of another size than the camera's images.
     """
+    require_size({name: one.view.size for name, one in views.items()}, camera)
     if len(views) < MIN_VIEWS:
         raise ViewsError(
             f"{len(views)} views with a tracked board are too few: take {MIN_VIEWS} or more, with "

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from handcal.errors import FileError, HandcalError
 from handcal.image_file import IMAGE_SUFFIXES, read_image
 from handcal.rig.board import Board, BoardError, BoardView, find_board
-from handcal.types import UInt8
+from handcal.types import Intrinsics, UInt8
 
 MAX_VIEWS = 500
 _CELLS = (8, 6)
@@ -150,7 +150,7 @@ def used(views: Iterable[View], at_least: int) -> dict[str, BoardView]:
         mostly = f"; mostly: {problems.most_common(1)[0][0]}" if problems else ""
         raise ViewsError(
             f"the board was found in {len(found)} of {len(views)} images used, at least "
-            f"{at_least} are needed{mostly}"
+            f"{at_least} {'is' if at_least == 1 else 'are'} needed{mostly}"
         )
     one_size(found)
     return found
@@ -177,6 +177,16 @@ def one_size(found: Mapping[str, BoardView]) -> tuple[int, int]:
             f"{', '.join(others[:5])}{' …' if len(others) > 5 else ''}; drop those"
         )
     return width, height
+
+
+def require_size(sizes: Mapping[str, tuple[int, int]], camera: Intrinsics) -> None:
+    """Raise ViewsError unless images, given by name, are of the viewpoint camera's size."""
+    for name, (width, height) in sizes.items():
+        if (width, height) != (camera.width, camera.height):
+            raise ViewsError(
+                f"{name} has {width}×{height} pixels, the viewpoint camera's calibration "
+                f"{camera.width}×{camera.height}: take all at one resolution"
+            )
 
 
 def coverage(found: Iterable[BoardView]) -> Coverage:

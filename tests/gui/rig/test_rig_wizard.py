@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +119,23 @@ def test_an_image_is_dropped_and_taken_in_again(
 def test_what_cannot_be_solved_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
     assert "intrinsics are missing" in solve(qtbot, wizard, LEFT)
     assert "intrinsics are missing" in solve(qtbot, wizard, RIGHT)
+    assert not wizard.draft.rig.origins
+
+
+def test_what_is_wrong_with_images_is_named(
+    qtbot: QtBot, wizard: RigWizard, photographs: Any, folder: Path
+) -> None:
+    depth = str(photographs.folder / "depth")
+    solve(qtbot, wizard, VIEWPOINT)
+    for step, fields, said in (
+        (STEREO, {"depth_images": depth, "headset_images": depth}, "images are the same"),
+        (RIGHT, asdict(photographs.work.left), "left and right exchanged"),
+    ):
+        wizard.show_step(step)
+        page = wizard.page
+        assert isinstance(page, StepPage)
+        page.form.enter(**{name: value for name, value in fields.items() if "dropped" not in name})
+        assert said in solve(qtbot, wizard, step)
     assert not wizard.draft.rig.origins
 
 
