@@ -13,7 +13,7 @@ from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
 from handcal.types import Frame, HandCloud, Intrinsics
 
-_EDGE_PX = 3  # of the coarse grid: a hand that comes this close to the window may go on beyond it
+_EDGE_PX = 3  # a hand that comes so close to its window's side may go on beyond it
 
 
 class HandFinder:
