@@ -38,6 +38,7 @@ from handcal_gui.review.review_page import ReviewPage
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import WorkFolder
 from handcal_gui.running.live import Live
+from handcal_gui.start.example import copy_example
 from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
@@ -135,6 +136,13 @@ class Program(QObject):
         self.window.banner.clear()
         self.review.open(path)
 
+    def open_example(self, sessions: Path) -> None:
+        """Look at the example session, copied to a folder of sessions."""
+        try:
+            self.open_session(copy_example(sessions))
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+
     def show_start(self) -> None:
         """End what runs, and show the start page."""
         self.live.stop()
@@ -219,6 +227,7 @@ class Program(QObject):
         self.start.cancel_requested.connect(self.live.cancel)
         self.start.resume_requested.connect(self.resume_session)
         self.start.open_requested.connect(self.open_session)
+        self.start.example_requested.connect(self.open_example)
         self.start.rig_wanted.connect(self.calibrate_rig)
         self.start.evaluation_wanted.connect(self.evaluate)
         self.live.ended.connect(self._take_end)

@@ -174,7 +174,7 @@ def quiet(header: QHeaderView) -> None:
     """Let a table's header look like its cells, in less important text."""
     header.setStyleSheet(
         "QHeaderView { background: palette(base); }"
-        "QHeaderView::section { background: transparent; border: 0; padding: 2px 6px;"
+        "QHeaderView::section { background: transparent; border: 0; padding: 2px 4px;"
         " color: palette(placeholder-text); }"
     )
 

@@ -34,7 +34,7 @@ from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel
 from handcal_gui.panels.wearer_view import WearerViewPanel
 from handcal_gui.start.start_page import StartPage
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.wizard.wizard import WizardPanel
 
@@ -60,6 +60,8 @@ _TITLES = {
     "session": "Session",
     "link": "Link",
 }
+_TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
+"""Icons by the names that Qt gives a dock's buttons."""
 _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
     "start": frozenset(),
     "live": frozenset(_TITLES),
@@ -245,6 +247,12 @@ class MainWindow(QMainWindow):
             return event.isAccepted()
         return super().eventFilter(watched, event)
 
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._draw_title_buttons()
+
     def closeEvent(self, event: QCloseEvent) -> None:
         """Say so before closing."""
         self.closing.emit()
@@ -299,6 +307,14 @@ class MainWindow(QMainWindow):
         self.resizeDocks([docks["rotation"], docks["results"]], [rotation, height - rotation], down)
         self.resizeDocks([docks["wearer_view"]], [height - wizard], down)
 
+    def _draw_title_buttons(self) -> None:
+        """Draw the buttons of docks as other icons are: Qt's own are dark in the dark, too."""
+        for dock in self._docks.values():
+            for name, drawing in _TITLE_BUTTONS.items():
+                button = dock.findChild(QAbstractButton, name)
+                if button is not None:
+                    button.setIcon(icon(drawing))
+
     def _leave_titles_to_tabs(self) -> None:
         """Take away the titles of docks that share a place, whose tabs say the same."""
         for dock in self._docks.values():
@@ -309,6 +325,7 @@ class MainWindow(QMainWindow):
             elif not shared and title is not None:
                 dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
                 title.deleteLater()
+        self._draw_title_buttons()  # which Qt draws anew with the titles
 
     def _make_menus(self) -> None:
         self._menus = {

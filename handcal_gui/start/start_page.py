@@ -43,6 +43,8 @@ class StartPage(QWidget):
         A rig is to be calibrated; studies and tests are to be made.
     cancel_requested : Signal()
         The station need not be opened after all.
+    example_requested : Signal(Path)
+        The example session is to be opened, from this folder of sessions.
     """
 
     start_requested = Signal(object, str)
@@ -51,6 +53,7 @@ class StartPage(QWidget):
     rig_wanted = Signal()
     evaluation_wanted = Signal()
     cancel_requested = Signal()
+    example_requested = Signal(object)
 
     def __init__(
         self,
@@ -77,8 +80,11 @@ class StartPage(QWidget):
         self._opened = SessionList(
             "Recent sessions", "Open", "The sessions worked on last will be listed here."
         )
+        example = button("example", "Example", "Open the example session")
+        example.setToolTip("A simulated wearer's session, copied to the session folder")
         browse = button("browse", "Choose folder…")
-        self._opened.add_button(browse)
+        for added in (browse, example):
+            self._opened.add_button(added)
         self._open.body.addWidget(self._opened, 1)
         self._evaluate = Card(
             "Evaluate", "Simulated studies, the cube test, and the user test.", "check"
@@ -95,6 +101,7 @@ class StartPage(QWidget):
         self._unfinished.chosen.connect(self.resume_requested)
         self._opened.chosen.connect(self.open_requested)
         browse.clicked.connect(self.browse)
+        example.clicked.connect(lambda: self.example_requested.emit(self._folder))
         evaluate.clicked.connect(self.evaluation_wanted)
         self.show_preferences(preferences)
 

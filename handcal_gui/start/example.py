@@ -1,0 +1,32 @@
+"""The session that ships with handcal, for those who have none yet."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from handcal.errors import FileError
+from handcal.files import make_folder
+from handcal.resources import resource_path
+
+_NAME = "example-session"
+
+
+def copy_example(sessions: Path) -> Path:
+    """Return the example among a user's sessions, where it may be changed; a copy if need be.
+
+    Raises
+    ------
+    FileError
+        If it cannot be copied.
+    """
+    target = make_folder(sessions) / _NAME
+    if not target.exists():
+        try:
+            with tempfile.TemporaryDirectory(dir=sessions) as scratch:
+                copy = shutil.copytree(resource_path("example_session"), Path(scratch, _NAME))
+                copy.rename(target)
+        except OSError as error:
+            raise FileError(f"cannot write {target}: {error.strerror or error}") from error
+    return target
