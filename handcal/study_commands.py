@@ -11,10 +11,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handcal.errors import CancelledError
 from handcal.terminal import (
     Commands,
     add_command,
     console,
+    fail,
     number,
     progress,
     save,
@@ -129,15 +131,18 @@ def _run(
     from handcal.report.write import write_report
     from handcal.study.run import run_study
 
-    with until_interrupted() as is_cancelled, progress() as say:
-        rows = run_study(
-            study,
-            arguments.output,
-            workers=arguments.workers,
-            scheduler=arguments.scheduler,
-            progress=lambda share: say("Doing the trials", share),
-            is_cancelled=is_cancelled,
-        )
+    try:
+        with until_interrupted() as is_cancelled, progress() as say:
+            rows = run_study(
+                study,
+                arguments.output,
+                workers=arguments.workers,
+                scheduler=arguments.scheduler,
+                progress=lambda share: say("Doing the trials", share),
+                is_cancelled=is_cancelled,
+            )
+    except CancelledError as error:
+        fail(str(error), 130)
     report = report_of(rows)
     with progress() as say:
         written = write_report(

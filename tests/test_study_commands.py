@@ -83,7 +83,7 @@ def test_an_interrupted_study_goes_on(
 
     with monkeypatch.context() as patch:
         patch.setattr("handcal.study_commands.until_interrupted", interrupted)
-        assert fails(study) == 1
+        assert fails(study) == 130
     assert "the same command goes on with it" in capsys.readouterr().err
     assert not (tmp_path / "study" / "rows.csv").exists()
     chunks = set((tmp_path / "study" / "chunks").iterdir())
