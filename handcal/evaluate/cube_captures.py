@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from handcal.camera.viewpoint import IMAGE_SUFFIXES
 from handcal.errors import FileError
+from handcal.image_file import IMAGE_SUFFIXES
 
 MAX_POSES = 1000
 REAL, VIRTUAL, GRID = "real", "virtual", "grid"

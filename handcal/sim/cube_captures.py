@@ -45,6 +45,7 @@ POSITIONS = {
 
 _NEAR_M, _FAR_M, _ASIDE_M = 0.4, 0.6, 0.02
 _EDGE_PX = 8.0
+_MOST_TRIES = 300
 # So turned, three faces show.
 _YAW_RAD, _PITCH_RAD, _ROLL_RAD = (0.45, 1.1), (0.3, 0.7), (-0.3, 0.3)
 _VERTICES = np.array(list(product((-0.5, 0.5), repeat=3)))
@@ -120,6 +121,8 @@ def write_captures(
     ------
     FileError
         If the folder is not empty, or cannot be written.
+    CubeError
+        If the cube is too large for display or cameras to show it whole.
     """
     if any(make_folder(folder).iterdir()):
         raise FileError(f"{folder} is not empty: give a new folder")
@@ -204,7 +207,7 @@ class _Studio:
     ) -> tuple[Float64, Float64]:
         """Return T_E_T, true and as tracked, of a cube that display and cameras show whole."""
         settings, depth_camera = self._settings, self._rig.depth_intrinsics
-        while True:
+        for _ in range(_MOST_TRIES):
             T_E_T = self._some_pose(rng)
             vertices_m = transform(T_E_T, settings.cube.side_m * _VERTICES)
             if not (
@@ -217,6 +220,7 @@ class _Studio:
                 image = self._seen_by_depth.paint(invert(self._T_E_D) @ T_E_T, rng)
                 T_D_T = cube_pose(find_cube(image, settings.cube), settings.cube, depth_camera)
                 return T_E_T, self._T_E_D @ T_D_T
+        raise CubeError("display and cameras do not show the cube whole: take a smaller one")
 
     def _some_pose(self, rng: np.random.Generator) -> Float64:
         """Return T_E_T of a cube before the display's middle, turned so that three faces show."""

@@ -8,6 +8,7 @@ from handcal.cube_file import read_cube
 from handcal.errors import FileError
 from handcal.evaluate.cube_test import judge_captures
 from handcal.files import read_json
+from handcal.rig.cube import Cube, CubeError
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid
@@ -58,3 +59,9 @@ def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:
     (tmp_path / "note.txt").touch()
     with pytest.raises(FileError, match="not empty"):
         write_captures(tmp_path, small_rig(), SETTINGS, lambda _what, _share: None)
+
+
+def test_a_cube_too_large_for_the_display_is_refused(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, cube=Cube(side_m=0.3, marker_m=0.2))
+    with pytest.raises(CubeError, match="smaller"):
+        write_captures(tmp_path, small_rig(), settings, lambda _what, _share: None)
