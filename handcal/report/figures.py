@@ -24,14 +24,14 @@ def write_figures(folder: Path, report: Report, checkpoint: Callable[[float], No
     Parameters
     ----------
     folder : Path
-        Created if needed.
+        Created if there is any figure.
     report : Report
     checkpoint : callable
         Told the share done before each figure; what it raises ends the writing.
     """
-    make_folder(folder)
     for done, figure in enumerate(report.figures):
         checkpoint(done / len(report.figures))
+        make_folder(folder)
         write_atomic(folder / f"{figure.name}.png", picture(figure, "png"))
         write_atomic(folder / f"{figure.name}.csv", rows_csv(figure.rows))
 
