@@ -79,7 +79,8 @@ def run_study(
     Raises
     ------
     CancelledError
-        Once `is_cancelled` says so, and the trials being done have ended.
+        Once `is_cancelled` says so; what other processes are at is given up, and the trial that
+        this one is at comes to its end.
     FileError
         If `folder` holds another study, or cannot be read or written.
     HandcalError

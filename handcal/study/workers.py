@@ -14,7 +14,8 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     ThreadPoolExecutor,
 )
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection
 
 from handcal.errors import HandcalError
 
@@ -82,9 +83,20 @@ def _processes(workers: int) -> Iterator[Executor]:
     before = {name: os.environ.get(name) for name in _THREAD_LIMITS}
     os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
     context = multiprocessing.get_context("spawn")
+    theirs, ours = context.Pipe(duplex=False)
     try:
-        with _shut_down(ProcessPoolExecutor(workers, context, _prepare_process)) as executor:
-            yield executor
+        with (
+            theirs,
+            ours,
+            _shut_down(
+                ProcessPoolExecutor(workers, context, _prepare_process, (theirs,))
+            ) as executor,
+        ):
+            try:
+                yield executor
+            except BaseException:
+                ours.close()  # trials may take long, and what they come to is not wanted
+                raise
     except BrokenExecutor as error:
         raise HandcalError(
             "a process of the study died, perhaps for want of memory; the same command goes on, "
@@ -106,14 +118,14 @@ def _shut_down(executor: Executor) -> Iterator[Executor]:
         executor.shutdown(cancel_futures=True)
 
 
-def _prepare_process() -> None:
+def _prepare_process(parent: Connection) -> None:
     """Leave Ctrl+C to the process that started this one, and end with it, even if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None, "this process was started by multiprocessing"
-    parent.join()
+def _end_with(parent: Connection) -> None:
+    """End this process once the other end of a pipe is closed."""
+    with suppress(EOFError):
+        parent.recv()
     os._exit(1)

@@ -1,3 +1,4 @@
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -57,6 +58,12 @@ def fail_at_three(settings: Settings, case: Case) -> list[Row]:
     if case["number"] == 3:
         raise ValueError("no such thing")
     return trial(settings, case)
+
+
+def sleep(settings: Settings, case: Case) -> list[Row]:
+    Path(settings.log).touch()
+    time.sleep(600.0)
+    return []
 
 
 def nan(settings: Settings, case: Case) -> list[Row]:
@@ -140,6 +147,15 @@ def test_a_study_that_is_done_is_not_done_again(tmp_path: Path) -> None:
     log.unlink()
     assert run_study(study, tmp_path / "study", workers=1) == rows
     assert not log.exists()
+
+
+def test_cancelling_gives_up_what_other_processes_are_at(tmp_path: Path) -> None:
+    begun = tmp_path / "begun"
+    study = replace(make_study(Settings(log=str(begun))), trial=sleep)
+    before = set(multiprocessing.active_children())
+    with pytest.raises(CancelledError):
+        run_study(study, tmp_path / "study", workers=2, is_cancelled=begun.exists)
+    assert set(multiprocessing.active_children()) == before
 
 
 def test_how_much_of_a_study_is_done_is_told_without_a_trace(tmp_path: Path) -> None:
