@@ -83,8 +83,8 @@ def _reprojection_table(rows: Sequence[Row]) -> Table:
     columns = [Column("method", "left")] + [
         Column(title)
         for title in (
-            *("alignments", "time, s", "refused", "mean [95 %], ′"),
-            *("median, ′", "IQR, ′", "min, ′", "max, ′"),
+            *("alignments", "time, s", "refused", "mean, arcmin", "95 %, arcmin"),
+            *("median, arcmin", "IQR, arcmin", "min, arcmin", "max, arcmin"),
         )
     ]
     cells = []
@@ -94,7 +94,7 @@ def _reprojection_table(rows: Sequence[Row]) -> Table:
         refused = (len(of) - len(judged)) // len(TARGET_DEPTHS_M)
         start = [name, str(of[0]["alignments"]), f"{of[0]['wearer_s']:.0f}", str(refused)]
         if len({row["wearer"] for row in judged}) < 2:
-            cells.append([*start, *["–"] * 5])
+            cells.append([*start, *["–"] * 6])
             continue
         errors = _arcmin(judged)
         spread = summarise(errors.ravel())
@@ -102,7 +102,8 @@ def _reprojection_table(rows: Sequence[Row]) -> Table:
         cells.append(
             [
                 *start,
-                f"{mean.mean:.1f} [{mean.low:.1f}, {mean.high:.1f}]",
+                f"{mean.mean:.1f}",
+                f"{mean.low:.1f}–{mean.high:.1f}",
                 f"{spread.median:.2f}",
                 f"{spread.q1:.2f}–{spread.q3:.2f}",
                 f"{spread.min:.2f}",
@@ -132,8 +133,8 @@ def _eye_distance(settings: MethodSettings, rows: Sequence[Row]) -> Section:
     """Compare what a varying eye distance costs with what one displacement for two eyes must."""
     sigma_m = settings.eye_distance_sigmas_m[1]
     depth_m = TARGET_DEPTHS_M[1]
-    columns = [Column("method", "left"), Column("rms, set, ′"), Column("rms, varying, ′")]
-    columns.append(Column("cost, ′"))
+    columns = [Column("method", "left"), Column("rms, set, arcmin"), Column("rms, varying, arcmin")]
+    columns.append(Column("cost, arcmin"))
     cells = []
     for name in [name for name in _methods(rows) if name.startswith((HANDCAL_BOTH, HANDCAL_EACH))]:
         before, after = (
@@ -145,8 +146,8 @@ def _eye_distance(settings: MethodSettings, rows: Sequence[Row]) -> Section:
     predicted = predicted_cost_arcmin(sigma_m, depth_m)
     text = (
         f"One alignment with both eyes open gives one displacement of the hand: half of the eye "
-        f"distance's deviation stays in each eye. At {depth_m} m that is {predicted:.1f}′ rms for "
-        f"σ = {1e3 * sigma_m:g} mm. Cost: the root of the difference of squares, on the same "
+        f"distance's deviation stays in each eye. At {depth_m} m that is {predicted:.1f} arcmin "
+        f"rms for σ = {1e3 * sigma_m:g} mm. Cost: the root of the difference of squares, on the same "
         "wearers with the same slips."
     )
     return Section("One eye at a time, or both", [text, Table(columns, cells)])
@@ -163,7 +164,7 @@ def predicted_cost_arcmin(sigma_m: float, depth_m: float) -> float:
 
 def _published() -> Section:
     columns = [Column("published", "left")] + [
-        Column(title) for title in ("median, ′", "IQR, ′", "min, ′", "max, ′")
+        Column(title) for title in ("median, arcmin", "IQR, arcmin", "min, arcmin", "max, arcmin")
     ]
     cells = [
         [p.study, f"{p.median:.2f}", f"{p.q1:.2f}–{p.q3:.2f}", f"{p.min:.2f}", f"{p.max:.2f}"]
