@@ -147,8 +147,8 @@ def _eye_distance(settings: MethodSettings, rows: Sequence[Row]) -> Section:
     text = (
         f"One alignment with both eyes open gives one displacement of the hand: half of the eye "
         f"distance's deviation stays in each eye. At {depth_m} m that is {predicted:.1f} arcmin "
-        f"rms for σ = {1e3 * sigma_m:g} mm. Cost: the root of the difference of squares, on the same "
-        "wearers with the same slips."
+        f"rms for σ = {1e3 * sigma_m:g} mm. Cost: the root of the difference of squares, on the "
+        "same wearers with the same slips."
     )
     return Section("One eye at a time, or both", [text, Table(columns, cells)])
 
