@@ -16,7 +16,6 @@ from PySide6.QtWidgets import QApplication, QPushButton
 
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, write_photographs
-from handcal_gui.rig.job_bar import JobBar
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import (
     DisplayEntries,
@@ -25,6 +24,7 @@ from handcal_gui.rig.work import (
     ViewpointEntries,
     WorkFolder,
 )
+from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import use_theme
 
 PICTURES = Path(__file__).parent / "pictures"

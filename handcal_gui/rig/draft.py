@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError, HandcalError
+from handcal.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
 from handcal_gui.rig.solve import Solved
@@ -62,6 +64,20 @@ class Draft(QObject):
         """Where the viewpoint camera's intrinsics are, once they are known."""
         given = self.work.viewpoint.intrinsics
         return Path(given).expanduser() if given else self.folder.viewpoint
+
+    @property
+    def camera_verdict(self) -> str:
+        """How the viewpoint camera's calibration ended; empty if there is none.
+
+        A file that tells no verdict is taken to be good.
+        """
+        file = self.camera_file
+        if not file.exists():
+            return ""
+        with suppress(FileError):
+            verdict = read_json(file).get("verdict")
+            return str(verdict.get("name")) if isinstance(verdict, dict) else "good"
+        return "good"  # OpenCV's or ROS's
 
     def enter(self, **changes: Any) -> None:
         """Take fields of `RigWork`."""

@@ -179,7 +179,7 @@ class RigWizard(QDialog):
         if title == "Board":
             return "good"
         if title == "Viewpoint camera":
-            return "good" if self.draft.camera_file.exists() else ""
+            return self.draft.camera_verdict
         verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
         return "good" if verdicts == {"good"} else ""
 

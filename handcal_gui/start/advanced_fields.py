@@ -1,16 +1,17 @@
-"""What hardly anyone changes: how the calibration runs, and what the simulator simulates."""
+"""What hardly anyone changes: how calibration and recordings run, what the simulator simulates."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QToolButton, QVBoxLayout, QWidget
 
+from handcal.camera.playback import PlaybackSettings
 from handcal.station_settings import StationSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import named, number, whole_number
+from handcal_gui.widgets.fields import beside, named, number, whole_number
 
 
 class AdvancedFields(QWidget):
@@ -30,6 +31,15 @@ class AdvancedFields(QWidget):
         self._fold.setCheckable(True)
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._calibration = CalibrationFields()
+        self._real_time = named(
+            QCheckBox("Real time"),
+            "realTime",
+            help_text="At the pace it was recorded at; otherwise every frame, as fast as possible.",
+        )
+        self._loop = named(QCheckBox("Loop"), "loop", help_text="Begin again at its end.")
+        playback = QWidget()
+        beside(playback, self._real_time, self._loop, grows=self._loop)
+        self._calibration.add_row("Recordings", playback)
         self._seed = whole_number(
             "seed", 0, 999_999, "Another number is another simulated wearer, hand and room."
         )
@@ -44,6 +54,8 @@ class AdvancedFields(QWidget):
         ):
             self._calibration.add_row(label, field)
             field.valueChanged.connect(self.changed)
+        for box in (self._real_time, self._loop):
+            box.toggled.connect(self.changed)
         self._calibration.changed.connect(self.changed)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -56,6 +68,8 @@ class AdvancedFields(QWidget):
     def show_settings(self, settings: StationSettings) -> None:
         """Show settings of a station."""
         self._calibration.show_settings(settings.calibration)
+        self._real_time.setChecked(settings.playback.real_time)
+        self._loop.setChecked(settings.playback.loop)
         self._seed.setValue(settings.seed)
         self._loss.setValue(100 * settings.loss)
         self._reorder.setValue(100 * settings.reorder)
@@ -65,6 +79,7 @@ class AdvancedFields(QWidget):
         return replace(
             settings,
             calibration=self._calibration.take(settings.calibration),
+            playback=PlaybackSettings(self._real_time.isChecked(), self._loop.isChecked()),
             seed=self._seed.value(),
             loss=self._loss.value() / 100,
             reorder=self._reorder.value() / 100,

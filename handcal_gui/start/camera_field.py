@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QLineEdit, QStackedWidget, QWidget
+from PySide6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
-from handcal.camera.playback import PlaybackSettings
 from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
 from handcal.station_settings import Source, StationSettings
@@ -49,16 +48,8 @@ class CameraField(QWidget):
         camera = QWidget()
         beside(camera, self._serial, edit, grows=self._serial)
         self._recording = PathField("Recording", "either", _PATTERN)
-        self._real_time = named(
-            QCheckBox("Real time"),
-            "realTime",
-            help_text="At the pace it was recorded at; otherwise every frame, as fast as possible.",
-        )
-        self._loop = named(QCheckBox("Loop"), "loop", help_text="Begin again at its end.")
-        played = QWidget()
-        beside(played, self._recording, self._real_time, self._loop, grows=self._recording)
         details = QStackedWidget()
-        for page in (QWidget(), camera, played):  # in the order of _SOURCES
+        for page in (QWidget(), camera, self._recording):  # in the order of _SOURCES
             details.addWidget(page)
         beside(self, self._source, details, grows=details)
         self._source.currentIndexChanged.connect(details.setCurrentIndex)
@@ -66,8 +57,6 @@ class CameraField(QWidget):
         self._serial.textChanged.connect(self.changed)
         edit.clicked.connect(self.edit_realsense)
         self._recording.changed.connect(self.changed)
-        for box in (self._real_time, self._loop):
-            box.toggled.connect(self.changed)
 
     def show_settings(self, settings: StationSettings) -> None:
         """Show the camera of a station."""
@@ -75,8 +64,6 @@ class CameraField(QWidget):
         self._realsense = settings.realsense
         self._serial.setText(settings.realsense.serial)
         self._recording.set_path(settings.recording)
-        self._real_time.setChecked(settings.playback.real_time)
-        self._loop.setChecked(settings.playback.loop)
 
     def take(self, settings: StationSettings) -> StationSettings:
         """Return settings with the camera shown."""
@@ -85,7 +72,6 @@ class CameraField(QWidget):
             source=self._source.currentData(),
             realsense=replace(self._realsense, serial=self._serial.text().strip()),
             recording=self._recording.path,
-            playback=PlaybackSettings(self._real_time.isChecked(), self._loop.isChecked()),
         )
 
     def edit_realsense(self) -> None:

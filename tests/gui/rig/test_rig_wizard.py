@@ -76,6 +76,7 @@ def test_a_rig_is_calibrated_saved_and_used(
     assert "displays are calibrated with it" in solve(qtbot, wizard, VIEWPOINT)
     assert "in the rig now" in solve(qtbot, wizard, LEFT)
     assert undone not in marks(wizard)[:RIGHT]
+    assert marks(wizard)[VIEWPOINT] == "needs more views"  # eight of them
     assert marks(wizard)[RIGHT:] == [undone, undone]
     wizard.show_step(RESULT)
     child(wizard, QLineEdit, "rigName").setText("Our headset")
