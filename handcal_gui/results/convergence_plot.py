@@ -42,5 +42,5 @@ class ConvergencePlot(Plot):
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
                 self.add_text(alignment, len(rms_mm), float(rms_mm[-1]))
-        longest = max((len(s.history_m2) for eyes in results.alignments for s in eyes.values()))
-        self.item.setXRange(1, 1.1 * longest)  # with room for the names
+        lengths = [len(s.history_m2) for eyes in results.alignments for s in eyes.values()]
+        self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with room for the names
