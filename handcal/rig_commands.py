@@ -16,7 +16,17 @@ from typing import TYPE_CHECKING, Any, get_args
 from handcal.camera_options import add_realsense_options, realsense_of
 from handcal.errors import FileError, HandcalError
 from handcal.files import make_folder, write_json
-from handcal.terminal import Commands, Parser, add_command, console, fail, number, progress, table
+from handcal.terminal import (
+    Commands,
+    Parser,
+    add_command,
+    console,
+    fail,
+    number,
+    progress,
+    table,
+    until_interrupted,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -76,9 +86,10 @@ def take(arguments: argparse.Namespace) -> None:
             for source, into in zip(sources, folders, strict=True)
         ]
         console.print(f"From {' and '.join(one.name for one in cameras)}; Ctrl+C ends it")
+        is_stopped = stack.enter_context(until_interrupted())
         report = stack.enter_context(progress())
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
-        taken = take_views(cameras, folders, board, settings, report)
+        taken = take_views(cameras, folders, board, settings, report, is_stopped)
     for why, count in taken.passed_over.items():
         console.print(f"{count} of {taken.looked_at} moments passed over: {why}")
     if not taken.kept:

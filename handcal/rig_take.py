@@ -65,6 +65,7 @@ def take_views(
     board: Board,
     settings: TakeSettings,
     report: Callable[[str, float], None],
+    is_stopped: Callable[[], bool] = lambda: False,
 ) -> Taken:
     """Take images of a board by itself: of one camera, or of the two of pairs.
 
@@ -77,7 +78,9 @@ def take_views(
     board : Board
     settings : TakeSettings
     report : callable
-        Told what is being done, and the share done; may raise to give up.
+        Told what is being done, and the share done.
+    is_stopped : callable
+        Asked at every moment; what is kept by then stays.
 
     Raises
     ------
@@ -91,7 +94,7 @@ def take_views(
     next_ns = 0
     for images, t_ns in _moments(cameras):
         share = 1e-9 * t_ns / settings.seconds
-        if chooser.is_done or share > 1.0:
+        if chooser.is_done or share > 1.0 or is_stopped():
             break
         if t_ns < next_ns:
             continue

@@ -86,11 +86,16 @@ def test_no_more_are_taken_than_asked_for(videos: tuple[Path, Path], tmp_path: P
     assert names == [f"a-00{number}.png" for number in (1, 2, 3, 4)]
 
 
-def test_time_is_up(videos: tuple[Path, Path], tmp_path: Path) -> None:
+def test_it_ends_when_time_is_up_or_when_stopped(videos: tuple[Path, Path], tmp_path: Path) -> None:
     with open_viewpoint(videos[0]) as camera:
         settings = TakeSettings(seconds=0.35)
         taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
     assert (taken.kept, taken.looked_at) == (1, 4)
+    with open_viewpoint(videos[0]) as camera:
+        taken = take_views(
+            *((camera,), (tmp_path / "b",), BOARD, TakeSettings(), lambda *_: None, lambda: True)
+        )
+    assert taken.looked_at == 0
 
 
 def test_images_of_a_moment_get_one_number(tmp_path: Path) -> None:
