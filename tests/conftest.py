@@ -14,7 +14,8 @@ hypothesis.settings.register_profile("handcal", deadline=None)
 hypothesis.settings.load_profile("handcal")
 
 _IN_REAL_TIME = {
-    "qtbot", "display", "live", "studio", "server", "raw_server", "client", "process", "begun"
+    "qtbot", "display", "live", "studio", "server", "raw_server", "client", "process", "begun",
+    "cluster",
 }  # fmt: skip
 """Fixtures that run windows, threads or processes, which a busy machine may keep waiting."""
 

@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection
 
 from handcal.errors import HandcalError
 
-_CONNECT_S = 10
+_CONNECT_S = 30
 _THREAD_LIMITS = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 

@@ -91,16 +91,20 @@ def _few_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[str]:
-    distributed = pytest.importorskip("distributed")
+    dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
+    patient = {f"distributed.comm.timeouts.{what}": "120s" for what in ("connect", "tcp")}
     path, sys.path[:] = sys.path[:], [str(ROOT), *sys.path]
     try:
-        with distributed.LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-        ) as cluster:
+        with (
+            dask.config.set(patient),
+            distributed.LocalCluster(
+                n_workers=2,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address=None,
+            ) as cluster,
+        ):
             yield cluster.scheduler_address
     finally:
         sys.path[:] = path
@@ -192,7 +196,7 @@ def test_a_killed_study_goes_on_and_leaves_no_process(tmp_path: Path) -> None:
         f"run_study(make_study({study.settings}), Path({str(tmp_path)!r}), workers=2)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
-        process.communicate(timeout=60)  # ends once no process is left that could write
+        process.communicate(timeout=300)  # ends once no process is left that could write
         assert process.returncode == -signal.SIGKILL
     rows = run_study(study, tmp_path, workers=1)
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
