@@ -58,6 +58,17 @@ def is_open(program: Program) -> bool:
     return program.window.page == "review"
 
 
+def test_the_example_is_opened_from_the_start_page(
+    program: Program, qtbot: QtBot, tmp_path: Path
+) -> None:
+    program.start.example_requested.emit(tmp_path / "sessions")
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    assert child(program, QLabel, "reviewHolds").text().startswith("2 alignments, 6 trials")
+    program.show_start()
+    program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
+    assert "preferences.json" in program.window.banner.text
+
+
 def test_a_session_is_shown_and_closed_again(
     program: Program, qtbot: QtBot, record: SessionRecord
 ) -> None:

@@ -305,6 +305,9 @@ def test_unfinished_and_recent_sessions_are_offered(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
 ) -> None:
     page = open_page()
+    with qtbot.waitSignal(page.example_requested) as example:
+        button(page, "example").click()
+    assert example.args == [Path(page.new.settings.sessions)]
     resume, opened = (find(page, QWidget, name) for name in ("resume", "open"))
     assert not resume.isVisible()
     assert not button(opened, "choose").isEnabled()
