@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 from handcal.types import Float64
 
 # Of so few clusters the skewness cannot be told.
-_FEWEST_FOR_SKEWNESS = 5
+_FEWEST_FOR_SKEWNESS = 10
 _NO_SKEWNESS = 1e-6
 
 
