@@ -96,7 +96,7 @@ def mean_interval(
     mean is that of all values, and Student's interval that of a mixed-effects model with a random
     intercept for each cluster.
 
-    A bootstrap of few clusters is too narrow. From five clusters on, Student's interval is
+    A bootstrap of few clusters is too narrow. From ten clusters on, Student's interval is
     corrected for skewness by Hall's monotone cubic transformation of the t statistic (Hall 1992,
     "On the removal of skewness by transformation", J. R. Statist. Soc. B 54:221-228), which does
     what a bootstrap-t does, without random numbers; of fewer, it is Student's own.
