@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QAbstractItemView,
     QHeaderView,
     QTableWidget,
@@ -52,9 +53,7 @@ class NumberTable(QTableWidget):
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(self.verticalHeader().minimumSectionSize())
         self.verticalHeader().setSectionsClickable(False)
-        self.setStyleSheet("QTableCornerButton::section { background: palette(base); border: 0; }")
-        quiet(self.horizontalHeader())
-        quiet(self.verticalHeader())
+        self._take_colors()
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
 
@@ -88,8 +87,15 @@ class NumberTable(QTableWidget):
         """Let the headers follow when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
-            quiet(self.horizontalHeader())
-            quiet(self.verticalHeader())
+            self._take_colors()
+
+    def _take_colors(self) -> None:
+        quiet(self.horizontalHeader())
+        quiet(self.verticalHeader())
+        for corner in self.findChildren(QAbstractButton):
+            corner.setStyleSheet(
+                "QTableCornerButton::section { background: palette(base); border: 0; }"
+            )
 
     def _fit_columns(self) -> None:
         """Give each column what is in it needs, and an equal share of what is left."""
