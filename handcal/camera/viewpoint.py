@@ -17,7 +17,6 @@ from handcal.errors import CameraEndError, CameraError, FileError
 from handcal.image_file import IMAGE_SUFFIXES, MAX_SIDE_PX, read_image
 from handcal.types import UInt8
 
-
 _BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_DSHOW, "darwin": cv2.CAP_AVFOUNDATION}
 _MOST_CAMERAS = 10
 
