@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any, Literal, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
 from hypothesis import given
@@ -15,7 +15,6 @@ from handcal.calibrate import CalibrationSettings
 from handcal.config import read_settings, settings_json
 from handcal.demo import DemoSettings
 from handcal.errors import FileError
-from handcal.types import METHODS
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses
@@ -52,13 +51,14 @@ def any_settings(kind: type) -> st.SearchStrategy[Any]:
 def any_value(kind: Any) -> st.SearchStrategy[Any]:
     if is_dataclass(kind) and isinstance(kind, type):
         return any_settings(kind)
+    if get_origin(kind) is Literal:
+        return st.sampled_from(get_args(kind))
     known: dict[Any, st.SearchStrategy[Any]] = {
         float: PLAUSIBLE,
         int: st.integers(200, 40_000),
         bool: st.booleans(),
         str: st.text(),
         tuple[float, float, float]: st.lists(PLAUSIBLE, min_size=3, max_size=3),
-        Literal[METHODS]: st.sampled_from(METHODS),
     }
     return known[kind]
 
