@@ -100,6 +100,7 @@ def report(arguments: argparse.Namespace) -> None:
     from handcal.evaluate.cube_report import cube_report
     from handcal.evaluate.cube_summary import cube_summary
     from handcal.evaluate.cube_test import judge_captures
+    from handcal.report.cells import mean_sd
     from handcal.report.write import write_report
     from handcal.rig.formats import read_intrinsics
 
@@ -124,8 +125,7 @@ def report(arguments: argparse.Namespace) -> None:
     shown_table = table("drawn", "pairs", *(title for _, title in _SHOWN))
     for drawn, found in summary.items():
         spreads = [found[name].spread for name, _ in _SHOWN]
-        cells = [f"{spread.mean:.2f} ± {spread.sd:.2f}" for spread in spreads]
-        shown_table.add_row(escape(drawn), str(spreads[0].count), *cells)
+        shown_table.add_row(escape(drawn), str(spreads[0].count), *map(mean_sd, spreads))
     console.print(shown_table)
     for file in written:
         console.print(str(file), markup=False)

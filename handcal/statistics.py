@@ -15,6 +15,9 @@ from handcal.types import Float64
 _FEWEST_FOR_SKEWNESS = 10
 _NO_SKEWNESS = 1e-6
 
+INTERVAL_METHOD = f"Student's t, corrected for skewness from {_FEWEST_FOR_SKEWNESS} on (Hall 1992)"
+"""How `mean_interval` is found, as reports say it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Summary:

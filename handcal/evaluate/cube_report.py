@@ -11,9 +11,11 @@ from matplotlib.axes import Axes
 from handcal.evaluate.cube_summary import ErrorSummary
 from handcal.evaluate.cube_test import CubeRow, CubeTest
 from handcal.export.figures import name_axes
+from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
 from handcal.rig.cube import Cube
+from handcal.statistics import INTERVAL_METHOD
 from handcal.types import Intrinsics
 
 _METHOD = (
@@ -26,8 +28,7 @@ _METHOD = (
 )
 _INTERVALS = (
     "Each position of the camera has its own calibration, so that only positions count as "
-    "independent: intervals are of the mean of positions' means, by Student's t, corrected for "
-    "skewness from five on (Hall 1992)."
+    f"independent: intervals are of the mean of positions' means, by {INTERVAL_METHOD}."
 )
 _ERRORS = {
     "err_t_x_mm": "err_t x, mm",
@@ -79,8 +80,9 @@ def cube_report(
     positions = {row["position"] for row in test.rows}
     poses = {(row["position"], row["pose"]) for row in test.rows}
     findings = [
-        f"{drawn} {_mean(errors['err_t_xy_arcmin'])} arcmin ({_mean(errors['err_t_xy_mm'])} mm), "
-        f"{_mean(errors['err_t_z_mm'])} mm, {_mean(errors['err_R_deg'])}°"
+        f"{drawn} {mean_sd(errors['err_t_xy_arcmin'].spread)} arcmin "
+        f"({mean_sd(errors['err_t_xy_mm'].spread)} mm), "
+        f"{mean_sd(errors['err_t_z_mm'].spread)} mm, {mean_sd(errors['err_R_deg'].spread)}°"
         for drawn, errors in summary.items()
     ]
     return Report(
@@ -118,11 +120,11 @@ def _table(drawn: str, errors: Mapping[str, ErrorSummary]) -> Table:
 
 
 def _cells(name: str, error: ErrorSummary) -> list[str]:
-    spread, interval = error.spread, error.interval
+    spread = error.spread
     return [
         name,
-        _mean(error),
-        f"{interval.low:.2f} to {interval.high:.2f}" if interval else "–",
+        mean_sd(spread),
+        interval_ends(error.interval),
         f"{spread.median:.2f}",
         f"{spread.q1:.2f} to {spread.q3:.2f}",
         f"{spread.min:.2f} to {spread.max:.2f}",
@@ -196,12 +198,8 @@ def _draw_boxes(
 def _published(summary: Mapping[str, Mapping[str, ErrorSummary]]) -> Section:
     columns = [Column("study", "left"), *(Column(_ERRORS[key]) for key in _COMPARED)]
     here = [
-        (f"this test, {drawn}", *(_mean(errors[key]) for key in _COMPARED))
+        (f"this test, {drawn}", *(mean_sd(errors[key].spread) for key in _COMPARED))
         for drawn, errors in summary.items()
     ]
     caption = "Mean ± SD, others as given by Hu et al. 2021; all at arm's reach, 0.4 to 0.6 m."
     return Section("Beside published tests", [Table(columns, [*here, *_PUBLISHED], caption)])
-
-
-def _mean(error: ErrorSummary) -> str:
-    return f"{error.spread.mean:.2f} ± {error.spread.sd:.2f}"

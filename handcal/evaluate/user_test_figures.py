@@ -37,9 +37,11 @@ def draw_wearers(
         flierprops={"marker": ".", "markersize": 2.5},
     )
     for place, group in enumerate(by_wearer.values()):
-        means.plot(group.arcmin.mean, place, MARKERS["left"], color=COLORS["left"], markersize=4)
-        if group.interval_arcmin is not None:
-            ends = group.interval_arcmin.low, group.interval_arcmin.high
+        found = group.interval_arcmin
+        mean = group.arcmin.mean if found is None else found.mean
+        means.plot(mean, place, MARKERS["left"], color=COLORS["left"], markersize=4)
+        if found is not None:
+            ends = found.low, found.high
             means.plot(ends, (place, place), color=COLORS["left"], linewidth=1.2)
     titles = "reprojection error by wearer", "mean, with interval"
     for ax, title in zip(axes, titles, strict=True):

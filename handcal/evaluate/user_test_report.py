@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 
-from matplotlib.axes import Axes
-
-from handcal.evaluate.user_test import CornerRow, GroupErrors, UserTest, UserTestResult
+from handcal.evaluate.user_test import GroupErrors, UserTest, UserTestResult
 from handcal.evaluate.user_test_figures import draw_corners, draw_wearers
 from handcal.export.figures import draw_trial_errors
+from handcal.methods.published import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Row, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
+from handcal.statistics import INTERVAL_METHOD
 from handcal.trial import calibration_numbers
 
 # Wearers in one figure, and the height of each.
@@ -25,14 +25,8 @@ _METHOD = (
 )
 _INTERVALS = (
     "Errors of one wearer are alike, so that only wearers count as independent: intervals are of "
-    "the mean of wearers' means, by Student's t, corrected for skewness from five on (Hall 1992). "
+    f"the mean of wearers' means, by {INTERVAL_METHOD}. "
     "Those of one wearer take calibrations for independent."
-)
-_PUBLISHED = (
-    ("Hu et al. 2021, this method", "10.87", "8.18–13.18", "5.55–17.16"),
-    ("Itoh and Klinker 2014, INDICA", "14.49", "12.10–16.08", "10.42–17.32"),
-    ("Moser and Swan 2016, stylus", "9.57", "6.13–14.80", "0.66–13.09"),
-    ("Moser and Swan 2016, finger", "16.98", "10.83–25.51", "0.93–46.87"),
 )
 
 
@@ -105,7 +99,7 @@ def _wearers(test: UserTest, result: UserTestResult) -> Section:
             Figure(
                 f"wearers-{first // _WEARERS + 1}",
                 "Means over calibrations; a wearer of one calibration has no interval.",
-                partial(_draw_wearers, shown, test.corners),
+                partial(draw_wearers, by_wearer=shown, rows=test.corners),
                 list(_wearer_rows(shown)),
                 height_mm=_FIGURE_MM + _WEARER_MM * len(shown),
                 columns=2,
@@ -113,12 +107,6 @@ def _wearers(test: UserTest, result: UserTestResult) -> Section:
             )
         )
     return Section("Wearers", items)
-
-
-def _draw_wearers(
-    shown: Mapping[str, GroupErrors], rows: Sequence[CornerRow], axes: Sequence[Axes]
-) -> None:
-    draw_wearers(axes, shown, rows)
 
 
 def _corners(test: UserTest) -> Section:
@@ -153,12 +141,16 @@ def _published(result: UserTestResult) -> Section:
         Column("min–max, arcmin"),
     ]
     text = (
-        "Published figures as printed in Hu et al. 2021, whose test had 3 wearers, 10 calibrations "
-        "each, 3 distances and 4 corners, and a mean of 10.79 ± 3.21 arcmin (7.71 ± 2.29 px). The "
-        "maximum printed for the stylus is below its third quartile. Displays, wearers and targets "
-        "differ between the studies."
+        "Published figures as printed in Hu et al. 2021, those of SPAAM in its source; its test "
+        "had 3 wearers, 10 calibrations each, 3 distances and 4 corners, and a mean of "
+        "10.79 ± 3.21 arcmin (7.71 ± 2.29 px). The maximum printed for the stylus is below its "
+        "third quartile. Displays, wearers and targets differ between the studies."
     )
-    return Section("Beside published tests", [text, Table(columns, [here, *_PUBLISHED])])
+    published = [
+        (p.study, f"{p.median:.2f}", f"{p.q1:.2f}–{p.q3:.2f}", f"{p.min:.2f}–{p.max:.2f}")
+        for p in REPROJECTION
+    ]
+    return Section("Beside published tests", [text, Table(columns, [here, *published])])
 
 
 def _sessions(test: UserTest) -> Section:

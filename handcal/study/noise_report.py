@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from handcal.export.figures import name_axes
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
-from handcal.statistics import MeanInterval, mean_interval
+from handcal.statistics import INTERVAL_METHOD, MeanInterval, mean_interval
 from handcal.study.noise import ERRORS_MM, FLOOR, HANDS, SECTIONS, NoiseSettings
 from handcal.study.store import Row
 from handcal.types import Float64
@@ -31,9 +31,9 @@ _COLORS = {
     FLOOR: "#009e73",
 }
 _INTERVALS = (
-    "Intervals are 95 % confidence intervals of the mean. Errors of one person's hand are alike, "
-    "so that people count as independent, not alignments: Student's t over their means, corrected "
-    "for skewness from five on (Hall 1992)."
+    "Intervals are of 95 % confidence. Errors of one person's hand are alike, "
+    "so that people count as independent, not alignments: intervals are of the mean of people's "
+    f"means, by {INTERVAL_METHOD}."
 )
 _METHODS = (
     "consistent: handcal's default. paper: rotation-constrained ICP as published. linear: its "

@@ -36,7 +36,7 @@ def test_the_report_holds_what_the_summary_says() -> None:
     ]
     errors = {table.caption: {row[0]: row[1] for row in table.rows} for table in tables}
     z = summary["solved"]["err_t_z_mm"].spread
-    shown = f"{z.mean:.2f} ± {z.sd:.2f}"
+    shown = f"{z.mean:.2f}\u00a0±\u00a0{z.sd:.2f}"
     assert errors["solved, 4 pairs of captures"]["err_t z, mm"] == shown
     assert f"solved {summary['solved']['err_t_xy_arcmin'].spread.mean:.2f}" in report.lead
     published = next(table for table in tables if table.columns[0].title == "study")

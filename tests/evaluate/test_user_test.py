@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
 from handcal.__main__ import main
 from handcal.display import TARGET_DEPTHS_M
 from handcal.errors import FileError
 from handcal.evaluate.user_test import UserTest, evaluate_user_test, read_user_test
+from handcal.evaluate.user_test_figures import draw_wearers
 from handcal.evaluate.user_test_report import user_test_report
 from handcal.report.cells import median_quartiles
 from handcal.report.document import Table
@@ -145,6 +147,17 @@ def test_the_report_says_it(user_test: UserTest) -> None:
     assert median_quartiles(result.by_wearer["a"].arcmin) in cells
     assert "holds no trial of the user test" in cells
     assert {figure.name for figure in report.figures} == {"errors", "wearers-1", "corners"}
+    published = ("Moser & Swan 2016, finger, 25", "16.98", "10.83–25.51", "0.93–46.87")
+    assert published in [tuple(row) for table in tables for row in table.rows]
+
+
+def test_what_is_drawn_within_an_interval_is_its_own_mean(user_test: UserTest) -> None:
+    group = evaluate_user_test(user_test).by_wearer["a"]
+    assert group.interval_arcmin is not None
+    apart = replace(group.interval_arcmin, mean=group.arcmin.mean + 1.0)
+    boxes, means = Canvas().subplots(1, 2)
+    draw_wearers((boxes, means), {"a": replace(group, interval_arcmin=apart)}, user_test.corners)
+    assert means.lines[0].get_xdata() == [apart.mean]
 
 
 def test_a_report_of_one_calibration_says_what_it_cannot_tell(folder: Path) -> None:
