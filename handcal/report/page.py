@@ -109,6 +109,9 @@ class Document:
             if any(head):
                 self._row(columns, widths_mm, head, weight="bold")
 
+        if rows:  # the head is not parted from the first of them
+            first_mm = _row_height_mm(widths_mm, rows[0])
+            self._need(_row_height_mm(widths_mm, head, weight="bold") + first_mm)
         set_head()
         for row in rows:
             if self._y_mm + _row_height_mm(widths_mm, row) > HEIGHT_MM - _BOTTOM_MM:

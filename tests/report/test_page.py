@@ -68,6 +68,17 @@ def test_what_the_font_lacks_is_replaced() -> None:
     assert plain("a\nb\tc\x00d🙂e中") == "a b c\ufffdd\ufffde\ufffd"
 
 
+def test_a_tables_head_is_not_parted_from_its_first_row() -> None:
+    for high_mm in np.arange(235.0, 262.0, 1.5):
+        document = Document("footer")
+        document.space(high_mm)
+        document.table([Column("value")], [["1.5\n2.5\n3.5"]])
+        pages = document.finish()
+        shown = [set(lines([page])) & {"value", "1.5", "3.5"} for page in pages]
+        assert shown[-1] == {"value", "1.5", "3.5"}
+        assert not any(shown[:-1])
+
+
 def test_a_long_table_goes_on_with_its_head_on_every_page() -> None:
     document = Document("footer")
     rows = [[str(number), LOREM[: number % 300], f"{number:.3f}"] for number in range(150)]
