@@ -84,7 +84,7 @@ def test_an_interrupted_study_goes_on(
     with monkeypatch.context() as patch:
         patch.setattr("handcal.study_commands.until_interrupted", interrupted)
         assert fails(study) == 130
-    assert "the same command goes on with it" in capsys.readouterr().err
+    assert "run it again to go on with it" in capsys.readouterr().err
     assert not (tmp_path / "study" / "rows.csv").exists()
     chunks = set((tmp_path / "study" / "chunks").iterdir())
     monkeypatch.setattr("handcal.report.write.write_report", lambda *_: ())

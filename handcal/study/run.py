@@ -142,7 +142,7 @@ def _run_chunks(
     parts: dict[int, dict[int, list[Row]]] = {number: {} for number in chunks}
     while parts:
         if is_cancelled is not None and is_cancelled():
-            raise CancelledError("the study was cancelled; the same command goes on with it")
+            raise CancelledError("the study was cancelled; run it again to go on with it")
         try:
             future = finished.get(timeout=_POLL_S)
         except Empty:

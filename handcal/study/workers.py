@@ -72,8 +72,8 @@ def _cluster(address: str) -> Iterator[Executor]:
             yield client.get_executor(pure=False)  # type: ignore[no-untyped-call]
         except (KilledWorker, CancelledError) as error:
             raise HandcalError(
-                "the Dask cluster lost its scheduler or its workers; the same command goes on "
-                "once it is there again"
+                "the Dask cluster lost its scheduler or its workers; once it is there again, run "
+                "the study again to go on with it"
             ) from error
 
 
@@ -99,8 +99,8 @@ def _processes(workers: int) -> Iterator[Executor]:
                 raise
     except BrokenExecutor as error:
         raise HandcalError(
-            "a process of the study died, perhaps for want of memory; the same command goes on, "
-            "with --workers fewer of them"
+            "a process of the study died, perhaps for want of memory; run the study again, with "
+            "fewer processes, to go on with it"
         ) from error
     finally:
         for name, value in before.items():
