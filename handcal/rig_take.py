@@ -151,11 +151,13 @@ def _moments(cameras: Sequence[ViewpointCamera]) -> Iterator[tuple[tuple[UInt8, 
         while True:
             seen = [_read(camera) for camera in cameras]
             begins_ns = begins_ns or [t_ns for _, t_ns in seen]
-            since_ns = seen[0][1] - begins_ns[0]
-            for number, camera in enumerate(cameras[1:], start=1):
-                while seen[number][1] - begins_ns[number] < since_ns - _TOGETHER_NS:
+            latest_ns = max(
+                t_ns - begin_ns for (_, t_ns), begin_ns in zip(seen, begins_ns, strict=True)
+            )
+            for number, camera in enumerate(cameras):
+                while seen[number][1] - begins_ns[number] < latest_ns - _TOGETHER_NS:
                     seen[number] = _read(camera)
-            yield tuple(image for image, _ in seen), since_ns
+            yield tuple(image for image, _ in seen), seen[0][1] - begins_ns[0]
     except CameraEndError:
         return
 

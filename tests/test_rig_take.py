@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ import pytest
 from handcal.__main__ import main
 from handcal.camera.viewpoint import open_viewpoint
 from handcal.closable import Closable
-from handcal.errors import CameraTimeoutError
+from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import interpolate_pose, rigid
 from handcal.image_file import read_image
 from handcal.rig.board import Board
@@ -132,6 +133,44 @@ def test_a_camera_that_falls_silent_is_told(tmp_path: Path) -> None:
     with pytest.raises(CameraTimeoutError, match="no frame for 1 s"):
         take_views((camera,), (tmp_path / "a",), BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
     assert camera.left < 1000  # after its first image
+
+
+class PacedCamera(Closable):
+    """Gives images that hold their time, in tens of milliseconds, at a pace of its own."""
+
+    name = "paced"
+
+    def __init__(self, every_ms: int) -> None:
+        self.every_ms = every_ms
+        self.t_ms = -every_ms
+
+    def read(self) -> tuple[UInt8, int]:
+        self.t_ms += self.every_ms
+        if self.t_ms > 2000:
+            raise CameraEndError("the end")
+        return np.full((1, 1, 3), self.t_ms // 10, np.uint8), self.t_ms * 1_000_000
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("paces_ms", [(30, 200), (200, 30)])
+def test_cameras_of_different_paces_stay_together(
+    paces_ms: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    apart_ms: list[int] = []
+
+    def look(images: Sequence[UInt8], _board: Board) -> tuple[None, None]:
+        one, other = (int(image[0, 0, 0]) for image in images)
+        apart_ms.append(10 * abs(one - other))
+        return None, None
+
+    monkeypatch.setattr("handcal.rig_take.see_board", look)
+    cameras = [PacedCamera(pace_ms) for pace_ms in paces_ms]
+    folders = tmp_path / "depth", tmp_path / "headset"
+    take_views(cameras, folders, BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
+    assert len(apart_ms) == 11
+    assert max(apart_ms) <= 20
 
 
 def test_the_depth_imager_is_kept_beside_its_colour(tmp_path: Path) -> None:
