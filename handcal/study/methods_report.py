@@ -39,13 +39,7 @@ _NAMES_MM = 42.0
 
 
 def methods_report(settings: MethodSettings, rows: Sequence[Row]) -> Report:
-    """Return the report of a method comparison.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two wearers, of whom no interval can be given.
-    """
+    """Return the report of a method comparison."""
     first = _population(rows, settings.eye_distance_sigmas_m[0])
     paper, one, three, each = (
         float(_arcmin(_of(first, name)).mean())
@@ -76,7 +70,7 @@ def _sections(settings: MethodSettings, rows: Sequence[Row]) -> Iterator[Section
     if len(settings.eye_distance_sigmas_m) > 1 and settings.eye_distance_sigmas_m[0] == 0.0:
         yield _eye_distance(settings, rows)
     yield _published()
-    yield Section("Settings", settings_items(asdict(settings)))
+    yield Section("Settings", settings_items(asdict(settings), "study.json"))
 
 
 def _reprojection_table(rows: Sequence[Row]) -> Table:
@@ -195,7 +189,7 @@ def _figure(rows: Sequence[Row], name: str) -> Figure:
 def _draw(rows: Sequence[Row], axes: Sequence[Axes]) -> None:
     (ax,) = axes
     names = _methods(rows)
-    errors = [_arcmin([row for row in _of(rows, name) if not row["refused"]]) for name in names]
+    errors = [_arcmin(_of(rows, name)) for name in names]
     ax.boxplot(
         [values.ravel() for values in errors],
         positions=range(len(names)),
@@ -228,8 +222,9 @@ def _at(rows: Sequence[Row], depth_m: float) -> list[Row]:
 
 
 def _arcmin(rows: Sequence[Row]) -> Float64:
-    """Return (N, 8) errors: each eye's four corners."""
-    return np.array([[row[name] for name in ARCMIN_COLUMNS] for row in rows], dtype=np.float64)
+    """Return (N, 8) errors of the rows that are not refused: each eye's four corners."""
+    errors = [[row[name] for name in ARCMIN_COLUMNS] for row in rows if not row["refused"]]
+    return np.array(errors, dtype=np.float64).reshape(-1, len(ARCMIN_COLUMNS))
 
 
 def _numbers(rows: Sequence[Row], name: str, depth_m: float) -> Float64:
