@@ -94,7 +94,7 @@ def add_study_commands(commands: Commands) -> None:
         one = add_command(commands, command)
         if command is methods:
             one.add_argument(
-                "--wearers", type=number(int, 2, 100_000), metavar="N", help="of each population"
+                "--wearers", type=number(int, 2, 10_000), metavar="N", help="of each population"
             )
             one.add_argument(
                 "--fit-noise",
