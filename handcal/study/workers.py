@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import (
@@ -20,6 +21,7 @@ from multiprocessing.connection import Connection
 from handcal.errors import HandcalError
 
 _CONNECT_S = 30
+_MOST_ON_WINDOWS = 61  # processes that a ProcessPoolExecutor can wait for there
 _THREAD_LIMITS = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 
@@ -30,7 +32,8 @@ def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executo
     Parameters
     ----------
     workers : int or None
-        Processes on this machine, as many as cores if None; 1 means a thread of this process.
+        Processes on this machine, as many as cores if None, at most 61 on Windows; 1 means a
+        thread of this process.
     scheduler : str or None
         Address of a Dask scheduler whose workers do the work instead.
 
@@ -79,6 +82,8 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 @contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
+    if sys.platform == "win32":
+        workers = min(workers, _MOST_ON_WINDOWS)
     # More than one thread of linear algebra in each process would only be in the others' way.
     before = {name: os.environ.get(name) for name in _THREAD_LIMITS}
     os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
