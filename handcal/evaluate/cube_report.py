@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from handcal.evaluate.cube_summary import ErrorSummary
 from handcal.evaluate.cube_test import CubeRow, CubeTest
 from handcal.export.figures import name_axes
+from handcal.methods.published import MISALIGNMENT
 from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
@@ -50,21 +51,6 @@ _COMPARED = (
     "err_t_xy_mm",
     "err_t_xy_arcmin",
     "err_R_deg",
-)
-# All with their standard deviations, from Hu et al. 2021, tables 1 and 2 and the text beside them.
-_PUBLISHED = (
-    (
-        "Hu et al. 2021",
-        "0.85 ± 0.52",
-        "0.88 ± 0.53",
-        "2.85 ± 2.03",
-        "1.37 ± 0.42",
-        "8.81 ± 2.69",
-        "1.76 ± 0.99",
-    ),
-    ("Azimi et al. 2017, MPAAM", "0.94 ± 0.74", "0.83 ± 0.63", "3.51 ± 2.67", "–", "–", "–"),
-    ("Guo et al. 2019, 6.83 mm in all", "–", "–", "–", "–", "–", "5.42"),
-    ("Jun and Kim 2016, about 10 mm in all", "–", "–", "–", "–", "–", "–"),
 )
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 _BOX_WIDTH = 0.8
@@ -202,4 +188,11 @@ def _published(summary: Mapping[str, Mapping[str, ErrorSummary]]) -> Section:
         for drawn, errors in summary.items()
     ]
     caption = "Mean ± SD, others as given by Hu et al. 2021; all at arm's reach, 0.4 to 0.6 m."
-    return Section("Beside published tests", [Table(columns, [*here, *_PUBLISHED], caption)])
+    published = [
+        (
+            f"{p.study}, {p.whole_mm} mm in all" if p.whole_mm else p.study,
+            *(p.x_mm, p.y_mm, p.z_mm, p.across_mm, p.across_arcmin, p.rotation_deg),
+        )
+        for p in MISALIGNMENT
+    ]
+    return Section("Beside published tests", [Table(columns, [*here, *published], caption)])

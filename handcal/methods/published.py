@@ -22,11 +22,28 @@ class PublishedReprojection:
 
 @dataclass(frozen=True, slots=True)
 class PublishedMisalignment:
-    """Misalignment at arm's reach; x, y, z are "mean ± sd" in mm."""
+    """Misalignment at arm's reach, each "mean ± sd" as far as given.
+
+    Attributes
+    ----------
+    study, alignments : str
+    x_mm, y_mm, z_mm : str
+    across_mm, across_arcmin : str
+        In x and y together.
+    rotation_deg : str
+    whole_mm : str
+        Where components are not given.
+    """
 
     study: str
     alignments: str
-    error: str
+    x_mm: str = "–"
+    y_mm: str = "–"
+    z_mm: str = "–"
+    across_mm: str = "–"
+    across_arcmin: str = "–"
+    rotation_deg: str = "–"
+    whole_mm: str = ""
 
 
 REPROJECTION = (
@@ -41,12 +58,13 @@ its maximum as printed."""
 
 MISALIGNMENT = (
     PublishedMisalignment(
-        "Hu et al. 2021", "1, hand", "x 0.85 ± 0.52, y 0.88 ± 0.53, z 2.85 ± 2.03"
+        *("Hu et al. 2021", "1, hand", "0.85 ± 0.52", "0.88 ± 0.53", "2.85 ± 2.03"),
+        *("1.37 ± 0.42", "8.81 ± 2.69", "1.76 ± 0.99"),
     ),
     PublishedMisalignment(
-        "Azimi et al. 2017", "4 × 5, cube", "x 0.94 ± 0.74, y 0.83 ± 0.63, z 3.51 ± 2.67"
+        *("Azimi et al. 2017", "4 × 5, cube", "0.94 ± 0.74", "0.83 ± 0.63", "3.51 ± 2.67"),
     ),
-    PublishedMisalignment("Guo et al. 2019", "5, box", "6.83"),
-    PublishedMisalignment("Jun & Kim 2016", "8, fingertip", "about 10"),
+    PublishedMisalignment("Guo et al. 2019", "5, box", rotation_deg="5.42", whole_mm="6.83"),
+    PublishedMisalignment("Jun & Kim 2016", "8, fingertip", whole_mm="about 10"),
 )
 """Of cameras or users; not of the same quantity."""

@@ -164,12 +164,16 @@ def _published() -> Section:
         [p.study, f"{p.median:.2f}", f"{p.q1:.2f}–{p.q3:.2f}", f"{p.min:.2f}", f"{p.max:.2f}"]
         for p in REPROJECTION
     ]
+    in_space = [
+        [p.study, p.alignments, p.whole_mm or f"x {p.x_mm}, y {p.y_mm}, z {p.z_mm}"]
+        for p in MISALIGNMENT
+    ]
     spaces = Column("published", "left"), Column("alignments", "left"), Column("mm", "left")
     return Section(
         "Published",
         [
             Table(columns, cells, "Reprojection error."),
-            Table(spaces, [[p.study, p.alignments, p.error] for p in MISALIGNMENT], "In space."),
+            Table(spaces, in_space, "In space."),
             "As Hu et al. 2021 give them. Displays, distances and users differ between studies.",
         ],
     )
