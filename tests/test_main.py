@@ -221,9 +221,11 @@ def test_bench_shows_and_saves_its_figures(
         "met": True,
     }
 
-    def pretend(settings: object, report: Callable[[str, float], None]) -> dict[str, Any]:
+    def pretend(
+        settings: object, report: Callable[[str, float], None], only: str
+    ) -> dict[str, Any]:
         report("speed", 0.5)
-        return {"figures": [figure], "quick": settings == bench.QUICK}
+        return {"figures": [figure], "quick": settings == bench.QUICK and not only}
 
     monkeypatch.setattr(bench, "run_bench", pretend)
     handcal("bench", "--quick", "--json", tmp_path / "bench.json")
