@@ -19,7 +19,7 @@ Axis: TypeAlias = Literal["x", "y", "z"]
 AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
 # Mean error with 1.5 mm of noise 0.7° in a few milliseconds, and 0.4° in twice the time.
-_LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=6e-4)
+_LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=1e-3)
 _ONCE = RigidSettings(max_points=800, max_interior=400, tolerance_m=3e-4)
 # A hand that fits this much worse than the last one found from scratch may have been lost.
 _LOST = 2.0

@@ -21,7 +21,7 @@ from handcal_gui.window import MainWindow, Panel
 from handcal_gui.wizard.steps import Action, EyePlan, Step, Wizard
 from handcal_gui.wizard.wizard import WizardPanel
 
-_POLL_MS = 10
+_POLL_MS = 4
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
     Step.SOLVE: "results",
