@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from handcal.display import projection_matrix, view_of_eye
+from handcal.errors import HandcalError
 from handcal.geometry import invert, rigid, transform
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import Slip, misplace, overlay_hand, view_through
@@ -57,6 +58,11 @@ def overlay_by_eye(
     -------
     Alignment
         In H for W: the head keeps still.
+
+    Raises
+    ------
+    HandcalError
+        If the raised hand's cursor is on no display.
     """
     worn = worn_rig or rig
 
@@ -88,7 +94,11 @@ def overlay_by_eye(
     ]
     turned = T_H_raised @ rigid(slip.rotation_rad)
     placed = overlay_hand(transform(invert(T_H_raised), cursor_m), turned, views)
-    assert placed is not None, "the cursor is on the displays"
+    if placed is None:
+        raise HandcalError(
+            "with this rig, a hand raised half a metre before the headset is not on the displays, "
+            "or the depth camera does not see it: check the rig file"
+        )
     eyes_m = [
         transform(invert(view_of_eye(worn.eyes[eye], np.eye(4))), shift_m[None])[0]
         for eye, shift_m in true_shift_m.items()

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from handcal.bench.trials import trial_hand
 from handcal.display import eye_projection
-from handcal.geometry import project, transform
+from handcal.errors import HandcalError
+from handcal.geometry import project, rigid, transform
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
@@ -51,6 +54,16 @@ def test_a_slip_moves_and_turns_the_hand() -> None:
     away_m = 0.56  # from the eyes
     assert moved_m[2] == pytest.approx(0.02 * away_m, abs=0.003)
     assert np.linalg.norm(moved_m[:2]) == pytest.approx(0.004 * away_m, abs=0.003)
+
+
+def test_a_rig_that_shows_no_hand_is_named() -> None:
+    small = {eye: replace(RIG.eyes[eye], width_px=20, height_px=20) for eye in EYES}
+    turned_away = rigid([0.0, np.pi, 0.0]) @ RIG.T_H_D
+    for rig in (replace(RIG, eyes=small), replace(RIG, T_H_D=turned_away)):
+        with pytest.raises(HandcalError, match="check the rig file"):
+            overlay_by_eye(
+                np.random.default_rng(1), trial_hand(1), rig, dict.fromkeys(EYES, np.zeros(3)), 500
+            )
 
 
 def test_eyes_at_the_viewpoints_need_no_update() -> None:
