@@ -173,7 +173,8 @@ def record(arguments: argparse.Namespace) -> None:
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
     with _open_source(arguments) as camera, until_interrupted() as is_stopped:
-        console.print(f"Recording {camera.name}; Ctrl+C ends it and keeps what there is.")
+        said = f"Recording {camera.name}; Ctrl+C ends it and keeps what there is."
+        console.print(said, markup=False)
         try:
             with progress() as report:
                 recorded = record_camera(camera, arguments.output, settings, report, is_stopped)

@@ -50,12 +50,13 @@ def board(arguments: argparse.Namespace) -> None:
         if arguments.pdf:
             make_folder(arguments.pdf.parent)
             write_board_pdf(arguments.pdf, made, arguments.paper)
-            console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler")
+            console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler", markup=False)
         if arguments.png:
             image = draw_board(made, arguments.square_px)
             make_folder(arguments.png.parent)
             write_png(arguments.png, image)
-            console.print(f"{arguments.png}: {image.shape[1]}x{image.shape[0]} pixels")
+            size = f"{image.shape[1]}x{image.shape[0]}"
+            console.print(f"{arguments.png}: {size} pixels", markup=False)
     except ValueError as error:
         raise HandcalError(str(error)) from error
 
@@ -85,7 +86,8 @@ def take(arguments: argparse.Namespace) -> None:
             )
             for source, into in zip(sources, folders, strict=True)
         ]
-        console.print(f"From {' and '.join(one.name for one in cameras)}; Ctrl+C ends it")
+        names = " and ".join(one.name for one in cameras)
+        console.print(f"From {names}; Ctrl+C ends it", markup=False)
         is_stopped = stack.enter_context(until_interrupted())
         report = stack.enter_context(progress())
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
@@ -94,7 +96,7 @@ def take(arguments: argparse.Namespace) -> None:
         console.print(f"{count} of {taken.looked_at} moments passed over: {why}")
     if not taken.kept:
         raise HandcalError("no image was kept; see above")
-    console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}")
+    console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}", markup=False)
 
 
 def camera(arguments: argparse.Namespace) -> None:
@@ -177,7 +179,7 @@ def convert(arguments: argparse.Namespace) -> None:
             write_intrinsics(arguments.output, intrinsics, arguments.format)
     except ValueError as error:
         raise HandcalError(str(error)) from error
-    console.print(f"{arguments.output}")
+    console.print(str(arguments.output), markup=False)
 
 
 def add_rig_commands(commands: Commands) -> None:
@@ -338,11 +340,14 @@ def show_views(views: Iterable[View], residuals_px: Mapping[str, float]) -> None
         console.print(shown)
     for view in views:
         if view.problem:
-            console.print(f"{view.name}: {view.problem}")
+            console.print(f"{view.name}: {view.problem}", markup=False)
 
 
 def _conclude(rms_px: float, worst: WorstView, verdict: CalibrationVerdict) -> None:
-    console.print(f"RMS {rms_px:.3f} px. Worst: {worst.name}, {worst.rms_px:.2f} px: {worst.why}")
+    console.print(
+        f"RMS {rms_px:.3f} px. Worst: {worst.name}, {worst.rms_px:.2f} px: {worst.why}",
+        markup=False,
+    )
     show_verdict(verdict)
 
 
@@ -365,4 +370,4 @@ def _write(
         write_json(arguments.output, result)
     else:
         in_another(arguments.output)
-    console.print(f"{arguments.output}")
+    console.print(str(arguments.output), markup=False)

@@ -260,4 +260,4 @@ def _write(path: Path, rig: Rig) -> None:
         write_rig(path, rig)
     except ValueError as error:
         raise HandcalError(f"this is no plausible rig: {error}") from error
-    console.print(f"{path}")
+    console.print(str(path), markup=False)

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from glob import escape
 from pathlib import Path
 
 from handcal.camera.viewpoint import ViewpointCamera
@@ -171,5 +172,5 @@ def _read(camera: ViewpointCamera) -> tuple[UInt8, int]:
 
 
 def _last_number(folder: Path) -> int:
-    names = (path.stem.rpartition("-")[2] for path in folder.glob(f"{folder.name}-*.png"))
+    names = (path.stem.rpartition("-")[2] for path in folder.glob(f"{escape(folder.name)}-*.png"))
     return max((int(name) for name in names if name.isdecimal()), default=0)

@@ -105,11 +105,11 @@ def progress() -> Iterator[Callable[[str, float], None]]:
             nonlocal last
             if last != (what, int(10 * share)):
                 last = what, int(10 * share)
-                console.print(f"{100 * share:3.0f} % {what}")
+                console.print(f"{100 * share:3.0f} % {what}", markup=False)
 
         yield say
         return
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda what, share: bar.update(task, description=what, completed=share)

@@ -100,12 +100,13 @@ def test_it_ends_when_time_is_up_or_when_stopped(videos: tuple[Path, Path], tmp_
 
 
 def test_images_of_a_moment_get_one_number(tmp_path: Path) -> None:
-    folders = tmp_path / "depth", tmp_path / "headset"
+    folders = tmp_path / "depth", tmp_path / "headset [2]"
     red = np.zeros((64, 64, 3), np.uint8)
     red[..., 0] = 200
     keep_images([red], folders[:1])
-    assert keep_images([red, red], folders) == ("depth-002.png", "headset-002.png")
-    stored = read_image(folders[1] / "headset-002.png", cv2.IMREAD_COLOR_RGB)
+    assert keep_images([red, red], folders) == ("depth-002.png", "headset [2]-002.png")
+    assert keep_images([red], folders[1:]) == ("headset [2]-003.png",)
+    stored = read_image(folders[1] / "headset [2]-002.png", cv2.IMREAD_COLOR_RGB)
     np.testing.assert_array_equal(stored, red)
 
 
@@ -203,12 +204,12 @@ def test_the_command_says_what_it_kept_and_what_it_passed_over(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     board = ("--squares", 7, 5, "--square-mm", 35, "--marker-mm", 25)
-    out = tmp_path / "new" / "views"
+    out = tmp_path / "new [" / "views]"  # no markup
     assert run(monkeypatch, videos[0], *board, "--most", 2, "--output", out) == 0
     said = capsys.readouterr().out
     assert "2 kept in " in said
     assert "moments passed over: the board moves" in said
-    assert len(list(out.glob("views-*.png"))) == 2
+    assert len(list(out.glob("views*-*.png"))) == 2
 
     assert run(monkeypatch, videos[0], "--output", out, "--seconds", 0.5) == 1
     heard = capsys.readouterr()
