@@ -130,7 +130,7 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         )
         left = targeted.views["left"]
         missed_px = np.linalg.norm(left.drawn_target_px - left.target_px, axis=1)
-        assert 0.0 < missed_px.min()
+        assert missed_px.min() > 0.0
         assert len(targeted.views["right"].target_px) == 0
 
         solved_m = applied_m["left"]

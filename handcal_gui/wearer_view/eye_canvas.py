@@ -18,8 +18,8 @@ LINES = {
     "cursor": ("cursor", (2.0, Qt.PenStyle.SolidLine)),
     "offline": ("muted", (1.0, Qt.PenStyle.DotLine)),
 }
-"""Colour of each kind of outline, and width in pixels and style of its line; wider ones take Qt ten times
-as long, and their halos make them plain enough."""
+"""Colour of each kind of outline, and width in pixels and style of its line; wider ones take Qt ten
+times as long, and their halos make them plain enough."""
 _HALO_PX = 4.5
 _MOST_POINTS = 120
 """Of each outline, since Qt takes a microsecond and more for each."""
