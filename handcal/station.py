@@ -20,7 +20,7 @@ from handcal.camera.recordings import open_recording
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.closable import Closable
 from handcal.config import settings_json
-from handcal.display import view_of_eye
+from handcal.display import target_corners_m, view_of_eye
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
 from handcal.link.pairing import new_pairing_key
@@ -34,7 +34,7 @@ from handcal.sim.simulation import Simulation
 from handcal.snapshot import Procedure, Snapshot
 from handcal.station_settings import StationSettings
 from handcal.trial import make_trial
-from handcal.types import Eye, Float64, Frame
+from handcal.types import Eye, Float64, Frame, Target
 from handcal.wearer_view import EyeView, see
 
 _VIEW_PERIOD_S = 0.1
@@ -106,6 +106,7 @@ class Station(Closable):
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
         self._revision = self.session.revision
+        self._target_E_m: dict[Eye, Float64] = {}  # of the one eye that it is shown to
         self._views: dict[Eye, EyeView] = {}
         self._viewed: Eye = "right"
         self._next_view_s = 0.0
@@ -133,6 +134,8 @@ class Station(Closable):
             pass  # the procedure keeps what it could not write; `_store_waiting` tells
         if self.calibration.state is not State.SOLVED:
             self._not_applied = ""
+        if self.calibration.state is not State.APPLIED:
+            self.hide_target()
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -153,6 +156,7 @@ class Station(Closable):
 
     def finish(self) -> None:
         """Note how the link did and that the session is complete; FileError if it cannot be."""
+        self.hide_target()
         self.calibration.store_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
@@ -178,6 +182,28 @@ class Station(Closable):
             self.calibration.applied_shift_m[eye],
         )
         return self.session.save_trial(trial)
+
+    def show_target(self, eye: Eye, depth_m: float) -> None:
+        """Let the headset draw the target of a trial for one eye, until φ is no longer judged.
+
+        Raises
+        ------
+        ProcedureError
+            Unless the solved φ is applied.
+        LinkError
+            If the link is closed.
+        """
+        if self.calibration.state is not State.APPLIED:
+            raise ProcedureError("solve and apply first")
+        corners_E_m = target_corners_m(depth_m)
+        self._link.send_target(Target(eye, corners_E_m - self.rig.eyes[eye].t_C0_V_m))
+        self._target_E_m = {eye: corners_E_m}
+
+    def hide_target(self) -> None:
+        """Take the target away, if it is shown."""
+        if self._target_E_m:
+            self._link.send_target(None)
+            self._target_E_m = {}
 
     def require_headset(self) -> None:
         """Raise LinkError if the virtual headset has ended."""
@@ -260,6 +286,7 @@ class Station(Closable):
             drawn_shift_m,
             _outline_E(T_E_W, hand),
             np.empty((0, 3)) if cursor is None else _outline_E(T_E_W, cursor),
+            self._target_E_m.get(eye, np.empty((0, 3))),
             is_true=image is not None,
             image=image,
         )

@@ -295,6 +295,24 @@ class Projection:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """The user test's target, drawn for one eye and resting before its display.
+
+    Attributes
+    ----------
+    eye : {"left", "right"}
+    corners_V_m : (4, 3) float64
+        Clockwise from the upper left, in V.
+    """
+
+    eye: Eye
+    corners_V_m: Float64
+
+    def __post_init__(self) -> None:
+        freeze(self, "corners_V_m", np.float64, 4, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class EyeDisplay:
     """One eye's offline calibration.
 

@@ -16,6 +16,7 @@ from handcal.geometry import project
 from handcal.types import Eye, EyeDisplay, Float64, UInt8, freeze
 
 _NEAREST_M = 0.05
+_NO_TARGET_M = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +56,10 @@ class EyeView:
         With the offline calibration, as before any alignment.
     cursor_px : (M, 2) float64
         The cursor as the headset draws it; empty if there is none.
+    target_px : (4, 2) or (0, 2) float64
+        The user test's target at its place, as the eye sees it; empty while it is not shown.
+    drawn_target_px : (4, 2) or (0, 2) float64
+        The target as the headset draws it: on the other if the calibration is right.
     is_true : bool
         Whether the eye is the simulated wearer's true one; otherwise it is predicted.
     image : (h, w, 3) uint8 or None
@@ -68,12 +73,16 @@ class EyeView:
     drawn: Overlay
     offline: Overlay
     cursor_px: Float64
+    target_px: Float64
+    drawn_target_px: Float64
     is_true: bool
     image: UInt8 | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "hand_px", np.float64, None, 2)
         freeze(self, "cursor_px", np.float64, None, 2)
+        freeze(self, "target_px", np.float64, None, 2)
+        freeze(self, "drawn_target_px", np.float64, None, 2)
         freeze(self, "image", np.uint8, None, None, 3)
 
 
@@ -84,6 +93,7 @@ def see(
     drawn_shift_m: ArrayLike,
     outline_E_m: Float64,
     cursor_E_m: Float64,
+    target_E_m: Float64 = _NO_TARGET_M,
     *,
     is_true: bool,
     image: UInt8 | None = None,
@@ -101,12 +111,15 @@ def see(
     outline_E_m : (N, 3) float64
         The live hand's outline.
     cursor_E_m : (M, 3) float64
+    target_E_m : (4, 3) float64, optional
+        Corners of the user test's target, where it is shown.
     is_true, image
         As in `EyeView`.
     """
     drawn = eye_projection(display, drawn_shift_m)
     outline_m = _in_front(outline_E_m)
-    hand_px = project(eye_projection(display, eye_shift_m), outline_m)
+    seen = eye_projection(display, eye_shift_m)
+    hand_px = project(seen, outline_m)
     return EyeView(
         eye=eye,
         width_px=display.width_px,
@@ -115,6 +128,8 @@ def see(
         drawn=_overlay(display, project(drawn, outline_m), hand_px),
         offline=_overlay(display, project(eye_projection(display), outline_m), hand_px),
         cursor_px=project(drawn, _in_front(cursor_E_m)),
+        target_px=project(seen, target_E_m),
+        drawn_target_px=project(drawn, target_E_m),
         is_true=is_true,
         image=image,
     )

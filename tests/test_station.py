@@ -101,6 +101,8 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         assert (steady.problem, steady.link_problem, steady.camera.problem) == ("", "", "")
         with pytest.raises(ProcedureError, match="solve the left eye"):
             station.save_trial("left", 0.5)
+        with pytest.raises(ProcedureError, match="solve and apply"):
+            station.show_target("left", 0.5)
         calibration.make_cursor(EYES)
         refused = step_until(station, "a refusal", lambda s: s.procedure.refused > 0, PATIENCE_S)
         assert "turned" in refused.procedure.refusal
@@ -118,6 +120,18 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         # 6 mm before, 2 to 3 mm after; what is left are the wearer's own placement errors.
         before_m, after_m = map(errors_m, (aligned.procedure.applied_shift_m, applied_m))
         assert all(after_m[eye] < 0.8 * before_m[eye] for eye in EYES)
+
+        station.show_target("left", 0.5)
+        targeted = step_until(
+            station,
+            "a view of the target",
+            lambda s: s.link.unacked == 0 and len(s.views["left"].target_px) > 0,
+            PATIENCE_S,
+        )
+        left = targeted.views["left"]
+        missed_px = np.linalg.norm(left.drawn_target_px - left.target_px, axis=1)
+        assert missed_px.min() > 0.0
+        assert len(targeted.views["right"].target_px) == 0
 
         solved_m = applied_m["left"]
         adjusted_m = solved_m + np.array([0.001, 0.0, 0.0])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection, reprojection_error_px
+from handcal.display import eye_projection, reprojection_error_px, target_corners_m
 from handcal.geometry import project
 from handcal.rig.example import FOCAL_PX, example_rig
 from handcal.types import Float64
@@ -41,6 +41,19 @@ def test_offline_projection_stays_for_comparison() -> None:
     assert view.offline.error_px == _see(np.zeros(3)).drawn.error_px
 
 
+def test_target_is_seen_at_its_place_and_drawn_with_what_the_headset_has() -> None:
+    corners_m = target_corners_m(0.5)
+    wrong_m = np.zeros(3)
+    view = see("left", DISPLAY, SHIFT_M, wrong_m, NONE_M, NONE_M, corners_m, is_true=True)
+    np.testing.assert_allclose(view.target_px, project(eye_projection(DISPLAY, SHIFT_M), corners_m))
+    np.testing.assert_allclose(
+        np.linalg.norm(view.drawn_target_px - view.target_px, axis=1),
+        reprojection_error_px(DISPLAY, wrong_m, SHIFT_M, corners_m),
+    )
+    right = see("left", DISPLAY, SHIFT_M, SHIFT_M, NONE_M, NONE_M, corners_m, is_true=True)
+    np.testing.assert_allclose(right.drawn_target_px, right.target_px)
+
+
 def test_what_lies_at_or_behind_the_eye_is_left_out() -> None:
     behind_m = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.0]])
     view = _see(np.zeros(3), np.vstack([behind_m, OUTLINE_M]))
@@ -53,3 +66,4 @@ def test_no_outline_has_no_error() -> None:
     assert view.hand_px.shape == (0, 2)
     assert view.drawn.error_px is None
     assert view.offline.error_arcmin is None
+    assert view.target_px.shape == view.drawn_target_px.shape == (0, 2)

@@ -18,7 +18,7 @@ from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import Slot
-from handcal.types import EYES, Eye, Float64, Projection
+from handcal.types import EYES, Eye, Float64, Projection, Target
 
 _POSES_PER_DATAGRAM = 3
 
@@ -39,6 +39,8 @@ class HeadsetState:
         The eyes to keep open.
     projections : mapping of eye to Projection
         What each eye renders with, where the PC has said so.
+    target : Target or None
+        The user test's target; None where there is none.
     """
 
     cursor_W_m: Float64 | None = None
@@ -48,6 +50,7 @@ class HeadsetState:
     prompt: str = ""
     eyes: tuple[Eye, ...] = EYES
     projections: Mapping[Eye, Projection] = field(default_factory=dict)
+    target: Target | None = None
 
 
 class HeadsetClient(Endpoint):
@@ -166,6 +169,9 @@ class HeadsetClient(Endpoint):
                 projection = messages.read_projection(envelope.projection)
                 projections = {**self._state.projections, projection.eye: projection}
                 self._state = replace(self._state, projections=projections)
+            case "target":
+                target = messages.read_target(envelope.target)
+                self._state = replace(self._state, target=target)
             case other:
                 raise messages.MalformedError(f"a PC sends no {other}")
 

@@ -24,45 +24,47 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\rhandcal.proto\x12\x0chandcal.link\"\xeb\x03\n\x08\x45nvelope\x12$\n\x05hello\x18\x01 \x01(\x0b\x32\x13.handcal.link.HelloH\x00\x12$\n\x05poses\x18\x02 \x01(\x0b\x32\x13.handcal.link.PosesH\x00\x12(\n\x07\x63onfirm\x18\x03 \x01(\x0b\x32\x15.handcal.link.ConfirmH\x00\x12\"\n\x04pong\x18\x04 \x01(\x0b\x32\x12.handcal.link.PongH\x00\x12(\n\x07welcome\x18\x05 \x01(\x0b\x32\x15.handcal.link.WelcomeH\x00\x12\"\n\x04ping\x18\x06 \x01(\x0b\x32\x12.handcal.link.PingH\x00\x12&\n\x06\x63ursor\x18\x07 \x01(\x0b\x32\x14.handcal.link.CursorH\x00\x12+\n\tlive_hand\x18\x08 \x01(\x0b\x32\x16.handcal.link.LiveHandH\x00\x12&\n\x06prompt\x18\t \x01(\x0b\x32\x14.handcal.link.PromptH\x00\x12.\n\nprojection\x18\n \x01(\x0b\x32\x18.handcal.link.ProjectionH\x00\x12 \n\x03\x61\x63k\x18\x0b \x01(\x0b\x32\x11.handcal.link.AckH\x00\x12 \n\x03\x62ye\x18\x0c \x01(\x0b\x32\x11.handcal.link.ByeH\x00\x42\x06\n\x04\x62ody\"\x16\n\x05Hello\x12\r\n\x05nonce\x18\x01 \x01(\x06\")\n\x07Welcome\x12\r\n\x05nonce\x18\x01 \x01(\x06\x12\x0f\n\x07session\x18\x02 \x01(\x06\"+\n\x04Pose\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\r\n\x05T_W_H\x18\x02 \x03(\x01\"*\n\x05Poses\x12!\n\x05poses\x18\x01 \x03(\x0b\x32\x12.handcal.link.Pose\"[\n\x07\x43onfirm\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\x11\n\tcursor_id\x18\x02 \x01(\r\x12\x12\n\nT_E_W_left\x18\x03 \x03(\x01\x12\x13\n\x0bT_E_W_right\x18\x04 \x03(\x01\"\x1e\n\x04Ping\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\"\x84\x01\n\x04Pong\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\x12\x1d\n\x15t_received_headset_ns\x18\x02 \x01(\x10\x12\x19\n\x11t_sent_headset_ns\x18\x03 \x01(\x10\x12\x18\n\x10highest_sequence\x18\x04 \x01(\x04\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x05 \x01(\x04\"+\n\x06Points\x12\x10\n\x08origin_m\x18\x01 \x03(\x01\x12\x0f\n\x07offsets\x18\x02 \x01(\x0c\"A\n\x06\x43ursor\x12\x11\n\tcursor_id\x18\x01 \x01(\r\x12$\n\x06points\x18\x02 \x01(\x0b\x32\x14.handcal.link.Points\"p\n\x08LiveHand\x12\r\n\x05\x66rame\x18\x01 \x01(\r\x12\r\n\x05\x63hunk\x18\x02 \x01(\r\x12\x13\n\x0b\x63hunk_count\x18\x03 \x01(\r\x12\x0b\n\x03red\x18\x04 \x01(\x08\x12$\n\x06points\x18\x05 \x01(\x0b\x32\x14.handcal.link.Points\"7\n\x06Prompt\x12\x0c\n\x04text\x18\x01 \x01(\t\x12\x1f\n\x04\x65yes\x18\x02 \x03(\x0e\x32\x11.handcal.link.Eye\"\\\n\nProjection\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\t\n\x01P\x18\x02 \x03(\x01\x12\x10\n\x08width_px\x18\x03 \x01(\r\x12\x11\n\theight_px\x18\x04 \x01(\r\"t\n\x03\x41\x63k\x12,\n\x08received\x18\x01 \x03(\x0b\x32\x1a.handcal.link.Ack.Received\x1a?\n\x08Received\x12\x0c\n\x04slot\x18\x01 \x01(\r\x12\x12\n\nmessage_id\x18\x02 \x01(\r\x12\x11\n\tfragments\x18\x03 \x01(\x0c\"\x05\n\x03\x42ye*7\n\x03\x45ye\x12\x13\n\x0f\x45YE_UNSPECIFIED\x10\x00\x12\x0c\n\x08\x45YE_LEFT\x10\x01\x12\r\n\tEYE_RIGHT\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\rhandcal.proto\x12\x0chandcal.link\"\x93\x04\n\x08\x45nvelope\x12$\n\x05hello\x18\x01 \x01(\x0b\x32\x13.handcal.link.HelloH\x00\x12$\n\x05poses\x18\x02 \x01(\x0b\x32\x13.handcal.link.PosesH\x00\x12(\n\x07\x63onfirm\x18\x03 \x01(\x0b\x32\x15.handcal.link.ConfirmH\x00\x12\"\n\x04pong\x18\x04 \x01(\x0b\x32\x12.handcal.link.PongH\x00\x12(\n\x07welcome\x18\x05 \x01(\x0b\x32\x15.handcal.link.WelcomeH\x00\x12\"\n\x04ping\x18\x06 \x01(\x0b\x32\x12.handcal.link.PingH\x00\x12&\n\x06\x63ursor\x18\x07 \x01(\x0b\x32\x14.handcal.link.CursorH\x00\x12+\n\tlive_hand\x18\x08 \x01(\x0b\x32\x16.handcal.link.LiveHandH\x00\x12&\n\x06prompt\x18\t \x01(\x0b\x32\x14.handcal.link.PromptH\x00\x12.\n\nprojection\x18\n \x01(\x0b\x32\x18.handcal.link.ProjectionH\x00\x12&\n\x06target\x18\r \x01(\x0b\x32\x14.handcal.link.TargetH\x00\x12 \n\x03\x61\x63k\x18\x0b \x01(\x0b\x32\x11.handcal.link.AckH\x00\x12 \n\x03\x62ye\x18\x0c \x01(\x0b\x32\x11.handcal.link.ByeH\x00\x42\x06\n\x04\x62ody\"\x16\n\x05Hello\x12\r\n\x05nonce\x18\x01 \x01(\x06\")\n\x07Welcome\x12\r\n\x05nonce\x18\x01 \x01(\x06\x12\x0f\n\x07session\x18\x02 \x01(\x06\"+\n\x04Pose\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\r\n\x05T_W_H\x18\x02 \x03(\x01\"*\n\x05Poses\x12!\n\x05poses\x18\x01 \x03(\x0b\x32\x12.handcal.link.Pose\"[\n\x07\x43onfirm\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\x11\n\tcursor_id\x18\x02 \x01(\r\x12\x12\n\nT_E_W_left\x18\x03 \x03(\x01\x12\x13\n\x0bT_E_W_right\x18\x04 \x03(\x01\"\x1e\n\x04Ping\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\"\x84\x01\n\x04Pong\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\x12\x1d\n\x15t_received_headset_ns\x18\x02 \x01(\x10\x12\x19\n\x11t_sent_headset_ns\x18\x03 \x01(\x10\x12\x18\n\x10highest_sequence\x18\x04 \x01(\x04\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x05 \x01(\x04\"+\n\x06Points\x12\x10\n\x08origin_m\x18\x01 \x03(\x01\x12\x0f\n\x07offsets\x18\x02 \x01(\x0c\"A\n\x06\x43ursor\x12\x11\n\tcursor_id\x18\x01 \x01(\r\x12$\n\x06points\x18\x02 \x01(\x0b\x32\x14.handcal.link.Points\"p\n\x08LiveHand\x12\r\n\x05\x66rame\x18\x01 \x01(\r\x12\r\n\x05\x63hunk\x18\x02 \x01(\r\x12\x13\n\x0b\x63hunk_count\x18\x03 \x01(\r\x12\x0b\n\x03red\x18\x04 \x01(\x08\x12$\n\x06points\x18\x05 \x01(\x0b\x32\x14.handcal.link.Points\"7\n\x06Prompt\x12\x0c\n\x04text\x18\x01 \x01(\t\x12\x1f\n\x04\x65yes\x18\x02 \x03(\x0e\x32\x11.handcal.link.Eye\"\\\n\nProjection\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\t\n\x01P\x18\x02 \x03(\x01\x12\x10\n\x08width_px\x18\x03 \x01(\r\x12\x11\n\theight_px\x18\x04 \x01(\r\"=\n\x06Target\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\x13\n\x0b\x63orners_V_m\x18\x02 \x03(\x01\"t\n\x03\x41\x63k\x12,\n\x08received\x18\x01 \x03(\x0b\x32\x1a.handcal.link.Ack.Received\x1a?\n\x08Received\x12\x0c\n\x04slot\x18\x01 \x01(\r\x12\x12\n\nmessage_id\x18\x02 \x01(\r\x12\x11\n\tfragments\x18\x03 \x01(\x0c\"\x05\n\x03\x42ye*7\n\x03\x45ye\x12\x13\n\x0f\x45YE_UNSPECIFIED\x10\x00\x12\x0c\n\x08\x45YE_LEFT\x10\x01\x12\r\n\tEYE_RIGHT\x10\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'handcal_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_EYE']._serialized_start=1443
-  _globals['_EYE']._serialized_end=1498
+  _globals['_EYE']._serialized_start=1546
+  _globals['_EYE']._serialized_end=1601
   _globals['_ENVELOPE']._serialized_start=32
-  _globals['_ENVELOPE']._serialized_end=523
-  _globals['_HELLO']._serialized_start=525
-  _globals['_HELLO']._serialized_end=547
-  _globals['_WELCOME']._serialized_start=549
-  _globals['_WELCOME']._serialized_end=590
-  _globals['_POSE']._serialized_start=592
-  _globals['_POSE']._serialized_end=635
-  _globals['_POSES']._serialized_start=637
-  _globals['_POSES']._serialized_end=679
-  _globals['_CONFIRM']._serialized_start=681
-  _globals['_CONFIRM']._serialized_end=772
-  _globals['_PING']._serialized_start=774
-  _globals['_PING']._serialized_end=804
-  _globals['_PONG']._serialized_start=807
-  _globals['_PONG']._serialized_end=939
-  _globals['_POINTS']._serialized_start=941
-  _globals['_POINTS']._serialized_end=984
-  _globals['_CURSOR']._serialized_start=986
-  _globals['_CURSOR']._serialized_end=1051
-  _globals['_LIVEHAND']._serialized_start=1053
-  _globals['_LIVEHAND']._serialized_end=1165
-  _globals['_PROMPT']._serialized_start=1167
-  _globals['_PROMPT']._serialized_end=1222
-  _globals['_PROJECTION']._serialized_start=1224
-  _globals['_PROJECTION']._serialized_end=1316
-  _globals['_ACK']._serialized_start=1318
-  _globals['_ACK']._serialized_end=1434
-  _globals['_ACK_RECEIVED']._serialized_start=1371
-  _globals['_ACK_RECEIVED']._serialized_end=1434
-  _globals['_BYE']._serialized_start=1436
-  _globals['_BYE']._serialized_end=1441
+  _globals['_ENVELOPE']._serialized_end=563
+  _globals['_HELLO']._serialized_start=565
+  _globals['_HELLO']._serialized_end=587
+  _globals['_WELCOME']._serialized_start=589
+  _globals['_WELCOME']._serialized_end=630
+  _globals['_POSE']._serialized_start=632
+  _globals['_POSE']._serialized_end=675
+  _globals['_POSES']._serialized_start=677
+  _globals['_POSES']._serialized_end=719
+  _globals['_CONFIRM']._serialized_start=721
+  _globals['_CONFIRM']._serialized_end=812
+  _globals['_PING']._serialized_start=814
+  _globals['_PING']._serialized_end=844
+  _globals['_PONG']._serialized_start=847
+  _globals['_PONG']._serialized_end=979
+  _globals['_POINTS']._serialized_start=981
+  _globals['_POINTS']._serialized_end=1024
+  _globals['_CURSOR']._serialized_start=1026
+  _globals['_CURSOR']._serialized_end=1091
+  _globals['_LIVEHAND']._serialized_start=1093
+  _globals['_LIVEHAND']._serialized_end=1205
+  _globals['_PROMPT']._serialized_start=1207
+  _globals['_PROMPT']._serialized_end=1262
+  _globals['_PROJECTION']._serialized_start=1264
+  _globals['_PROJECTION']._serialized_end=1356
+  _globals['_TARGET']._serialized_start=1358
+  _globals['_TARGET']._serialized_end=1419
+  _globals['_ACK']._serialized_start=1421
+  _globals['_ACK']._serialized_end=1537
+  _globals['_ACK_RECEIVED']._serialized_start=1474
+  _globals['_ACK_RECEIVED']._serialized_end=1537
+  _globals['_BYE']._serialized_start=1539
+  _globals['_BYE']._serialized_end=1544
 # @@protoc_insertion_point(module_scope)

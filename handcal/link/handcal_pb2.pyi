@@ -17,7 +17,7 @@ EYE_LEFT: Eye
 EYE_RIGHT: Eye
 
 class Envelope(_message.Message):
-    __slots__ = ("hello", "poses", "confirm", "pong", "welcome", "ping", "cursor", "live_hand", "prompt", "projection", "ack", "bye")
+    __slots__ = ("hello", "poses", "confirm", "pong", "welcome", "ping", "cursor", "live_hand", "prompt", "projection", "target", "ack", "bye")
     HELLO_FIELD_NUMBER: _ClassVar[int]
     POSES_FIELD_NUMBER: _ClassVar[int]
     CONFIRM_FIELD_NUMBER: _ClassVar[int]
@@ -28,6 +28,7 @@ class Envelope(_message.Message):
     LIVE_HAND_FIELD_NUMBER: _ClassVar[int]
     PROMPT_FIELD_NUMBER: _ClassVar[int]
     PROJECTION_FIELD_NUMBER: _ClassVar[int]
+    TARGET_FIELD_NUMBER: _ClassVar[int]
     ACK_FIELD_NUMBER: _ClassVar[int]
     BYE_FIELD_NUMBER: _ClassVar[int]
     hello: Hello
@@ -40,9 +41,10 @@ class Envelope(_message.Message):
     live_hand: LiveHand
     prompt: Prompt
     projection: Projection
+    target: Target
     ack: Ack
     bye: Bye
-    def __init__(self, hello: _Optional[_Union[Hello, _Mapping]] = ..., poses: _Optional[_Union[Poses, _Mapping]] = ..., confirm: _Optional[_Union[Confirm, _Mapping]] = ..., pong: _Optional[_Union[Pong, _Mapping]] = ..., welcome: _Optional[_Union[Welcome, _Mapping]] = ..., ping: _Optional[_Union[Ping, _Mapping]] = ..., cursor: _Optional[_Union[Cursor, _Mapping]] = ..., live_hand: _Optional[_Union[LiveHand, _Mapping]] = ..., prompt: _Optional[_Union[Prompt, _Mapping]] = ..., projection: _Optional[_Union[Projection, _Mapping]] = ..., ack: _Optional[_Union[Ack, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
+    def __init__(self, hello: _Optional[_Union[Hello, _Mapping]] = ..., poses: _Optional[_Union[Poses, _Mapping]] = ..., confirm: _Optional[_Union[Confirm, _Mapping]] = ..., pong: _Optional[_Union[Pong, _Mapping]] = ..., welcome: _Optional[_Union[Welcome, _Mapping]] = ..., ping: _Optional[_Union[Ping, _Mapping]] = ..., cursor: _Optional[_Union[Cursor, _Mapping]] = ..., live_hand: _Optional[_Union[LiveHand, _Mapping]] = ..., prompt: _Optional[_Union[Prompt, _Mapping]] = ..., projection: _Optional[_Union[Projection, _Mapping]] = ..., target: _Optional[_Union[Target, _Mapping]] = ..., ack: _Optional[_Union[Ack, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ("nonce",)
@@ -153,6 +155,14 @@ class Projection(_message.Message):
     width_px: int
     height_px: int
     def __init__(self, eye: _Optional[_Union[Eye, str]] = ..., P: _Optional[_Iterable[float]] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ...) -> None: ...
+
+class Target(_message.Message):
+    __slots__ = ("eye", "corners_V_m")
+    EYE_FIELD_NUMBER: _ClassVar[int]
+    CORNERS_V_M_FIELD_NUMBER: _ClassVar[int]
+    eye: Eye
+    corners_V_m: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, eye: _Optional[_Union[Eye, str]] = ..., corners_V_m: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Ack(_message.Message):
     __slots__ = ("received",)

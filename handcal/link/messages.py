@@ -17,7 +17,7 @@ from handcal.geometry import is_rigid
 from handcal.link import handcal_pb2 as pb
 from handcal.link.reliable import Receipt
 from handcal.link.wire import MAX_FRAGMENTS, Slot
-from handcal.types import EYES, Eye, Float64, Projection
+from handcal.types import EYES, Eye, Float64, Projection, Target
 
 QUANTUM_M = 1e-4
 MAX_POINTS = 50_000
@@ -152,6 +152,29 @@ def read_projection(message: pb.Projection) -> Projection:
     """Read a projection."""
     P = _numbers(message.P, 12).reshape(3, 4)
     return Projection(_eye(message.eye), P, message.width_px, message.height_px)
+
+
+def target(value: Target | None) -> pb.Envelope:
+    """Make the user test's target; None takes it away.
+
+    Raises
+    ------
+    ValueError
+        If it is not finite.
+    """
+    if value is None:
+        return pb.Envelope(target=pb.Target())
+    if not np.isfinite(value.corners_V_m).all():
+        raise ValueError("the target must be finite")
+    corners = value.corners_V_m.ravel().tolist()
+    return pb.Envelope(target=pb.Target(eye=_EYE_CODES[value.eye], corners_V_m=corners))
+
+
+def read_target(message: pb.Target) -> Target | None:
+    """Read a target; None where it is taken away."""
+    if not message.corners_V_m:
+        return None
+    return Target(_eye(message.eye), _numbers(message.corners_V_m, 12).reshape(4, 3))
 
 
 def poses(recent: Iterable[tuple[int, Float64]]) -> pb.Envelope:

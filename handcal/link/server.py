@@ -22,7 +22,7 @@ from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.transport import Address, UdpTransport
 from handcal.link.wire import Rejection, Slot
-from handcal.types import EYES, Eye, Float64, Projection
+from handcal.types import EYES, Eye, Float64, Projection, Target
 
 LOOPBACK: Address = ("127.0.0.1", 0)
 _MAX_OFFERS = 16
@@ -96,8 +96,8 @@ class LinkStatistics:
 class HeadsetServer(Endpoint):
     """Waits for the headset, streams to it, and knows its pose.
 
-    A headset that connects anew is sent the newest cursor, prompt and projections again. One
-    headset at a time: the newest to connect is served.
+    A headset that connects anew is sent the newest cursor, prompt, projections and target
+    again. One headset at a time: the newest to connect is served.
 
     Parameters
     ----------
@@ -191,6 +191,18 @@ class HeadsetServer(Endpoint):
         """
         slot = messages.PROJECTION_SLOTS[projection.eye]
         return self._send_reliably(slot, messages.projection(projection))
+
+    def send_target(self, target: Target | None) -> Outgoing:
+        """Send the user test's target, reliably; None takes it away.
+
+        Raises
+        ------
+        ValueError
+            If it is not finite.
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.TARGET, messages.target(target))
 
     def confirmations(self) -> list[Confirmation]:
         """Return the confirmations since the last call.

@@ -33,6 +33,7 @@ class Slot(IntEnum):
     PROJECTION_LEFT = 3
     PROJECTION_RIGHT = 4
     CONFIRM = 5
+    TARGET = 6
 
 
 class Rejection(StrEnum):

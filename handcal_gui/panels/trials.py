@@ -6,6 +6,7 @@ import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QHBoxLayout,
     QLabel,
@@ -53,6 +54,9 @@ class TrialsPanel(QWidget):
     record_action : QAction
     trial_requested : Signal(str, float)
         Eye, and the target's distance in metres.
+    show_target_requested : Signal(str, float)
+        In the headset, likewise; in place of the one shown before.
+    hide_target_requested : Signal()
     doubted : Signal(str)
         Why a trial is asked for only if the user asks again.
     delete_trial_requested, restore_trial_requested : Signal(int)
@@ -60,6 +64,8 @@ class TrialsPanel(QWidget):
     """
 
     trial_requested = Signal(str, float)
+    show_target_requested = Signal(str, float)
+    hide_target_requested = Signal()
     doubted = Signal(str)
     delete_trial_requested = Signal(int)
     restore_trial_requested = Signal(int)
@@ -72,6 +78,8 @@ class TrialsPanel(QWidget):
         self._record: SessionRecord | None = None
         self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
+        self._shows_target = QCheckBox("Show the target in the headset")
+        self._target: tuple[Eye, float] | None = None  # asked for
         self._fill_choices()
         self._make_record_action()
         self._message = QLabel()
@@ -110,8 +118,9 @@ class TrialsPanel(QWidget):
         self._show_deletions()
 
     def set_read_only(self, is_read_only: bool) -> None:
-        """Let a session only be looked at."""
+        """Let another session only be looked at, or run."""
         self._is_read_only = is_read_only
+        self._snapshot = None
         self._table.set_read_only(is_read_only)
         self._show_deletions()
         self._refresh()
@@ -150,6 +159,23 @@ class TrialsPanel(QWidget):
         self._is_doubtful = self._is_doubtful and self._is_zero()
         self.record_action.setEnabled(not why_not)
         self._message.setText(why_not or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
+        can_show = not (why_not or (self._record and self._record.is_finished))
+        self._shows_target.setEnabled(can_show)
+        if not can_show:
+            self._shows_target.setChecked(False)
+        self._ask_for_target()
+
+    def _ask_for_target(self) -> None:
+        """Ask for what the headset shall show, once it is something else."""
+        is_shown = self._shows_target.isChecked()
+        target = (self._next_eye(), self._depth.currentData()) if is_shown else None
+        if target == self._target:
+            return
+        self._target = target
+        if target is None:
+            self.hide_target_requested.emit()
+        else:
+            self.show_target_requested.emit(*target)
 
     def _show_deletions(self) -> None:
         can_undo = self._record is not None and not self._is_read_only
@@ -180,6 +206,12 @@ class TrialsPanel(QWidget):
         self._depth.setToolTip("Distance of the target from the eye, in metres")
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
+        self._depth.currentIndexChanged.connect(self._ask_for_target)
+        self._shows_target.setToolTip(
+            "Draw the target for this eye, at this distance straight ahead, until a cursor is made "
+            "or the session finished"
+        )
+        self._shows_target.toggled.connect(self._ask_for_target)
 
     def _make_record_action(self) -> None:
         self.record_action = QAction("Record trial", self)
@@ -211,6 +243,7 @@ class TrialsPanel(QWidget):
         layout.setSpacing(SPACING_PX)
         layout.addWidget(hint)
         layout.addLayout(choices)
+        layout.addWidget(self._shows_target)
         layout.addWidget(self._message)
         layout.addWidget(tabs, 1)
         layout.addWidget(self._summary)

@@ -21,8 +21,8 @@ _ERROR = (
     "in the display's pixels and in minutes of arc (′)"
 )
 _LEGEND = {
-    "hand": ("Hand", "The hand's outline as the eye sees it"),
-    "drawn": ("Drawn", "The hand's outline as the headset draws it: on the hand if φ is right"),
+    "hand": ("Hand", "The hand, and the target of a trial, as the eye sees them"),
+    "drawn": ("Drawn", "Hand and target as the headset draws them: on the others if φ is right"),
     "cursor": ("Cursor", "The frozen hand as the headset draws it"),
     "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
 }

@@ -172,6 +172,12 @@ class Live(QObject):
         trials.trial_requested.connect(
             lambda eye, depth_m: self._ask(_RECORD, lambda s: s.save_trial(eye, depth_m))
         )
+        trials.show_target_requested.connect(
+            lambda eye, depth_m: self._ask("show the target", lambda s: s.show_target(eye, depth_m))
+        )
+        trials.hide_target_requested.connect(
+            lambda: self._ask("take the target away", Station.hide_target)
+        )
         trials.doubted.connect(partial(self._take_failure, _RECORD))
 
     def _connect_session(self) -> None:

@@ -18,8 +18,8 @@ LINES = {
     "cursor": ("cursor", (2.0, Qt.PenStyle.SolidLine)),
     "offline": ("muted", (1.0, Qt.PenStyle.DotLine)),
 }
-"""Colour of each outline, and width in pixels and style of its line; wider ones take Qt ten times
-as long, and their halos make them plain enough."""
+"""Colour of each kind of outline, and width in pixels and style of its line; wider ones take Qt ten
+times as long, and their halos make them plain enough."""
 _HALO_PX = 4.5
 _MOST_POINTS = 120
 """Of each outline, since Qt takes a microsecond and more for each."""
@@ -29,7 +29,7 @@ _WIDEST_CROP = 1.8
 
 
 class EyeCanvas(QWidget):
-    """Shows one eye's view, by default the part of the display that holds the hand.
+    """Shows one eye's view, by default the part of the display with the hand and the target.
 
     Parameters
     ----------
@@ -105,17 +105,22 @@ class EyeCanvas(QWidget):
 
     def _paint_outlines(self, painter: QPainter, view: EyeView) -> None:
         """Draw the outlines, with halos that keep them visible over any world."""
-        outlines = {"offline": view.offline.outline_px} if self._is_offline_shown else {}
-        outlines |= {"hand": view.hand_px, "cursor": view.cursor_px}
-        outlines["drawn"] = view.drawn.outline_px
+        outlines = [("offline", view.offline.outline_px)] if self._is_offline_shown else []
+        outlines += [
+            ("hand", view.hand_px),
+            ("hand", view.target_px),
+            ("cursor", view.cursor_px),
+            ("drawn", view.drawn.outline_px),
+            ("drawn", view.drawn_target_px),
+        ]
         to_widget = self._to_widget()
         painter.setClipRect(to_widget.mapRect(_display(view)))
-        lines = {what: to_widget.map(_closed(px)) for what, px in outlines.items() if len(px)}
+        lines = [(what, to_widget.map(_closed(px))) for what, px in outlines if len(px)]
         painter.setPen(_pen(colors().canvas, _HALO_PX))
-        for line in lines.values():
+        for _, line in lines:
             painter.drawPolyline(line)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for what, line in lines.items():
+        for what, line in lines:
             role, width_and_style = LINES[what]
             painter.setPen(_pen(role_color(role, self), *width_and_style))
             painter.drawPolyline(line)
@@ -133,7 +138,10 @@ class EyeCanvas(QWidget):
         if self._view is None:
             return
         display = _display(self._view)
-        outlines_px = np.vstack([self._view.hand_px, self._view.drawn.outline_px])
+        view = self._view
+        outlines_px = np.vstack(
+            [view.hand_px, view.drawn.outline_px, view.target_px, view.drawn_target_px]
+        )
         hand = _bounds(outlines_px).intersected(display) if len(outlines_px) else QRectF()
         if self._is_whole or hand.isEmpty():
             self._crop = display

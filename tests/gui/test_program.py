@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QDoubleSpinBox, QLabel, QPlainTextEdit, QPushButton, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
@@ -331,9 +338,19 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     np.testing.assert_allclose(tuned["left"], solved_m + np.array([step_m, 0.0, 0.0]))
     assert sum(event.name == "fine_tuned" for event in live.record.events) == 1
 
+    [shows_target] = window.panels.trials.findChildren(QCheckBox)
+    shows_target.click()
+    live.wait(lambda: studio.headset.shown.target is not None)
+    target = studio.headset.shown.target
+    assert target.eye == "left"
+
     QTest.keyClick(window, Qt.Key.Key_T)
     live.wait(lambda: len(live.snapshot.record.trials) == 1)
     (trial,) = live.snapshot.record.trials
+    t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
+    np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, trial.corners_E_m)
+    # It would be the right eye's turn, which has not been aligned.
+    live.wait(lambda: studio.headset.shown.target is None)
     np.testing.assert_allclose(trial.adjusted_shift_m - trial.calibrated_shift_m, [step_m, 0, 0])
     assert trial.eye == "left"
     assert trial.error_px.min() > 0.0

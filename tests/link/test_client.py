@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handcal.display import target_corners_m
 from handcal.errors import LinkError
 from handcal.geometry import rigid
 from handcal.link import handcal_pb2 as pb
@@ -16,11 +17,12 @@ from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
-from handcal.types import EYES, Float64, Projection
+from handcal.types import EYES, Float64, Projection, Target
 
 Eventually = Callable[..., None]
 BAD = Impairment(loss=0.3, reorder=0.2, duplicate=0.2, delay_s=0.003, seed=1)
 OFFSET_NS = 20_000_000
+TARGET = Target("left", target_corners_m(0.5))
 
 
 def hand(seed: int = 0, count: int = 5000) -> Float64:
@@ -42,6 +44,7 @@ def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_ke
             server.send_prompt("Cover the outline", ["right"]),
             server.send_projection(projection("left", 1.0)),
             server.send_projection(projection("right", 2.0)),
+            server.send_target(TARGET),
         ]
         for message in sent:
             server.wait_acked(message, 5.0)
@@ -50,7 +53,10 @@ def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_ke
     np.testing.assert_allclose(state.cursor_W_m, hand(), atol=5.1e-5)
     assert (state.cursor_id, state.prompt, state.eyes) == (3, "Cover the outline", ("right",))
     assert {eye: state.projections[eye].P[0, 0] for eye in EYES} == {"left": 1.0, "right": 2.0}
-    assert (statistics.acked, statistics.unacked, statistics.failed) == (4, 0, 0)
+    assert state.target is not None
+    assert state.target.eye == "left"
+    np.testing.assert_array_equal(state.target.corners_V_m, TARGET.corners_V_m)
+    assert (statistics.acked, statistics.unacked, statistics.failed) == (5, 0, 0)
     assert statistics.resent > 0
     assert sum(statistics.rejected.values()) == statistics.rejected["replayed"]
 
@@ -139,6 +145,14 @@ def test_a_cursor_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -
         assert client.state().cursor_W_m is not None
         server.wait_acked(server.send_cursor(np.empty((0, 3)), 2), 5.0)
         assert client.state().cursor_W_m is None
+
+
+def test_a_target_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -> None:
+    with HeadsetClient(server.address, pairing_key) as client:
+        server.wait_acked(server.send_target(TARGET), 5.0)
+        assert client.state().target is not None
+        server.wait_acked(server.send_target(None), 5.0)
+        assert client.state().target is None
 
 
 def test_a_headset_that_starts_again_is_sent_the_state_again(

@@ -10,11 +10,12 @@ from typing import IO
 
 import numpy as np
 
-from handcal.display import view_of_eye
+from handcal.display import target_corners_m, view_of_eye
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.resources import resource_path
 from handcal.rig.rig_file import read_rig
+from handcal.types import Target
 
 PATIENCE_S = 20.0
 
@@ -32,8 +33,9 @@ def test_the_example_draws_confirms_and_ends_with_the_pc(pairing_key: bytes) -> 
         assert process.stdout is not None
         server.send_cursor(np.zeros((10, 3)), 7)
         server.send_prompt("Close your left eye.", ("right",))
-        lines: list[str] = []
-        while "cursor 7" not in (lines or [""])[-1] or "Close" not in lines[-1]:
+        server.send_target(Target("right", target_corners_m(0.5)))
+        lines = [""]
+        while not all(what in lines[-1] for what in ("cursor 7", "Close", "of the right eye")):
             lines.append(process.stdout.readline())
             assert lines[-1], "the example ended"
         confirmation = _confirm(process.stdin, server)

@@ -13,7 +13,7 @@ from handcal.link import messages
 from handcal.link.messages import MalformedError
 from handcal.link.reliable import Receipt
 from handcal.link.wire import MAX_PAYLOAD_BYTES
-from handcal.types import EYES, Float64, Projection
+from handcal.types import EYES, Float64, Projection, Target
 
 CLOUDS = arrays(np.float64, st.tuples(st.integers(0, 700), st.just(3)), elements=st.floats(-3, 3))
 
@@ -78,8 +78,19 @@ def test_projection_prompt_poses_and_confirmation_survive_exactly() -> None:
         np.testing.assert_array_equal(T_E_W, T[eye])
 
 
+def test_a_target_survives_exactly_and_can_be_taken_away() -> None:
+    corners_m = np.random.default_rng(0).normal(size=(4, 3))
+    read = messages.read_target(sent(messages.target(Target("right", corners_m))).target)
+    assert read is not None
+    assert read.eye == "right"
+    np.testing.assert_array_equal(read.corners_V_m, corners_m)
+    taken_away = sent(messages.target(None))
+    assert taken_away.WhichOneof("body") == "target"
+    assert messages.read_target(taken_away.target) is None
+
+
 @given(
-    st.lists(st.builds(Receipt, st.integers(1, 5), st.integers(0, 99), st.integers(0, 2**256 - 1)))
+    st.lists(st.builds(Receipt, st.integers(1, 6), st.integers(0, 99), st.integers(0, 2**256 - 1)))
 )
 def test_receipts_survive(receipts: list[Receipt]) -> None:
     assert list(messages.read_ack(sent(messages.ack(receipts)).ack)) == receipts
@@ -90,6 +101,8 @@ def test_what_cannot_be_sent_is_refused() -> None:
         messages.prompt("x" * 501, EYES)
     with pytest.raises(ValueError, match="finite"):
         messages.projection(Projection("left", np.full((3, 4), np.inf), 1268, 720))
+    with pytest.raises(ValueError, match="finite"):
+        messages.target(Target("left", np.full((4, 3), np.nan)))
 
 
 def rotated(scale: float) -> list[float]:
@@ -107,6 +120,8 @@ def rotated(scale: float) -> list[float]:
         (messages.read_projection, pb.Projection(eye=pb.EYE_LEFT, P=[0.0] * 11)),
         (messages.read_prompt, pb.Prompt(text="x" * 501)),
         (messages.read_prompt, pb.Prompt(eyes=[pb.EYE_LEFT] * 3)),
+        (messages.read_target, pb.Target(eye=pb.EYE_LEFT, corners_V_m=[0.0] * 9)),
+        (messages.read_target, pb.Target(corners_V_m=[0.0] * 12)),
         (lambda m: list(messages.read_poses(m)), pb.Poses(poses=[pb.Pose(T_W_H=rotated(1.01))])),
         (lambda m: list(messages.read_poses(m)), pb.Poses(poses=[pb.Pose(T_W_H=rotated(-1.0))])),
         (messages.read_confirm, pb.Confirm(T_E_W_left=rotated(1.0))),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
@@ -148,6 +148,53 @@ def test_takes_the_eyes_in_turn(
     with qtbot.waitSignal(panel.trial_requested) as asked:
         tool(panel, "Record trial").click()
     assert asked.args[0] == "right"
+
+
+def test_the_target_in_the_headset_follows_the_choices(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot]
+) -> None:
+    asked: list[tuple[str, float] | None] = []
+    panel.show_target_requested.connect(lambda eye, depth_m: asked.append((eye, depth_m)))
+    panel.hide_target_requested.connect(lambda: asked.append(None))
+    box = panel.findChild(QCheckBox)
+    assert box is not None
+    panel.show_snapshot(snapshot(State.SOLVED))
+    assert not box.isEnabled()
+    applied = snapshot(State.APPLIED)
+    panel.show_snapshot(applied)
+    box.click()
+    panel.show_snapshot(applied)
+    assert asked == [("left", 0.4)], "asked for once"
+    choose(panel, "Distance of the target", "0.5 m")
+    choose(panel, "Eye", "Right eye")
+    assert asked[1:] == [("left", 0.5), ("right", 0.5)]
+    box.click()
+    assert asked[3:] == [None]
+    box.click()
+    panel.show_snapshot(snapshot(State.ALIGN))
+    assert asked[4:] == [("right", 0.5), None]
+    assert not box.isChecked()
+
+
+@pytest.mark.parametrize("ends_by", ["another session", "the end of this one"])
+def test_the_target_goes_with_its_session(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot], ends_by: str
+) -> None:
+    hidden: list[bool] = []
+    panel.hide_target_requested.connect(lambda: hidden.append(True))
+    box = panel.findChild(QCheckBox)
+    assert box is not None
+    applied = snapshot(State.APPLIED)
+    panel.show_snapshot(applied)
+    box.click()
+    if ends_by == "another session":
+        panel.set_read_only(False)
+    else:
+        finished = replace(applied.record, is_finished=True)
+        panel.show_snapshot(snapshot(State.APPLIED, record=finished))
+    assert hidden == [True]
+    assert not box.isChecked()
+    assert not box.isEnabled()
 
 
 def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -> None:

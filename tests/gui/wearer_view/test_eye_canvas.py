@@ -103,6 +103,19 @@ def test_world_and_outline_lie_where_the_display_has_them(canvas: EyeCanvas) -> 
         np.testing.assert_allclose(seen, 149.5 + scale * (place_px - middle), atol=1.0)
 
 
+def test_target_is_shown_as_seen_and_as_drawn(canvas: EyeCanvas) -> None:
+    none_m, corners_m = RING_M[:0], RING_M[::25]  # slanting lines have pixels of full colour
+    eye_m, drawn_m = np.zeros(3), np.array([0.02, 0.0, 0.0])
+    view = see("left", DISPLAY, eye_m, drawn_m, none_m, none_m, corners_m, is_true=True)
+    canvas.show_view(view)
+    corners_px = np.vstack([view.target_px, view.drawn_target_px])
+    assert all(canvas.crop_px.contains(x, y) for x, y in corners_px.tolist())
+    assert _has(canvas, colors().live)
+    assert _has(canvas, canvas.palette().windowText().color().name())
+    canvas.show_view(_view(none_m))
+    assert not _has(canvas, colors().live)
+
+
 def test_offline_outline_is_shown_on_demand(canvas: EyeCanvas) -> None:
     canvas.show_view(_view(drawn_shift_m=np.array([0.01, 0.0, 0.0])))
     before = _pixels(canvas)
