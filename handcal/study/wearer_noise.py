@@ -73,9 +73,10 @@ def fit_noise(
     tried: dict[float, Float64] = {}
 
     def excess(scale: float) -> float:
-        scaled = replace(settings, noise_scale=scale)
-        tried[scale] = np.array([_errors_arcmin(scaled, wearer) for wearer in range(wearers)])
-        told(scale, float(tried[scale].mean()))
+        if scale not in tried:  # the search asks for its ends again
+            scaled = replace(settings, noise_scale=scale)
+            tried[scale] = np.array([_errors_arcmin(scaled, wearer) for wearer in range(wearers)])
+            told(scale, float(tried[scale].mean()))
         return float(tried[scale].mean()) - PAPER_MEAN_ARCMIN
 
     if excess(_SCALES[0]) > 0.0 or excess(_SCALES[1]) < 0.0:
