@@ -263,7 +263,7 @@ def _solve_wearer(
     methods: Sequence[Method],
 ) -> _Solved:
     """Solve one eye's alignment by a wearer who looks through the displays."""
-    rig, usual, eye = example_rig(), WearerSettings(), EYES[trial % 2]
+    rig, usual, eye = example_rig(), WearerSettings(), EYES[trial // settings.hands % 2]
     true_m = draw_eyes(rng, usual)[eye]
     drawn = draw_slip(rng, usual)
     alignment = overlay_by_eye(
