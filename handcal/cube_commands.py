@@ -57,7 +57,8 @@ def net(arguments: argparse.Namespace) -> None:
 def capture(arguments: argparse.Namespace) -> None:
     """Capture the real and the drawn cube with a camera, told at each step what to do."""
     from handcal.camera.viewpoint import open_viewpoint
-    from handcal.evaluate.cube_capture import CapturePlan, missing_captures, take_captures
+    from handcal.evaluate.cube_capture import take_captures
+    from handcal.evaluate.cube_folder import CapturePlan, missing_captures
 
     def ask(what: str) -> None:
         try:
@@ -103,7 +104,9 @@ def report(arguments: argparse.Namespace) -> None:
     from handcal.report.cells import mean_sd
     from handcal.report.write import write_report
     from handcal.rig.formats import read_intrinsics
+    from handcal.study.store import free_of_studies
 
+    output = free_of_studies(arguments.output)
     cube, grid = _cube(arguments), _grid(arguments)
     camera = read_intrinsics(arguments.camera_intrinsics or arguments.folder / "camera.json")
     with progress() as show:
@@ -114,9 +117,7 @@ def report(arguments: argparse.Namespace) -> None:
             raise HandcalError("no pair of captures can be evaluated; see above")
         summary = cube_summary(test.rows)
         described = cube_report(test, summary, cube, camera)
-        written = write_report(
-            arguments.output, described, lambda share: show("Writing the report", share)
-        )
+        written = write_report(output, described, lambda share: show("Writing the report", share))
     errors = {
         drawn: {name: asdict(error) for name, error in found.items()}
         for drawn, found in summary.items()
@@ -133,7 +134,7 @@ def report(arguments: argparse.Namespace) -> None:
 
 def add_cube_commands(commands: Commands) -> None:
     """Add ``handcal evaluate cube net, capture, simulate, report``."""
-    from handcal.evaluate.cube_capture import CapturePlan
+    from handcal.evaluate.cube_folder import CapturePlan
     from handcal.rig.cube import Cube
     from handcal.rig.print_page import PAPERS
 

@@ -53,14 +53,14 @@ def users(arguments: argparse.Namespace) -> None:
     from handcal.evaluate.user_test_report import user_test_report
     from handcal.report.cells import interval_ends, mean_sd
     from handcal.report.write import write_report
+    from handcal.study.store import free_of_studies
 
+    output = free_of_studies(arguments.output)
     with progress() as report:
         test = read_user_test(arguments.folder, lambda share: report("Reading sessions", share))
         result = evaluate_user_test(test)
         described = user_test_report(test, result)
-        written = write_report(
-            arguments.output, described, lambda share: report("Writing the report", share)
-        )
+        written = write_report(output, described, lambda share: report("Writing the report", share))
     save(arguments.json, asdict(result))
     shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")
     for name, errors in (*result.by_wearer.items(), ("all", result.total)):

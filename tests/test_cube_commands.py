@@ -86,6 +86,15 @@ def test_captures_of_which_none_can_be_used_are_told(
     assert "no pair of captures" in refused(monkeypatch, capsys, "report", captures)
 
 
+def test_a_report_never_goes_into_a_study(
+    captures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (captures / "study.json").write_text("{}")
+    told = refused(monkeypatch, capsys, "report", captures, "--output", captures)
+    assert "holds a study" in told
+    assert not (captures / "report.pdf").exists()
+
+
 def test_misuse_is_one_line(
     captures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.evaluate.cube_captures import GRID, REAL, VIRTUAL, images_in
+from handcal.evaluate.cube_folder import (
+    GRID,
+    REAL,
+    VIRTUAL,
+    CapturePlan,
+    PlannedCapture,
+    missing_captures,
+)
 from handcal.files import make_folder
 from handcal.image_file import write_png
 from handcal.rig.board import BoardError
@@ -27,46 +32,47 @@ _WHAT_TO_DO = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class CapturePlan:
-    """What shall be captured.
+def instruction(capture: PlannedCapture) -> str:
+    """Return what to do before an image is taken."""
+    drawn = f" ({capture.drawn})" if capture.drawn else ""
+    return f"{capture.where}: {_WHAT_TO_DO[capture.kind]}{drawn}"
 
-    Attributes
+
+def keep_capture(
+    image: UInt8, folder: Path, capture: PlannedCapture, cube: Cube, grid: Grid
+) -> str:
+    """Write an image if it shows what it should, in place of an earlier one.
+
+    Parameters
     ----------
-    positions : sequence of str
-        Of the camera in the eye box.
-    poses : int
-        Of the cube at each position.
-    drawn : sequence of str
-        Ways of drawing that are compared; empty for just one.
-    with_grid : bool
-        Whether the display's grid is captured at each position.
+    image : (H, W, 3) uint8
+        RGB.
+    folder : Path
+        Of all captures.
+    capture : PlannedCapture
+    cube : Cube
+    grid : Grid
+
+    Returns
+    -------
+    str
+        What is seen.
+
+    Raises
+    ------
+    CubeError, BoardError
+        If the cube, or the grid, is not seen.
+    FileError
+        If the image cannot be written.
     """
-
-    positions: Sequence[str] = ("centre", "up", "down", "left", "right")
-    poses: int = 4
-    drawn: Sequence[str] = ()
-    with_grid: bool = True
-
-    def __post_init__(self) -> None:
-        for name in (*self.positions, *self.drawn):
-            if not re.fullmatch(r"\w[\w-]*", name):
-                raise ValueError(f"a name is of letters, digits, _ and -, not {name!r}")
-
-
-def missing_captures(folder: Path, plan: CapturePlan) -> list[tuple[Path, str]]:
-    """Return the folder and name of each image that is not there yet, in the order to take them."""
-
-    def planned() -> Iterator[tuple[Path, str]]:
-        virtual = [f"{VIRTUAL}-{name}" for name in plan.drawn] or [VIRTUAL]
-        for position in plan.positions:
-            if plan.with_grid:
-                yield folder / position, GRID
-            for pose in range(1, plan.poses + 1):
-                for name in (REAL, *virtual):
-                    yield folder / position / f"pose-{pose}", name
-
-    return [(place, name) for place, name in planned() if not _is_there(place, name)]
+    gray = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype("uint8", copy=False)
+    if capture.kind == GRID:
+        seen = f"{len(find_grid(gray, grid).pixels)} corners of the grid"
+    else:
+        seen = f"{len(find_cube(gray, cube))} faces of the cube"
+    make_folder(folder / capture.where)
+    write_png(folder / capture.file, image)
+    return seen
 
 
 def take_captures(
@@ -100,35 +106,21 @@ def take_captures(
     FileError
         If an image cannot be written.
     """
-    for place, name in missing_captures(folder, plan):
-        where, is_taken = place.relative_to(folder).as_posix(), False
+    for capture in missing_captures(folder, plan):
+        is_taken = False
         while not is_taken:
-            kind, _, drawn = name.partition("-")
-            ask(f"{where}: {_WHAT_TO_DO[kind]}{f' ({drawn})' if drawn else ''}")
+            ask(instruction(capture))
             image = _fresh_image(camera)
             try:
-                seen = _look(image, kind, cube, grid)
+                seen = keep_capture(image, folder, capture, cube, grid)
             except (CubeError, BoardError) as error:
                 say(f"Not taken: {error}")
                 continue
-            write_png(make_folder(place) / f"{name}.png", image)
-            say(f"{where}/{name}.png: {seen}")
+            say(f"{capture.file}: {seen}")
             is_taken = True
-
-
-def _is_there(place: Path, name: str) -> bool:
-    return place.is_dir() and name in images_in(place)
 
 
 def _fresh_image(camera: ViewpointCamera) -> UInt8:
     for _ in range(_STALE_IMAGES):
         camera.read()
     return camera.read()[0]
-
-
-def _look(image: UInt8, kind: str, cube: Cube, grid: Grid) -> str:
-    """Return what is seen; CubeError or BoardError if that is not enough."""
-    gray = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype("uint8", copy=False)
-    if kind == GRID:
-        return f"{len(find_grid(gray, grid).pixels)} corners of the grid"
-    return f"{len(find_cube(gray, cube))} faces of the cube"

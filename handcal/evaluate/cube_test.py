@@ -14,7 +14,7 @@ import numpy as np
 
 from handcal.errors import FileError
 from handcal.evaluate.cube import CubeMisalignment, compare_cubes
-from handcal.evaluate.cube_captures import GRID, find_captures, images_in
+from handcal.evaluate.cube_folder import GRID, find_captures, images_in
 from handcal.image_file import read_image
 from handcal.rig.board import BoardError
 from handcal.rig.cube import Cube, CubeError, find_cube
@@ -61,7 +61,7 @@ def judge_captures(
     Parameters
     ----------
     folder : Path
-        As `handcal.evaluate.cube_captures` tells.
+        As `handcal.evaluate.cube_folder` tells.
     cube : Cube
     camera : Intrinsics
         The eye-replacement camera, lens included.

@@ -7,8 +7,9 @@ camera sees through it; then a cube is tracked by the depth camera, and captured
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -108,6 +109,8 @@ def write_captures(
     alignments (``virtual-solved``), and with the true φ (``virtual-true``), which shows what the
     test itself cannot tell.
 
+    They appear in the folder all at once, so that what was given up is not taken for a whole test.
+
     Parameters
     ----------
     folder : Path
@@ -126,6 +129,27 @@ def write_captures(
     """
     if any(make_folder(folder).iterdir()):
         raise FileError(f"{folder} is not empty: give a new folder")
+    with _appearing_in(folder) as rendering:
+        _render(rendering, rig, settings, report)
+
+
+@contextmanager
+def _appearing_in(folder: Path) -> Iterator[Path]:
+    """Give a hidden folder to fill; at the end, what is in it is moved up, unless that failed."""
+    hidden = make_folder(folder / ".rendering")
+    try:
+        yield hidden
+        for made in hidden.iterdir():
+            made.rename(folder / made.name)
+    except OSError as error:
+        raise FileError(f"cannot write {folder}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
+
+
+def _render(
+    folder: Path, rig: Rig, settings: CaptureSettings, report: Callable[[str, float], None]
+) -> None:
     write_intrinsics(folder / "camera.json", settings.camera, "json")
     write_cube(folder / "cube.json", settings.cube)
     studio = _Studio(rig, settings)

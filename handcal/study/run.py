@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias
 
 from handcal.errors import CancelledError
-from handcal.study.store import Row, StudyFolder
+from handcal.study.store import Row, StudyFolder, holds_study
 from handcal.study.workers import open_workers
 
 Case: TypeAlias = dict[str, float | int | str]
@@ -106,16 +106,18 @@ def run_study(
 def share_done(study: Study, folder: Path) -> float:
     """Return which share of a study a folder holds, 0..1.
 
+    A damaged chunk counts, though it will be done again: files are not read, so that this is quick.
+
     Raises
     ------
     FileError
         If it holds another study, or cannot be read.
     """
-    if not (folder / "study.json").exists():
+    if not holds_study(folder):
         return 0.0
     chunks = _chunks(study.cases)
     store = StudyFolder(folder, study.name, asdict(study.settings), chunks)
-    done = [store.read_chunk(number) is not None for number in range(len(chunks))]
+    done = [store.has_chunk(number) for number in range(len(chunks))]
     return sum(done) / len(done)
 
 

@@ -21,7 +21,26 @@ from handcal.report.rows import rows_csv
 Row: TypeAlias = dict[str, float | int | str | bool | None]
 """One row of a study's table; None where there is nothing to tell."""
 
+_STUDY = "study.json"
 _LIBRARIES = "handcal", "numpy", "scipy", "opencv-python-headless"
+
+
+def holds_study(folder: Path) -> bool:
+    """Tell whether a folder is that of a study."""
+    return (folder / _STUDY).exists()
+
+
+def free_of_studies(folder: Path) -> Path:
+    """Return a folder that other results may go into.
+
+    Raises
+    ------
+    FileError
+        If it is that of a study, whose report would be replaced.
+    """
+    if holds_study(folder):
+        raise FileError(f"{folder} holds a study; choose another folder for the results")
+    return folder
 
 
 class StudyFolder:
@@ -52,7 +71,7 @@ class StudyFolder:
     ) -> None:
         self._path = make_folder(path)
         self._chunks = make_folder(path / "chunks")
-        file = path / "study.json"
+        file = path / _STUDY
         study = json.loads(
             json.dumps(
                 {
@@ -72,6 +91,10 @@ class StudyFolder:
                 f"{path} holds another study ({others}); "
                 "choose another folder, or delete this one to begin again"
             )
+
+    def has_chunk(self, number: int) -> bool:
+        """Tell at once whether a chunk is there, be it whole or damaged."""
+        return self._file(number).exists()
 
     def read_chunk(self, number: int) -> list[list[Row]] | None:
         """Return the rows of each case of a chunk; None if it is not there, or damaged."""

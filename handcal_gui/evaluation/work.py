@@ -16,7 +16,7 @@ from handcal.image_file import read_image
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.study.run import Study, run_study, share_done
-from handcal.study.store import Row
+from handcal.study.store import Row, free_of_studies
 from handcal.types import UInt8
 from handcal_gui.evaluation.time_left import TimeLeft
 from handcal_gui.running.jobs import IsCancelled
@@ -141,14 +141,14 @@ class GivenData:
         """Tell what is missing, and whether an earlier report will be replaced."""
         if missing := self.missing(entries):
             return Standing(Finding("", Health.BROKEN, missing))
-        folder = _free_of_studies(output_folder(entries.output))
+        folder = free_of_studies(output_folder(entries.output))
         if (folder / "report.pdf").exists():
             return Standing(_note(f"The report in {folder} will be replaced"))
         return Standing(_ready())
 
     def run(self, entries: Any, tell: Tell, is_cancelled: IsCancelled) -> Outcome:
         """Read, evaluate, and write the report."""
-        folder = _free_of_studies(output_folder(entries.output))
+        folder = free_of_studies(output_folder(entries.output))
         checkpoint = _checkpoint(tell, is_cancelled)
         report = self.describe(
             entries, lambda doing, share: checkpoint(doing, _READING_SHARE * share)
@@ -183,12 +183,6 @@ def _write(folder: Path, report: Report, checkpoint: Checkpoint, begun: float) -
 
 def _read(file: Path) -> UInt8:
     return np.asarray(read_image(file, cv2.IMREAD_COLOR)[..., ::-1], np.uint8)
-
-
-def _free_of_studies(folder: Path) -> Path:
-    if (folder / "study.json").exists():
-        raise FileError(f"{folder} holds a study; choose another folder for the results")
-    return folder
 
 
 def _note(found: str, advice: str = "") -> Finding:

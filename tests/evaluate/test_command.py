@@ -20,8 +20,10 @@ class Seer:
         )
 
 
-def evaluate(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
-    monkeypatch.setattr("sys.argv", ["handcal", "evaluate", "detector", *map(str, arguments)])
+def evaluate(
+    monkeypatch: pytest.MonkeyPatch, *arguments: object, command: str = "detector"
+) -> None:
+    monkeypatch.setattr("sys.argv", ["handcal", "evaluate", command, *map(str, arguments)])
     main()
 
 
@@ -53,3 +55,13 @@ def test_a_missing_file_is_one_line(
         evaluate(monkeypatch, "--images", tmp_path, "--annotations", missing)
     assert ended.value.code == 1
     assert "no.json" in capsys.readouterr().err
+
+
+def test_the_report_of_users_never_goes_into_a_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(SystemExit) as ended:
+        evaluate(monkeypatch, tmp_path, "--output", tmp_path, command="users")
+    assert ended.value.code == 1
+    assert "holds a study" in capsys.readouterr().err

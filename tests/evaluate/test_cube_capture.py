@@ -7,10 +7,17 @@ import pytest
 
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CancelledError
-from handcal.evaluate.cube_capture import CapturePlan, missing_captures, take_captures
-from handcal.evaluate.cube_captures import find_captures
+from handcal.evaluate.cube_capture import keep_capture, take_captures
+from handcal.evaluate.cube_folder import (
+    CapturePlan,
+    PlannedCapture,
+    find_captures,
+    images_in,
+    missing_captures,
+)
 from handcal.geometry import rigid
-from handcal.rig.cube import Cube
+from handcal.image_file import write_png
+from handcal.rig.cube import Cube, CubeError
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
@@ -83,15 +90,20 @@ def test_it_goes_on_where_it_was_given_up(tmp_path: Path) -> None:
 
     with pytest.raises(CancelledError):
         take_captures(stage, tmp_path, PLAN, CUBE, GRID, ask, lambda _what: None)
-    assert missing_captures(tmp_path, PLAN) == [(tmp_path / "centre" / "pose-1", "virtual-a")]
+    (missing,) = missing_captures(tmp_path, PLAN)
+    assert missing.file == "centre/pose-1/virtual-a.png"
 
 
-def test_a_plan_without_grid_and_with_one_way_of_drawing(tmp_path: Path) -> None:
-    plan = CapturePlan(positions=("left", "right"), poses=2, with_grid=False)
-    names = [f"{place.name}/{name}" for place, name in missing_captures(tmp_path, plan)]
-    assert names == 2 * ["pose-1/real", "pose-1/virtual", "pose-2/real", "pose-2/virtual"]
-
-
-def test_a_name_that_is_no_folder_is_refused() -> None:
-    with pytest.raises(ValueError, match="letters, digits"):
-        CapturePlan(positions=("../other",))
+def test_an_image_replaces_an_earlier_one_only_if_the_cube_is_seen(tmp_path: Path) -> None:
+    capture = PlannedCapture("a/1", "real")
+    seen = np.repeat(cube_seen()[..., None], 3, axis=2)
+    earlier = tmp_path / "a" / "1" / "real.jpg"
+    earlier.parent.mkdir(parents=True)
+    earlier.write_bytes(b"")
+    with pytest.raises(CubeError, match="dark"):
+        keep_capture(np.zeros_like(seen), tmp_path, capture, CUBE, GRID)
+    assert images_in(earlier.parent) == {"real": earlier}
+    assert keep_capture(seen, tmp_path, capture, CUBE, GRID) == "3 faces of the cube"
+    write_png(tmp_path / "expected.png", seen)
+    kept = images_in(earlier.parent)["real"]
+    assert kept.read_bytes() == (tmp_path / "expected.png").read_bytes()

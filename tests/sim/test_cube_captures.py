@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handcal.cube_file import read_cube
-from handcal.errors import FileError
+from handcal.errors import CancelledError, FileError
 from handcal.evaluate.cube_test import judge_captures
 from handcal.files import read_json
 from handcal.rig.cube import Cube, CubeError
@@ -59,6 +59,20 @@ def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:
     (tmp_path / "note.txt").touch()
     with pytest.raises(FileError, match="not empty"):
         write_captures(tmp_path, small_rig(), SETTINGS, lambda _what, _share: None)
+
+
+def test_what_is_given_up_leaves_nothing(tmp_path: Path) -> None:
+    reports: list[str] = []
+
+    def give_up(what: str, _share: float) -> None:
+        reports.append(what)
+        assert any(tmp_path.rglob("grid.png"))
+        if len(reports) == 2:
+            raise CancelledError("enough")
+
+    with pytest.raises(CancelledError):
+        write_captures(tmp_path, small_rig(), replace(SETTINGS, poses=2), give_up)
+    assert not any(tmp_path.iterdir())
 
 
 def test_a_cube_too_large_for_the_display_is_refused(tmp_path: Path) -> None:

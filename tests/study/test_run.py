@@ -211,6 +211,15 @@ def test_a_worker_that_dies_is_told_of_and_the_study_goes_on(tmp_path: Path) -> 
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
 
 
+def test_how_much_is_done_is_told_without_reading_it(tmp_path: Path) -> None:
+    study = make_study()
+    run_study(study, tmp_path, workers=1)
+    chunks = sorted((tmp_path / "chunks").iterdir())
+    chunks[0].unlink()
+    chunks[1].write_bytes(b"damaged")
+    assert share_done(study, tmp_path) == 1.0 - 1.0 / len(chunks)
+
+
 @pytest.mark.parametrize("damage", [b"", b"{", b'{"rows": [[]], "sha256": ""}', b"\xff", None])
 def test_a_damaged_chunk_is_done_again(tmp_path: Path, damage: bytes | None) -> None:
     rows = run_study(make_study(), tmp_path, workers=1)
