@@ -8,9 +8,11 @@ from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QStandardPaths
 
+from handcal.evaluate.cube_folder import CapturePlan
 from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]
+_PLAN = CapturePlan()
 
 
 def _folder(name: str) -> str:
@@ -53,7 +55,7 @@ class MethodEntries:
 
 @dataclass(frozen=True, slots=True)
 class CubeEntries:
-    """What the cube test looks at; paths.
+    """What the cube test looks at, and the plan of its captures.
 
     Attributes
     ----------
@@ -69,6 +71,10 @@ class CubeEntries:
     seed : int
         Of what is rendered.
     output : str
+    positions, drawn : str
+        Names with commas between them, as of `CapturePlan`.
+    poses : int
+    with_grid : bool
     """
 
     captures: str = ""
@@ -79,6 +85,10 @@ class CubeEntries:
     square_px: int = 80
     seed: int = 1
     output: str = field(default_factory=lambda: _folder("cube"))
+    positions: str = ", ".join(_PLAN.positions)
+    poses: int = _PLAN.poses
+    drawn: str = ", ".join(_PLAN.drawn)
+    with_grid: bool = _PLAN.with_grid
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from handcal.doctor import Finding, Health
 from handcal.errors import HandcalError
+from handcal_gui.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.evaluation.results_view import ResultsView
 from handcal_gui.evaluation.work import Evaluation, Outcome, Standing
 from handcal_gui.running.job_bar import JobBar
@@ -34,12 +35,15 @@ class Offer:
     evaluation : Evaluation
     form : callable
         Makes the fields for its entries.
+    preparation : Preparation, optional
+        Makes what is evaluated.
     """
 
     title: str
     question: str
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
+    preparation: Preparation | None = None
 
 
 class EvaluationPage(QWidget):
@@ -68,6 +72,7 @@ class EvaluationPage(QWidget):
         self.form = offer.form()
         self.form.show_entries(entries)
         self._button = main_button("run", "Run")
+        self._prepare = PreparationButton(offer.preparation) if offer.preparation else None
         self._bar = JobBar()
         self._found = FindingLine("standing")
         self._results = ResultsView()
@@ -75,6 +80,8 @@ class EvaluationPage(QWidget):
         self._lay_out(offer.question)
         self.form.changed.connect(self._take_entries)
         self._button.clicked.connect(self.run)
+        if self._prepare is not None:
+            self._prepare.closed.connect(self._look_anew)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
         self._look.answered.connect(self._take_standing)
@@ -106,7 +113,9 @@ class EvaluationPage(QWidget):
         self._bar.cancel()
 
     def stop(self) -> None:
-        """Give up what runs, and wait for its end."""
+        """Give up what runs or is prepared, and wait for its end."""
+        if self._prepare is not None:
+            self._prepare.stop()
         self._bar.stop()
         self._look.stop()
 
@@ -121,7 +130,10 @@ class EvaluationPage(QWidget):
         self._ask()
 
     def _take_entries(self) -> None:
-        self._entries = self.form.take(self._entries)
+        self._look_anew(self.form.take(self._entries))
+
+    def _look_anew(self, entries: Any) -> None:
+        self._entries = entries
         self._failure = ""
         self._results.show_outcome(None)
         self._ask()
@@ -159,6 +171,8 @@ class EvaluationPage(QWidget):
 
     def _refresh(self) -> None:
         standing = self._standing
+        if self._prepare is not None:
+            self._prepare.follow(None if self.is_busy else self._entries)
         can_run = standing is not None and standing.can_run and not self._waits_for
         self._button.setEnabled(can_run)
         if standing is not None:
@@ -183,6 +197,8 @@ class EvaluationPage(QWidget):
         row = QHBoxLayout()
         row.setSpacing(2 * SPACING_PX)
         row.addWidget(self._button)
+        if self._prepare is not None:
+            row.addWidget(self._prepare)
         row.addWidget(self._bar, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

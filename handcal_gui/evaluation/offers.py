@@ -8,6 +8,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
+from handcal.evaluate.cube_folder import find_captures
 from handcal.evaluate.user_test import evaluate_user_test, read_user_test
 from handcal.evaluate.user_test_report import user_test_report
 from handcal.report.document import Report
@@ -17,9 +18,11 @@ from handcal.study.noise import QUICK_NOISE, NoiseSettings, noise_study
 from handcal.study.noise_report import noise_report
 from handcal.study.run import Study
 from handcal.types import EYES
+from handcal_gui.evaluation.capture_dialog import CaptureDialog
 from handcal_gui.evaluation.cube import evaluate_cube
-from handcal_gui.evaluation.entries import MethodEntries, NoiseEntries, UserEntries
+from handcal_gui.evaluation.entries import CubeEntries, MethodEntries, NoiseEntries, UserEntries
 from handcal_gui.evaluation.evaluation_page import Offer
+from handcal_gui.evaluation.preparation import Preparation
 from handcal_gui.evaluation.work import Checkpoint, GivenData, SimulatedStudy
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import choice, named, whole_number
@@ -49,8 +52,14 @@ def make_offers() -> Mapping[str, Offer]:
             "Cube test",
             "How far is a drawn cube from the real one, as a camera in the eye's place sees it? "
             "About a minute with rendered captures.",
-            GivenData(lambda _entries: "", evaluate_cube),
+            GivenData(_missing_captures, evaluate_cube),
             _cube_form,
+            Preparation(
+                "Capture…",
+                "Take the captures with a camera; enter the folder for them first.",
+                lambda entries: bool(entries.captures),
+                CaptureDialog,
+            ),
         ),
         "users": Offer(
             "User test",
@@ -69,6 +78,16 @@ def _noise(entries: NoiseEntries) -> Study:
 
 def _methods(entries: MethodEntries) -> Study:
     return methods_study(MethodSettings(wearers=entries.wearers, seed=entries.seed))
+
+
+def _missing_captures(entries: CubeEntries) -> str:
+    if not entries.captures:
+        return ""
+    folder = Path(entries.captures).expanduser()
+    if not folder.exists():
+        return f"there is no folder {folder} yet: Capture… makes it"
+    find_captures(folder)  # which says what is wrong with it
+    return ""
 
 
 def _missing_sessions(entries: UserEntries) -> str:

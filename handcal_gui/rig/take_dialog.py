@@ -3,43 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QDialog,
-    QGridLayout,
-    QHBoxLayout,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QDialog, QHBoxLayout, QVBoxLayout, QWidget
 
-from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
-from handcal.camera.view_source import REALSENSE, open_view_source
+from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.doctor import Finding, Health
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.views import View, view
 from handcal.rig_take import keep_imager, keep_images, see_board
-from handcal_gui.rig.live import Images, LiveImages
+from handcal_gui.camera.live_cameras import LiveCameras
+from handcal_gui.camera.live_images import Images
 from handcal_gui.running.job_bar import JobBar
 from handcal_gui.running.jobs import IsCancelled, Report
 from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, choice, main_button, named
+from handcal_gui.widgets.fields import button, main_button, named
 from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.widgets.path_field import PathField
-
-_RECORDED = "recorded"
-_SOURCES = {REALSENSE: "RealSense, colour", _RECORDED: "Recording or video"}
-_PLAYBACK = PlaybackSettings(real_time=True, loop=True)
-_POLL_MS = 50
 
 
 class TakeDialog(QDialog):
@@ -58,11 +42,6 @@ class TakeDialog(QDialog):
         As `open_view_source`.
     list_cameras : callable
         As `list_viewpoints`.
-
-    Attributes
-    ----------
-    shown_images : tuple of (H, W, 3) uint8, or None
-        What is seen now; None while no camera is shown.
     """
 
     def __init__(
@@ -79,20 +58,15 @@ class TakeDialog(QDialog):
         self.setObjectName("takeDialog")
         self.setWindowTitle("Take images")
         self._folders, self._board, self._choose = dict(folders), board, choose
-        self._realsense, self._open_source = realsense, open_source
-        self._live: LiveImages | None = None
         self._chooser = ViewChooser(choose)
         self._kept = 0
         self._is_looking = False
-        self.shown_images: Images | None = None
-        self._sources = {title: choice("source", title, _SOURCES) for title in folders}
-        self._recorded = {
-            title: PathField(
-                f"Recording or video, {title.lower()}", "either", empty="No recording or video"
-            )
-            for title in folders
-        }
-        self._views = {title: ImageView(title) for title in folders}
+        self._cameras = LiveCameras(
+            tuple(folders),
+            realsense,
+            lambda title, frame: keep_imager(folders[title], frame),
+            open_source,
+        )
         self._found = FindingLine("taken")
         self._bar = JobBar()
         self._start = button("startCameras", "Show")
@@ -106,47 +80,31 @@ class TakeDialog(QDialog):
             "the images taken before.",
         )
         self._close = button("close", "Close")
-        self._timer = QTimer(self, interval=_POLL_MS)
-        self._timer.timeout.connect(self._poll)
         self._looker = LatestJob(self._take_if_new, self)
         self._looker.answered.connect(self._show_looked)
         self._looker.failed.connect(self._show_failure)
+        self._cameras.images_changed.connect(self._follow)
+        self._cameras.failed.connect(self._show_failure)
         self._start.clicked.connect(self.start)
         self._take.clicked.connect(self.take)
         self._by_itself.toggled.connect(self._begin_anew)
         self._close.clicked.connect(self.accept)
         self._bar.busy_changed.connect(self._refresh)
         self._bar.failed.connect(self._show_failure)
-        for source in self._sources.values():
-            source.currentIndexChanged.connect(self._refresh)
         self._lay_out()
         self._refresh()
         self._found.show_finding(Finding("", Health.LIMITED, "choose the cameras, and show them"))
-        self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._offer_cameras)
+        self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._cameras.offer)
+
+    @property
+    def shown_images(self) -> Images | None:
+        """What is seen now; None while no camera is shown."""
+        return self._cameras.images
 
     def start(self) -> None:
         """Show what the chosen cameras see."""
-        self._stop_cameras()
-        sources = [self._source(title) for title in self._folders]
-        if "" in sources:
-            self._show_failure("choose the recording or video")
-            return
-        if len(set(sources)) < len(sources):
-            self._show_failure("one camera cannot be both: choose another")
-            return
-        opens = [
-            partial(
-                self._open_source,
-                *(source, self._realsense, _PLAYBACK, partial(keep_imager, folder)),
-            )
-            for source, folder in zip(sources, self._folders.values(), strict=True)
-        ]
-        self._live = LiveImages(opens)
-        self._live.failed.connect(self._show_failure)
-        self._live.start()
-        self._timer.start()
-        for shown in self._views.values():
-            shown.show_text(message="Opening the camera…")
+        self._stop_looking()
+        self._cameras.start()
 
     def take(self) -> None:
         """Keep the images shown, and look for the board in them."""
@@ -162,21 +120,10 @@ class TakeDialog(QDialog):
 
     def done(self, result: int) -> None:
         """Close cameras and dialog."""
-        self._stop_cameras()
+        self._stop_looking()
+        self._cameras.stop()
         self._bar.stop()
         super().done(result)
-
-    def _source(self, title: str) -> str:
-        """Return what a camera is called by `open_view_source`; empty for no recording."""
-        chosen = str(self._sources[title].currentData())
-        return self._recorded[title].path if chosen == _RECORDED else chosen
-
-    def _offer_cameras(self, numbers: list[int]) -> None:
-        for place, source in enumerate(self._sources.values()):
-            for number in reversed(numbers):
-                source.insertItem(0, f"Camera {number}", str(number))
-            if self._live is None:
-                source.setCurrentIndex(place)
 
     def _begin_anew(self) -> None:
         self._stop_looking()
@@ -205,32 +152,16 @@ class TakeDialog(QDialog):
             finding = Finding("", Health.GOOD, f"{self._kept} taken")
         self._found.show_finding(finding)
 
-    def _poll(self) -> None:
-        newest = self._live.newest if self._live is not None else None
-        if newest is None or newest is self.shown_images:
-            return
-        self.shown_images = newest
-        for shown, image in zip(self._views.values(), newest, strict=True):
-            shown.show_text()
-            shown.show_image(image)
-        if self._by_itself.isChecked() and not self._is_looking:
+    def _follow(self) -> None:
+        images = self.shown_images
+        if images is not None and self._by_itself.isChecked() and not self._is_looking:
             self._is_looking = True
-            self._looker.ask(newest)
-        self._refresh()
-
-    def _stop_cameras(self) -> None:
-        self._timer.stop()
-        self._stop_looking()
-        if self._live is not None:
-            self._live.stop()
-            self._live = None
-        self.shown_images = None
+            self._looker.ask(images)
         self._refresh()
 
     def _show_failure(self, why: str) -> None:
-        self._stop_cameras()
-        for shown in self._views.values():
-            shown.show_text(message="No picture")
+        self._stop_looking()
+        self._cameras.stop()
         self._found.show_finding(Finding("", Health.BROKEN, why))
 
     def _show_taken(self, views: list[View]) -> None:
@@ -244,24 +175,8 @@ class TakeDialog(QDialog):
 
     def _refresh(self) -> None:
         self._take.setEnabled(self.shown_images is not None and not self._bar.is_busy)
-        for title, field in self._recorded.items():
-            field.setEnabled(self._sources[title].currentData() == _RECORDED)
 
     def _lay_out(self) -> None:
-        grid = QGridLayout()
-        grid.setSpacing(SPACING_PX)
-        for column, (title, source) in enumerate(self._sources.items()):
-            row = QHBoxLayout()
-            row.setSpacing(SPACING_PX)
-            row.addWidget(QLabel(title))
-            row.addWidget(source, 1)
-            grid.addLayout(row, 0, column)
-            grid.addWidget(self._recorded[title], 1, column)
-            grid.addWidget(self._views[title], 2, column)
-            self._views[title].setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
-            self._views[title].show_text(message="No picture yet")
-        grid.setRowStretch(2, 1)
-        grid.setHorizontalSpacing(3 * SPACING_PX)
         foot = QHBoxLayout()
         foot.setSpacing(SPACING_PX)
         for widget in (self._start, self._take, self._by_itself):
@@ -271,6 +186,6 @@ class TakeDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(*4 * (2 * SPACING_PX,))
         layout.setSpacing(SPACING_PX)
-        layout.addLayout(grid, 1)
+        layout.addWidget(self._cameras, 1)
         layout.addWidget(self._found)
         layout.addLayout(foot)

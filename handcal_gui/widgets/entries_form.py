@@ -7,7 +7,15 @@ from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QLineEdit, QSpinBox, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QGridLayout,
+    QLabel,
+    QLineEdit,
+    QSpinBox,
+    QWidget,
+)
 
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.path_field import PathField
@@ -16,7 +24,7 @@ Entries = TypeVar("Entries")
 
 
 class EntriesForm(QWidget):
-    """Shows some fields of a dataclass: paths, choices, texts and whole numbers.
+    """Shows some fields of a dataclass: paths, choices, ticks, texts and whole numbers.
 
     Parameters
     ----------
@@ -72,6 +80,8 @@ def _change_of(field: QWidget) -> Any:
         return field.changed
     if isinstance(field, QComboBox):
         return field.currentIndexChanged
+    if isinstance(field, QCheckBox):
+        return field.toggled
     if isinstance(field, QLineEdit):
         return field.textChanged
     return cast(QSpinBox, field).valueChanged
@@ -82,6 +92,8 @@ def _show(field: QWidget, value: Any) -> None:
         field.set_path(value)
     elif isinstance(field, QComboBox):
         field.setCurrentIndex(field.findData(value))
+    elif isinstance(field, QCheckBox):
+        field.setChecked(value)
     elif isinstance(field, QLineEdit):
         field.setText(value)
     else:
@@ -93,6 +105,8 @@ def _value(field: QWidget) -> Any:
         return field.path
     if isinstance(field, QComboBox):
         return field.currentData()
+    if isinstance(field, QCheckBox):
+        return field.isChecked()
     if isinstance(field, QLineEdit):
         return field.text().strip()
     return cast(QSpinBox, field).value()

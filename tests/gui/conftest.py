@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.calibrate import CalibrationSettings, Observation, PlacedHand, State
 from handcal.camera.feed import CameraStatus
+from handcal.camera.viewpoint import ViewpointCamera
 from handcal.closable import Closable
 from handcal.config import settings_json
 from handcal.display import view_of_eye
@@ -36,7 +37,7 @@ from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.snapshot import Procedure, Snapshot
 from handcal.station_settings import StationSettings
-from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig
+from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig, UInt8
 from handcal.wearer_view import EyeView, see
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -191,6 +192,31 @@ class Camera(Closable):
 
     def close(self) -> None:
         pass
+
+
+class StillCamera(ViewpointCamera):
+    """Always sees the same; fails when told."""
+
+    def __init__(self, image: UInt8) -> None:
+        self.name = "still"
+        self.image = image
+        self.failure: CameraError | None = None
+        self.is_open = True
+
+    def read(self) -> tuple[UInt8, int]:
+        time.sleep(0.01)
+        failure, self.failure = self.failure, None
+        if failure is not None:
+            raise failure
+        return self.image.copy(), 0
+
+    def close(self) -> None:
+        self.is_open = False
+
+
+@pytest.fixture
+def still_camera() -> type[StillCamera]:
+    return StillCamera
 
 
 class Headset(Closable):

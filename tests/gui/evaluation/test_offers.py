@@ -89,6 +89,26 @@ def test_without_sessions_there_is_no_user_test(tmp_path: Path) -> None:
     assert "folder of sessions" in standing.finding.found
 
 
+def test_a_cube_test_is_run_once_there_are_captures_to_look_at(tmp_path: Path) -> None:
+    offer = make_offers()["cube"]
+    assert offer.preparation is not None
+    entries = CubeEntries(output=str(tmp_path / "results"))
+    assert offer.evaluation.standing(entries).can_run
+    assert not offer.preparation.is_possible(entries)
+    entries = replace(entries, captures=str(tmp_path / "captures"))
+    assert offer.preparation.is_possible(entries)
+    standing = offer.evaluation.standing(entries)
+    assert "no folder" in standing.finding.found
+    assert not standing.can_run
+    pose = tmp_path / "captures" / "centre" / "pose-1"
+    pose.mkdir(parents=True)
+    with pytest.raises(FileError, match="no captures"):
+        offer.evaluation.standing(entries)
+    for name in ("real.png", "virtual.png"):
+        (pose / name).touch()
+    assert offer.evaluation.standing(entries).can_run
+
+
 def test_a_cube_test_says_what_it_lacks(tmp_path: Path) -> None:
     entries = CubeEntries(captures=str(tmp_path))
     with pytest.raises(FileError, match=r"cube\.json"):

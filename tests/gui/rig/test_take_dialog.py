@@ -16,48 +16,28 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraError, CameraTimeoutError
+from handcal.errors import CameraError
 from handcal.rig.choose import ChooseSettings
-from handcal.types import UInt8
 from handcal_gui.rig.shots import read_color
 from handcal_gui.rig.take_dialog import TakeDialog
-from handcal_gui.widgets.path_field import PathField
 
 REALSENSE_SETTINGS = RealSenseSettings(serial="42")
 
 
-class StillCamera(ViewpointCamera):
-    """Always sees the same; fails when told."""
-
-    def __init__(self, image: UInt8) -> None:
-        self.name = "still"
-        self.image = image
-        self.failure: CameraError | None = None
-        self.is_open = True
-
-    def read(self) -> tuple[UInt8, int]:
-        failure, self.failure = self.failure, None
-        if failure is not None:
-            raise failure
-        return self.image.copy(), 0
-
-    def close(self) -> None:
-        self.is_open = False
-
-
 @pytest.fixture
-def cameras(photographs: Any) -> dict[str, StillCamera]:
+def cameras(photographs: Any, still_camera: Any) -> dict[str, Any]:
     names = {"0": "depth", "1": "headset"}
-    return {source: StillCamera(photographs.image(name)) for source, name in names.items()}
+    return {source: still_camera(photographs.image(name)) for source, name in names.items()}
 
 
 @pytest.fixture
 def dialog(
-    qtbot: QtBot, photographs: Any, cameras: dict[str, StillCamera], tmp_path: Path
+    qtbot: QtBot, photographs: Any, cameras: dict[str, Any], tmp_path: Path
 ) -> Iterator[TakeDialog]:
     def open_still(source: str, *how: object) -> ViewpointCamera:
         assert how[:2] == (REALSENSE_SETTINGS, PlaybackSettings(real_time=True, loop=True))
-        return cameras[source]
+        camera: ViewpointCamera = cameras[source]
+        return camera
 
     folders = {"Depth camera": tmp_path / "depth", "Headset camera": tmp_path / "headset"}
     dialog = TakeDialog(
@@ -94,7 +74,7 @@ def start(qtbot: QtBot, dialog: TakeDialog) -> None:
 
 
 def test_both_cameras_images_are_taken(
-    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera], tmp_path: Path
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
 ) -> None:
     assert not button(dialog, "takeImage").isEnabled()
     start(qtbot, dialog)
@@ -112,28 +92,14 @@ def test_both_cameras_images_are_taken(
     assert not any(camera.is_open for camera in cameras.values())
 
 
-def test_a_camera_that_is_late_is_waited_for(
-    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera]
-) -> None:
-    cameras["0"].failure = CameraTimeoutError("late")
-    start(qtbot, dialog)
-
-
 def test_a_camera_that_fails_is_told_and_can_be_shown_again(
-    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera]
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any]
 ) -> None:
     start(qtbot, dialog)
     cameras["1"].failure = CameraError("it was unplugged")
     qtbot.waitUntil(lambda: said(dialog) == "It was unplugged.")
     assert not button(dialog, "takeImage").isEnabled()
     start(qtbot, dialog)
-
-
-def test_one_camera_cannot_be_both(dialog: TakeDialog) -> None:
-    for source in dialog.findChildren(QComboBox, "source"):
-        source.setCurrentIndex(2)
-    button(dialog, "startCameras").click()
-    assert "cannot be both" in said(dialog)
 
 
 def test_images_are_taken_by_themselves_until_they_are_enough(
@@ -151,7 +117,7 @@ def test_images_are_taken_by_themselves_until_they_are_enough(
 
 
 def test_what_is_not_taken_by_itself_is_explained(
-    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera], tmp_path: Path
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
 ) -> None:
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
     start(qtbot, dialog)
@@ -160,18 +126,3 @@ def test_what_is_not_taken_by_itself_is_explained(
     by_itself.click()
     qtbot.waitUntil(lambda: said(dialog) == "0 taken; the board is not seen.")
     assert not (tmp_path / "depth").exists()
-
-
-def test_a_recording_is_shown_as_a_camera_is(
-    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, StillCamera], tmp_path: Path
-) -> None:
-    fields = dialog.findChildren(PathField)
-    assert not any(field.isEnabled() for field in fields)
-    source = dialog.findChildren(QComboBox, "source")[1]
-    source.setCurrentIndex(source.findText("Recording or video"))
-    assert [field.isEnabled() for field in fields] == [False, True]
-    button(dialog, "startCameras").click()
-    assert said(dialog) == "Choose the recording or video."
-    fields[1].set_path("film.mp4")
-    cameras["film.mp4"] = cameras["1"]
-    start(qtbot, dialog)

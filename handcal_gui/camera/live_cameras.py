@@ -1,0 +1,165 @@
+"""What cameras of this computer see, or recordings and videos in their place, as chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+
+from PySide6.QtCore import QTimer, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+
+from handcal.camera.playback import PlaybackSettings
+from handcal.camera.settings import RealSenseSettings
+from handcal.camera.view_source import REALSENSE, open_view_source
+from handcal.camera.viewpoint import ViewpointCamera
+from handcal.types import Frame
+from handcal_gui.camera.live_images import Images, LiveImages
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import choice
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.path_field import PathField
+
+_RECORDED = "recorded"
+_SOURCES = {REALSENSE: "RealSense, colour", _RECORDED: "Recording or video"}
+_PLAYBACK = PlaybackSettings(real_time=True, loop=True)
+_POLL_MS = 50
+
+
+class LiveCameras(QWidget):
+    """Has each camera chosen, and shows what all of them see at the same moment.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        What each camera is.
+    realsense : RealSenseSettings, optional
+    tell : callable
+        Given a title, and the first frame of a camera that has depth, too; in another thread.
+    open_source : callable
+        As `open_view_source`.
+
+    Attributes
+    ----------
+    images : tuple of (H, W, 3) uint8, or None
+        What is seen now; None while no camera is shown.
+    images_changed : Signal()
+    failed : Signal(str)
+        No camera is shown, and why.
+    """
+
+    images_changed = Signal()
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        titles: Sequence[str],
+        realsense: RealSenseSettings | None = None,
+        tell: Callable[[str, Frame], object] = lambda _title, _frame: None,
+        open_source: Callable[..., ViewpointCamera] = open_view_source,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("liveCameras")
+        self.images: Images | None = None
+        self._realsense, self._tell, self._open_source = realsense, tell, open_source
+        self._live: LiveImages | None = None
+        self._sources = {title: choice("source", title, _SOURCES) for title in titles}
+        self._recorded = {
+            title: PathField(
+                f"Recording or video, {title.lower()}", "either", empty="No recording or video"
+            )
+            for title in titles
+        }
+        self._views = {title: ImageView(title) for title in titles}
+        self._timer = QTimer(self, interval=_POLL_MS)
+        self._timer.timeout.connect(self._poll)
+        for source in self._sources.values():
+            source.currentIndexChanged.connect(self._refresh)
+        self._lay_out()
+        self._refresh()
+        self._say("No picture yet")
+
+    def offer(self, numbers: Iterable[int]) -> None:
+        """Offer cameras of this computer, too, by their numbers."""
+        for place, source in enumerate(self._sources.values()):
+            for number in sorted(numbers, reverse=True):
+                source.insertItem(0, f"Camera {number}", str(number))
+            if self._live is None:
+                source.setCurrentIndex(place)
+
+    def start(self) -> None:
+        """Show what the chosen cameras see."""
+        self.stop()
+        sources = {title: self._source(title) for title in self._sources}
+        if "" in sources.values():
+            self.failed.emit("choose the recording or video")
+            return
+        if len(set(sources.values())) < len(sources):
+            self.failed.emit("one camera cannot be both: choose another")
+            return
+        self._live = LiveImages(
+            [
+                partial(
+                    self._open_source,
+                    *(source, self._realsense, _PLAYBACK, partial(self._tell, title)),
+                )
+                for title, source in sources.items()
+            ]
+        )
+        self._live.failed.connect(self._fail)
+        self._live.start()
+        self._timer.start()
+        self._say("Opening the camera…")
+
+    def stop(self) -> None:
+        """Close the cameras; safe to call twice."""
+        self._timer.stop()
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+        self.images = None
+        self._say("No picture")
+        self.images_changed.emit()
+
+    def _source(self, title: str) -> str:
+        """Return what a camera is called by `open_view_source`; empty for no recording."""
+        chosen = str(self._sources[title].currentData())
+        return self._recorded[title].path if chosen == _RECORDED else chosen
+
+    def _poll(self) -> None:
+        newest = self._live.newest if self._live is not None else None
+        if newest is None or newest is self.images:
+            return
+        self.images = newest
+        self._say("")
+        for shown, image in zip(self._views.values(), newest, strict=True):
+            shown.show_image(image)
+        self.images_changed.emit()
+
+    def _fail(self, why: str) -> None:
+        self.stop()
+        self.failed.emit(why)
+
+    def _say(self, message: str) -> None:
+        for shown in self._views.values():
+            shown.show_text(message=message)
+
+    def _refresh(self) -> None:
+        for title, field in self._recorded.items():
+            field.setEnabled(self._sources[title].currentData() == _RECORDED)
+
+    def _lay_out(self) -> None:
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(SPACING_PX)
+        for column, (title, source) in enumerate(self._sources.items()):
+            row = QHBoxLayout()
+            row.setSpacing(SPACING_PX)
+            row.addWidget(QLabel(title))
+            row.addWidget(source, 1)
+            grid.addLayout(row, 0, column)
+            grid.addWidget(self._recorded[title], 1, column)
+            grid.addWidget(self._views[title], 2, column)
+            self._views[title].setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
+        grid.setRowStretch(2, 1)
+        grid.setHorizontalSpacing(3 * SPACING_PX)

@@ -1,0 +1,89 @@
+"""What can be made in a dialog before it is evaluated, and the button that opens it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QDialog, QPushButton, QWidget
+
+from handcal_gui.widgets.fields import named
+
+
+class PreparationDialog(QDialog):
+    """A dialog in which what is evaluated is made.
+
+    Attributes
+    ----------
+    entries : object
+        Of the evaluation, with what was entered here.
+    """
+
+    entries: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Preparation:
+    """How an evaluation offers such a dialog.
+
+    Attributes
+    ----------
+    button, help_text : str
+        What the button says that opens it, and its tooltip.
+    is_possible : callable
+        Whether entries suffice for it.
+    dialog : callable
+        Makes it for entries, with a parent.
+    """
+
+    button: str
+    help_text: str
+    is_possible: Callable[[Any], bool]
+    dialog: Callable[[Any, QWidget], PreparationDialog]
+
+
+class PreparationButton(QPushButton):
+    """Opens the dialog over the window.
+
+    Parameters
+    ----------
+    preparation : Preparation
+
+    Attributes
+    ----------
+    closed : Signal(object)
+        The dialog was closed, with these entries.
+    """
+
+    closed = Signal(object)
+
+    def __init__(self, preparation: Preparation, parent: QWidget | None = None) -> None:
+        super().__init__(preparation.button, parent, autoDefault=True)
+        named(self, "prepare", preparation.button, preparation.help_text)
+        self._preparation = preparation
+        self._entries: Any = None
+        self._dialog: PreparationDialog | None = None
+        self.clicked.connect(self._open)
+
+    def follow(self, entries: Any) -> None:
+        """Be there for other entries; None for none."""
+        self._entries = entries
+        self.setEnabled(entries is not None and self._preparation.is_possible(entries))
+
+    def stop(self) -> None:
+        """Close the dialog, if it is open."""
+        if self._dialog is not None:
+            self._dialog.reject()
+
+    def _open(self) -> None:
+        self._dialog = self._preparation.dialog(self._entries, self)
+        self._dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self._dialog.finished.connect(self._end)
+        self._dialog.open()
+
+    def _end(self) -> None:
+        assert self._dialog is not None
+        dialog, self._dialog = self._dialog, None
+        self.closed.emit(dialog.entries)
