@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import torch
 from onnxruntime.quantization import (
     CalibrationDataReader,
@@ -87,6 +88,7 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
         quant_pre_process(str(float_path), str(prepared), skip_symbolic_shape=True)
+        nodes = [node.name for node in onnx.load(prepared).graph.node]
         quantize_static(
             str(prepared),
             str(path),
@@ -97,6 +99,8 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
             weight_type=QuantType.QInt8,
             reduce_range=True,
             op_types_to_quantize=["Conv", "Clip", "Add", "Resize"],
+            # Logits and logarithms of distances have no range in common.
+            nodes_to_exclude=[name for name in nodes if "predict" in name],
         )
 
 

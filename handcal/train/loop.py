@@ -55,7 +55,7 @@ class TrainSettings:
     rate: float = 1e-3
     backbone_rate: float = 3e-4
     rise: float = 0.03
-    fall: float = 0.5
+    fall: float = 0.8
     weight_decay: float = 0.03
     gradient_max: float = 10.0
     average: float = 0.998
@@ -104,7 +104,7 @@ class Training:
             self._net, multi_avg_fn=_ema(settings.average), use_buffers=True
         )
         self._optimizer = torch.optim.AdamW(
-            _groups(self._net, settings), weight_decay=settings.weight_decay
+            _groups(self._net, settings), weight_decay=settings.weight_decay, fused=True
         )
         self._step = 0
         self._folder = folder
@@ -218,7 +218,7 @@ class Training:
 
 
 def read_average(folder: Path) -> HandNet:
-    """Return the averaged network of the checkpoint in a folder.
+    """Return the averaged network of the checkpoint in a folder, its weights rounded for good.
 
     Raises
     ------
@@ -237,6 +237,7 @@ def read_average(folder: Path) -> HandNet:
             if name.startswith("module.")
         }
     )
+    net.bake()
     return net.eval()
 
 

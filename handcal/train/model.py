@@ -32,13 +32,38 @@ _WIDTH = 96
 _PRIOR = 0.01
 
 
+class _Conv(nn.Conv2d):
+    """A convolution with weights of 7 bits, one scale per output channel, as in the integer export.
+
+    Gradients pass as if nothing were rounded (Jacob et al. 2018).
+    """
+
+    _is_baked = False
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Return the convolved features."""
+        return self._conv_forward(features, self._rounded(), self.bias)
+
+    def bake(self) -> None:
+        """Round the weights themselves, for good."""
+        self.weight.data = self._rounded().data
+        self._is_baked = True
+
+    def _rounded(self) -> Tensor:
+        if self._is_baked:
+            return self.weight
+        weight = self.weight.detach()
+        scale = weight.abs().amax((1, 2, 3), keepdim=True).clamp_min(1e-9) / 64.0
+        return self.weight + ((weight / scale).round() * scale - weight)
+
+
 def _separable(inputs: int, outputs: int, stride: int) -> nn.Sequential:
     """Return a depthwise and a pointwise convolution, batch normalisation folded into both."""
     return nn.Sequential(
         OrderedDict(
-            depthwise=nn.Conv2d(inputs, inputs, 3, stride, 1, groups=inputs),
+            depthwise=_Conv(inputs, inputs, 3, stride, 1, groups=inputs),
             depthwise_act=nn.ReLU6(inplace=True),
-            pointwise=nn.Conv2d(inputs, outputs, 1),
+            pointwise=_Conv(inputs, outputs, 1),
             pointwise_act=nn.ReLU6(inplace=True),
         )
     )
@@ -46,7 +71,7 @@ def _separable(inputs: int, outputs: int, stride: int) -> nn.Sequential:
 
 def _normalised(inputs: int, outputs: int, size: int = 1, groups: int = 1) -> nn.Sequential:
     return nn.Sequential(
-        nn.Conv2d(inputs, outputs, size, padding=size // 2, groups=groups, bias=False),
+        _Conv(inputs, outputs, size, padding=size // 2, groups=groups, bias=False),
         nn.BatchNorm2d(outputs, momentum=0.03),
         nn.ReLU6(inplace=True),
     )
@@ -81,7 +106,7 @@ class HandNet(nn.Module):
 
     def __init__(self, frozen_blocks: int = 5) -> None:
         super().__init__()
-        self.stem = nn.Sequential(nn.Conv2d(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
+        self.stem = nn.Sequential(_Conv(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
         self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)
         self.lateral = nn.ModuleList(_normalised(_BLOCKS[tap - 1][1], _WIDTH) for tap in _TAPS)
         towers = [_tower() for _ in _TAPS]
@@ -95,6 +120,12 @@ class HandNet(nn.Module):
         self.predict.bias = nn.Parameter(torch.tensor(first_bias))
         for part in (self.stem, *self.blocks[:frozen_blocks]):
             part.requires_grad_(False)
+
+    def bake(self) -> None:
+        """Round the weights as training does, so that nothing is left to round; for export."""
+        for module in self.modules():
+            if isinstance(module, _Conv):
+                module.bake()
 
     def forward(self, images: Tensor) -> Tensor:
         """Return the raw predictions."""

@@ -55,7 +55,7 @@ class SampleSettings:
     """
 
     side_px: int = 192
-    whole_px: float = 300.0
+    whole_px: float = 332.0
     zoomed: float = 0.5
     centered: float = 0.72
     zoom_max: float = 4.0

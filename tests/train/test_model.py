@@ -37,3 +37,28 @@ def test_levels_share_what_they_look_for_but_not_how_they_are_normalised() -> No
         weights, other_weights = dict(first.named_parameters()), dict(other.named_parameters())
         assert other_weights["0.0.weight"] is weights["0.0.weight"]
         assert other_weights["0.1.weight"] is not weights["0.1.weight"]
+
+
+def test_weights_are_rounded_as_the_export_to_integers_does() -> None:
+    torch.manual_seed(0)
+    net, image = HandNet().eval(), 255.0 * torch.rand(1, 3, 64, 64)
+    layer = dict(net.named_parameters())["blocks.6.pointwise.weight"]
+    weights = layer.detach().clone()
+    with torch.inference_mode():
+        before = net(image)
+        net.bake()
+        after = net(image)
+    assert torch.equal(before, after)
+    baked = dict(net.named_parameters())["blocks.6.pointwise.weight"].detach()
+    assert not torch.equal(baked, weights)
+    steps = baked / (weights.abs().amax((1, 2, 3), keepdim=True) / 64.0)
+    assert steps.numpy() == pytest.approx(steps.round().numpy(), abs=1e-3)
+    assert steps.abs().max() == pytest.approx(64.0)
+
+
+def test_rounding_does_not_stop_gradients() -> None:
+    net = HandNet()
+    net(torch.rand(1, 3, 64, 64)).sum().backward()
+    gradient = dict(net.named_parameters())["blocks.12.pointwise.weight"].grad
+    assert gradient is not None
+    assert gradient.abs().max() > 0.0
