@@ -18,7 +18,7 @@ from handcal.evaluate.annotations import read_annotations
 from handcal.evaluate.detector import SCORE_MIN, detect_all, summary
 from handcal.evaluate.precision import MATCH_OVERLAP
 from handcal.geometry import rigid
-from handcal.hand.detect import DetectSettings, HandDetector, overlaps
+from handcal.hand.detect import Detections, DetectSettings, HandDetector, overlaps
 from handcal.hand.roi import RoiFinder
 from handcal.hand.settings import SegmentSettings
 from handcal.resources import resource_path
@@ -32,7 +32,10 @@ from handcal.types import UInt8
 
 # Luminance of the skin in even light that parts three groups of about the same size.
 _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
+# What lights leave of red, green and blue.
+_LIGHTS = {"dim": (0.3, 0.3, 0.3), "warm": (1.0, 0.75, 0.45), "cold": (0.6, 0.8, 1.0)}
 _RUNS = 50
+_ALL = DetectSettings(score_min=SCORE_MIN)
 _FRAMES, _FRAME_NS = 120, 33_333_333
 
 
@@ -47,7 +50,11 @@ def main() -> None:
         path = resource_path(model)
         figures = {
             "model": model,
-            "photographs": photographed(path, arguments.data / "val"),
+            "photographs": photographed(HandDetector(path, _ALL), arguments.data / "val"),
+            "lights": {
+                light: photographed(_InLight(path, gains), arguments.data / "val")
+                for light, gains in _LIGHTS.items()
+            },
             "simulated": simulated(HandDetector(path), pictures),
             "median_ms": latency_ms(HandDetector(path), pictures[0].color),
             "following_ms": following_ms(HandDetector(path)),
@@ -55,10 +62,21 @@ def main() -> None:
         print(json.dumps(figures))  # noqa: T201
 
 
-def photographed(model: Path, folder: Path) -> dict[str, float | None]:
+class _InLight(HandDetector):
+    """The detector before which every image is dimmed or tinted."""
+
+    def __init__(self, model: Path, gains: tuple[float, float, float]) -> None:
+        super().__init__(model, _ALL)
+        self._gains = np.array(gains)
+
+    def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
+        """Find the hands in an image as the light shows it."""
+        return super().detect((color * self._gains).astype(np.uint8), pixels)
+
+
+def photographed(detector: HandDetector, folder: Path) -> dict[str, float | None]:
     """Return the average precisions on a folder of annotated photographs."""
     photos = read_annotations(folder, folder / "annotations.json")
-    detector = HandDetector(model, DetectSettings(score_min=SCORE_MIN))
     return summary(photos, detect_all(photos, detector))
 
 
