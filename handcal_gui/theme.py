@@ -17,7 +17,7 @@ from PySide6.QtGui import (
     QPixmap,
 )
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication, QHeaderView
+from PySide6.QtWidgets import QApplication, QHeaderView, QWidget
 
 from handcal.resources import resource_path
 
@@ -184,6 +184,14 @@ def number_font(scale: float = 1.0) -> QFont:
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
     font.setPointSizeF(scale * QGuiApplication.font().pointSizeF())
     return font
+
+
+def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:
+    """Set a widget's text larger or smaller than it is."""
+    font = widget.font()
+    font.setPointSizeF(scale * font.pointSizeF())
+    font.setBold(is_bold)
+    widget.setFont(font)
 
 
 def icon(name: str, color: str = "") -> QIcon:

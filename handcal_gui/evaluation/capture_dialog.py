@@ -23,7 +23,7 @@ from handcal_gui.evaluation.entries import CubeEntries
 from handcal_gui.evaluation.preparation import PreparationDialog
 from handcal_gui.running.job_bar import JobBar
 from handcal_gui.running.latest_job import LatestJob
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, named, paragraph, whole_number
 from handcal_gui.widgets.finding_line import FindingLine
@@ -178,10 +178,7 @@ class CaptureDialog(PreparationDialog):
         return f"{instruction(self._list.chosen)}."
 
     def _lay_out(self) -> None:
-        font = self._instruction.font()
-        font.setPointSizeF(1.6 * font.pointSizeF())
-        font.setBold(True)
-        self._instruction.setFont(font)
+        scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
         middle = QHBoxLayout()
         middle.setSpacing(2 * SPACING_PX)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.evaluation.entries import EvaluationEntries
 from handcal_gui.evaluation.evaluation_page import EvaluationPage, Offer
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import named
 
 _FIRST_SIZE = QSize(1240, 860)
@@ -125,10 +125,7 @@ class EvaluationWindow(QDialog):
             self.stop()
 
     def _lay_out(self) -> None:
-        font = self._title.font()
-        font.setPointSizeF(1.6 * font.pointSizeF())
-        font.setBold(True)
-        self._title.setFont(font)
+        scale_font(self._title, 1.6, is_bold=True)
         self._rail.setFixedWidth(_RAIL_PX)
         right = QVBoxLayout()
         right.setSpacing(SPACING_PX)

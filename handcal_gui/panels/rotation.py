@@ -14,7 +14,7 @@ from handcal.snapshot import Procedure, Snapshot
 from handcal.types import Float64
 from handcal_gui.rotation.dial import RotationDial
 from handcal_gui.rotation.turning_hand import TurningHand
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence
 
@@ -140,8 +140,6 @@ def _text_label(name: str, scale: float = 1.0) -> QLabel:
     label.setTextFormat(Qt.TextFormat.PlainText)
     label.setWordWrap(True)
     label.setAlignment(Qt.AlignmentFlag.AlignTop)
-    font = label.font()
-    font.setPointSizeF(scale * font.pointSizeF())
-    label.setFont(font)
+    scale_font(label, scale)
     label.setMinimumHeight(2 * label.fontMetrics().lineSpacing())
     return label

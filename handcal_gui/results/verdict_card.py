@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 
 from handcal.types import Eye, Verdict
 from handcal_gui.results.rows import EYE_NAMES, NOTHING, VERDICT_WORDS
-from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.theme import SPACING_PX, colors, scale_font
 from handcal_gui.widgets.sentence import sentence
 
 _ROLES = {"accept": "good", "repeat": "warning", "implausible": "red"}
@@ -24,10 +24,7 @@ class VerdictCard(QFrame):
         self.setFrameShape(QFrame.Shape.StyledPanel)
         self._verdict: Verdict | None = None
         self._word = QLabel()
-        font = self._word.font()
-        font.setBold(True)
-        font.setPointSizeF(1.25 * font.pointSizeF())
-        self._word.setFont(font)
+        scale_font(self._word, 1.25, is_bold=True)
         self._reason = QLabel()
         self._reason.setTextFormat(Qt.TextFormat.PlainText)
         self._reason.setWordWrap(True)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWi
 from handcal.results import Results
 from handcal.session import SessionRecord
 from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.times import local_time
@@ -32,10 +32,7 @@ class ReviewPage(QWidget):
         super().__init__(parent)
         self.setObjectName("reviewPage")
         self._title = QLabel()
-        font = self._title.font()
-        font.setPointSizeF(1.6 * font.pointSizeF())
-        font.setBold(True)
-        self._title.setFont(font)
+        scale_font(self._title, 1.6, is_bold=True)
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)

@@ -26,7 +26,7 @@ from handcal_gui.rig.result_page import ResultPage
 from handcal_gui.rig.stereo_page import StereoPage
 from handcal_gui.rig.viewpoint_page import ViewpointPage
 from handcal_gui.rig.work import WorkFolder
-from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, named
 
@@ -184,10 +184,7 @@ class RigWizard(QDialog):
         return "good" if verdicts == {"good"} else ""
 
     def _lay_out(self) -> None:
-        font = self._title.font()
-        font.setPointSizeF(1.6 * font.pointSizeF())
-        font.setBold(True)
-        self._title.setFont(font)
+        scale_font(self._title, 1.6, is_bold=True)
         self._rail.setFixedWidth(_RAIL_PX)
         self._rail.setSpacing(SPACING_PX // 2)
         self._rail.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, icon, scale_font
 from handcal_gui.widgets.fields import paragraph
 
 
@@ -26,10 +26,7 @@ class Card(QFrame):
         self._icon_name = icon_name
         self._icon = QLabel()
         heading = QLabel(title)
-        font = heading.font()
-        font.setPointSizeF(1.3 * font.pointSizeF())
-        font.setBold(True)
-        heading.setFont(font)
+        scale_font(heading, 1.3, is_bold=True)
         head = QGridLayout()
         head.setHorizontalSpacing(SPACING_PX)
         head.setVerticalSpacing(SPACING_PX // 2)

@@ -16,7 +16,7 @@ from handcal_gui.start.card import Card
 from handcal_gui.start.new_calibration import Check, NewCalibration
 from handcal_gui.start.session_entries import Offers, find_offers
 from handcal_gui.start.session_list import SessionList
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button
 
 FindOffers = Callable[[Path, Sequence[Path]], Offers]
@@ -156,10 +156,7 @@ class StartPage(QWidget):
 
     def _lay_out(self) -> None:
         title = QLabel("handcal")
-        font = title.font()
-        font.setPointSizeF(2.0 * font.pointSizeF())
-        font.setBold(True)
-        title.setFont(font)
+        scale_font(title, 2.0, is_bold=True)
         right = QVBoxLayout()
         right.setSpacing(2 * SPACING_PX)
         right.addWidget(self._resume, 1)

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 
 Field = TypeVar("Field", bound=QWidget)
 Spin = TypeVar("Spin", bound=QAbstractSpinBox)
@@ -75,10 +75,7 @@ class MainButton(QPushButton):
 def main_button(name: str, text: str = "") -> MainButton:
     """Return a page's main button: large, and what Enter presses."""
     made = named(MainButton(text, autoDefault=True), name, text)
-    font = made.font()
-    font.setPointSizeF(1.2 * font.pointSizeF())
-    font.setBold(True)
-    made.setFont(font)
+    scale_font(made, 1.2, is_bold=True)
     made.setMinimumHeight(5 * SPACING_PX)
     made.setDefault(True)
     return made

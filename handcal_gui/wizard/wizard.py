@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.snapshot import Snapshot
-from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.widgets.fields import button, main_button
 from handcal_gui.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard
 
@@ -87,13 +87,8 @@ class WizardPanel(QWidget):
             self._refresh(self.shown)
 
     def _lay_out(self) -> None:
-        font = self._title.font()
-        font.setPointSizeF(1.6 * font.pointSizeF())
-        font.setBold(True)
-        self._title.setFont(font)
-        font = self._sentence.font()
-        font.setPointSizeF(1.2 * font.pointSizeF())
-        self._sentence.setFont(font)
+        scale_font(self._title, 1.6, is_bold=True)
+        scale_font(self._sentence, 1.2)
         self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         # Two lines always, so that what is below stays where it is.
         self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
@@ -173,10 +168,8 @@ class _Rail(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
         self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
-        font = self.font()
-        font.setPointSizeF(0.85 * font.pointSizeF())
         for label in self._labels.values():
-            label.setFont(font)
+            scale_font(label, 0.85)
             label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             layout.addWidget(label)
 
