@@ -34,7 +34,7 @@ class DetectSettings:
         At most so many hands are returned.
     """
 
-    pixels: int = 92_160
+    pixels: int = 110_592
     score_min: float = 0.3
     overlap_max: float = 0.4
     hands: int = 20

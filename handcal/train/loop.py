@@ -51,7 +51,7 @@ class TrainSettings:
 
     seed: int = 1
     steps: int = 60_000
-    batch: int = 8
+    batch: int = 4
     rate: float = 1e-3
     backbone_rate: float = 3e-4
     rise: float = 0.03

@@ -54,7 +54,7 @@ class SampleSettings:
         Shares of samples that are simulated pictures, and photographs with a simulated hand.
     """
 
-    side_px: int = 192
+    side_px: int = 288
     whole_px: float = 332.0
     zoomed: float = 0.5
     centered: float = 0.72
