@@ -30,6 +30,9 @@ class DetectSettings:
     overlap_max : float
         Of two candidates whose intersection over union is larger, the one with the lower score is
         dropped.
+    agreement_min : float
+        A hand's box is the mean of the candidates, weighted by score, whose intersection over union
+        with the best is as large (box voting, Gidaris & Komodakis 2015).
     hands : int
         At most so many hands are returned.
     """
@@ -37,6 +40,7 @@ class DetectSettings:
     pixels: int = 110_592
     score_min: float = 0.3
     overlap_max: float = 0.4
+    agreement_min: float = 0.6
     hands: int = 20
 
 
@@ -167,7 +171,7 @@ def decode(
 ) -> tuple[Float64, Float64]:
     """Return the boxes (N, 4) in the canvas and scores (N,) of raw predictions (5, P).
 
-    Sorted by score, the best first, after non-maximum suppression.
+    Sorted by score, the best first, after non-maximum suppression and box voting.
     """
     logit_min = np.log(settings.score_min / (1.0 - settings.score_min))
     kept = np.flatnonzero(raw[0] > logit_min)
@@ -175,8 +179,10 @@ def decode(
     at, strides = (values[kept] for values in points(*canvas_shape))
     left, top, right, bottom = np.exp(raw[1:, kept].astype(np.float64).clip(-6.0, 6.0)) * strides
     boxes = np.stack([at[:, 0] - left, at[:, 1] - top, at[:, 0] + right, at[:, 1] + bottom], axis=1)
+    scores = 1.0 / (1.0 + np.exp(-raw[0, kept].astype(np.float64)))
     chosen = _suppress(boxes, settings.overlap_max, settings.hands)
-    return boxes[chosen], 1.0 / (1.0 + np.exp(-raw[0, kept][chosen].astype(np.float64)))
+    votes = (overlaps(boxes[chosen], boxes) >= settings.agreement_min) * scores
+    return votes @ boxes / votes.sum(axis=1, keepdims=True), scores[chosen]
 
 
 def overlaps(boxes: Float64, others: Float64) -> Float64:

@@ -74,9 +74,17 @@ def test_boxes_come_back_the_surest_first() -> None:
     assert scores == pytest.approx([1 / (1 + np.exp(-2)), 0.5])
 
 
-def test_of_two_boxes_on_one_hand_the_surer_remains() -> None:
+def test_boxes_that_agree_are_averaged_by_their_scores() -> None:
     boxes, scores = decoded((30, 1.0, [0, 5, 50, 40]), (29, 2.0, [0, 5, 52, 40]))
-    assert boxes == pytest.approx(np.array([[0, 5, 52, 40]]), abs=1e-3)
+    less, more = 1 / (1 + np.exp(-1)), 1 / (1 + np.exp(-2))
+    mean = (less * 50 + more * 52) / (less + more)
+    assert boxes == pytest.approx(np.array([[0, 5, mean, 40]]), abs=1e-3)
+    assert scores == pytest.approx([more])
+
+
+def test_of_two_boxes_that_share_half_the_surer_remains() -> None:
+    boxes, scores = decoded((30, 1.0, [0, 5, 50, 40]), (29, 2.0, [0, 5, 90, 40]))
+    assert boxes == pytest.approx(np.array([[0, 5, 90, 40]]), abs=1e-3)
     assert len(scores) == 1
 
 

@@ -73,6 +73,7 @@ def test_a_sample_is_the_same_every_time(samples: dict[str, Samples]) -> None:
 def test_a_batch_keeps_pictures_and_boxes_together(samples: dict[str, Samples]) -> None:
     drawn = [samples["simulated"][index] for index in range(3)]
     images, boxes = collate(drawn)
-    assert images.shape == (3, 3, 192, 192)
+    side_px = SampleSettings().side_px
+    assert images.shape == (3, 3, side_px, side_px)
     assert (images[1].numpy().transpose(1, 2, 0) == drawn[1][0]).all()
     assert [len(part) for part in boxes] == [len(part) for _, part in drawn]
