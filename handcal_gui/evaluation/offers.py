@@ -37,7 +37,7 @@ def make_offers() -> Mapping[str, Offer]:
         "noise": Offer(
             "Noise study",
             "How much rotation and noise do the solvers bear, and when do they leave the paper's "
-            "4 mm? A quarter of an hour on two cores; a quick look, half a minute.",
+            "4 mm? About ten minutes on two cores; a quick look, half a minute.",
             SimulatedStudy(_noise, noise_report),
             _noise_form,
         ),
