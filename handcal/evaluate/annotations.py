@@ -1,7 +1,8 @@
 """Annotated photographs of hands, in the format of the Oxford Hands data as handcal keeps it.
 
 A JSON object: file name to ``width``, ``height`` and ``hands``, each hand with ``box`` [x0, y0, x1,
-y1], ``quad`` (its four corners) and ``large``.
+y1], ``quad`` (its four corners) and ``large``. The data set counts pixels from 1: (1, 1) is the
+middle of the first.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from handcal.files import read_json
 from handcal.image_file import read_image
 from handcal.types import Bool, Float64, UInt8
 
+_CORNER = 0.5  # the image's upper left corner, counted so
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
@@ -28,7 +31,7 @@ class Photo:
     path : Path
     width, height : int
     boxes : (M, 4) float64
-        x0, y0, x1, y1 of each hand, px.
+        x0, y0, x1, y1 of each hand, px from the image's upper left corner.
     quads : (M, 4, 2) float64
         The same hands' corners, px.
     large : (M,) bool
@@ -89,8 +92,8 @@ def _photo(path: Path, entry: dict[str, Any]) -> Photo:
     width, height = int(entry["width"]), int(entry["height"])
     if width < 1 or height < 1:
         raise ValueError(f"{path.name} is {width}x{height} pixels large")
-    boxes = np.array([hand["box"] for hand in hands], np.float64).reshape(-1, 4)
-    quads = np.array([hand["quad"] for hand in hands], np.float64).reshape(-1, 4, 2)
+    boxes = np.array([hand["box"] for hand in hands], np.float64).reshape(-1, 4) - _CORNER
+    quads = np.array([hand["quad"] for hand in hands], np.float64).reshape(-1, 4, 2) - _CORNER
     if not (np.isfinite(boxes).all() and np.isfinite(quads).all()):
         raise ValueError(f"{path.name} has a hand that is nowhere")
     return Photo(

@@ -13,7 +13,7 @@ from handcal.train.loop import Pace, Training, TrainSettings
 from handcal.train.model import HandNet
 from handcal.train.simulated import render_hands
 
-_SIMULATED = 1500
+_SIMULATED = 1800
 
 
 def main() -> None:

@@ -1,4 +1,7 @@
-"""Random views of a picture, as a headset's camera might have taken it."""
+"""Random views of a picture, as a headset's camera might have taken it.
+
+Maps and boxes count pixels from the image's upper left corner.
+"""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ class HandNet(nn.Module):
         That many of the first blocks, and the convolution before them, are not trained.
     """
 
-    def __init__(self, frozen_blocks: int = 5) -> None:
+    def __init__(self, frozen_blocks: int = 3) -> None:
         super().__init__()
         self.stem = nn.Sequential(_Conv(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
         self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)

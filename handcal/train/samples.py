@@ -60,8 +60,8 @@ class SampleSettings:
     centered: float = 0.72
     zoom_max: float = 4.0
     large_weight: float = 2.0
-    simulated: float = 0.06
-    pasted: float = 0.06
+    simulated: float = 0.1
+    pasted: float = 0.08
 
 
 class Samples(Dataset[tuple[UInt8, Float32]]):
@@ -165,7 +165,11 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         scale = np.sqrt(abs(np.linalg.det(warp[:, :2])))
         smooth = cv2.GaussianBlur(image, (0, 0), 0.35 / scale) if scale < 0.6 else image
         fill = _GRAY if border is None else (border,) * 4
-        square = cv2.warpAffine(smooth, warp, (side, side), borderValue=fill)
+        # OpenCV counts from the middle of the first pixel.
+        offset = warp[:, 2] + warp[:, :2] @ (0.5, 0.5) - 0.5
+        square = cv2.warpAffine(
+            smooth, np.column_stack([warp[:, :2], offset]), (side, side), borderValue=fill
+        )
         return square.astype(np.uint8, copy=False)
 
     def _clipped(self, boxes: Float64) -> Float32:

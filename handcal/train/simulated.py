@@ -21,6 +21,7 @@ CAMERA = Intrinsics(width=424, height=240, fx=306.0, fy=306.0, cx=211.5, cy=119.
 _FIRST_SEED = 1_000_000  # tests and benchmarks count from 0
 _HANDS_PER_ROOM = 25
 _GRID_M = 0.003
+_TILT = 1.6  # foreshortened hands are the hardest to find
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +35,8 @@ class Picture:
     is_hand : (H, W) bool
         The hand and its forearm.
     box : (4,) float64
-        x0, y0, x1, y1 about the hand without its forearm, px; may reach beyond the image.
+        x0, y0, x1, y1 about the hand without its forearm, px from the image's upper left corner;
+        may reach beyond the image.
     skin : (3,) float64
         Mean colour of the skin in even light, RGB of 0 to 255.
     """
@@ -45,12 +47,17 @@ class Picture:
     skin: Float64
 
 
-def picture(seed: int, room: Room, camera: Intrinsics, settings: HandSettings) -> Picture:
-    """Draw the hand of a seed, raised somewhere before a camera in a room."""
+def picture(
+    seed: int, room: Room, camera: Intrinsics, settings: HandSettings, tilt: float = 1.0
+) -> Picture:
+    """Draw the hand of a seed, raised somewhere before a camera in a room.
+
+    With a larger `tilt`, hands are more often seen foreshortened than a wearer's are.
+    """
     rng = np.random.default_rng(seed)
     hand = make_hand(seed, settings)
     T_W_D = rigid([rng.normal(0.0, 0.2), rng.uniform(-3.1, 3.1), 0.0])
-    T_D_hand = _raised(rng, camera)
+    T_D_hand = _raised(rng, camera, tilt)
     _, color = render(World(hand, room), T_W_D, T_W_D @ T_D_hand, camera)
     drawn = draw_hand(hand, T_D_hand, camera)
     rows, columns = drawn.depth_m.shape
@@ -72,7 +79,7 @@ def render_hands(folder: Path, count: int) -> None:
         seed = _FIRST_SEED + number
         if number % _HANDS_PER_ROOM == 0:
             room = make_room(seed)
-        drawn = picture(seed, room, CAMERA, HandSettings(grid_m=_GRID_M))
+        drawn = picture(seed, room, CAMERA, HandSettings(grid_m=_GRID_M), _TILT)
         name = f"{number:05}.png"
         boxes[name] = drawn.box.round(1).tolist()
         alpha = np.where(drawn.is_hand, np.uint8(255), np.uint8(0))
@@ -85,15 +92,15 @@ def _hand_box(hand: HandModel, T_D_hand: Float64, camera: Intrinsics) -> Float64
     beyond_wrist = (hand.vertices_m - hand.wrist_m) @ hand.arm_axis < 0.0
     x, y, z = transform(T_D_hand, hand.vertices_m[beyond_wrist].astype(np.float64)).T
     u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-    return np.array([u.min(), v.min(), u.max(), v.max()])
+    return np.array([u.min(), v.min(), u.max(), v.max()]) + 0.5  # u, v: from a pixel's middle
 
 
-def _raised(rng: np.random.Generator, camera: Intrinsics) -> Float64:
+def _raised(rng: np.random.Generator, camera: Intrinsics, tilt: float) -> Float64:
     """Return the pose of a hand in view, within arm's reach, palm or back to the camera."""
     z = rng.uniform(0.3, 0.7)
     x = z * rng.uniform(0.15, 0.85) * camera.width / camera.fx - z * camera.cx / camera.fx
     y = z * rng.uniform(0.3, 0.75) * camera.height / camera.fy - z * camera.cy / camera.fy
     facing = rigid([0.0, np.pi * rng.integers(2), 0.0])
-    tilted = rigid([rng.normal(0.0, 0.35), rng.normal(0.0, 0.4), 0.0])
+    tilted = rigid([tilt * rng.normal(0.0, 0.35), tilt * rng.normal(0.0, 0.4), 0.0])
     rolled = rigid([0.0, 0.0, rng.normal(0.0, 0.6)])
     return rigid(translation_m=[x, y, z]) @ rolled @ tilted @ facing

@@ -25,7 +25,7 @@ def test_reads_what_the_data_set_says(tmp_path: Path) -> None:
     entry = {"width": 100, "height": 80, "hands": [HAND]}
     [photo] = read_annotations(tmp_path, write(tmp_path, {"a.jpg": entry}))
     assert photo.path == tmp_path / "a.jpg"
-    assert photo.boxes.tolist() == [HAND["box"]]
+    assert photo.boxes.tolist() == [[9.5, 19.5, 29.5, 59.5]]  # the file counts pixels from 1
     assert photo.quads.shape == (1, 4, 2)
     assert photo.large.tolist() == [True]
     assert photo.relative_sizes == pytest.approx(np.sqrt(20 * 40 / 8000))

@@ -57,6 +57,25 @@ def test_boxes_are_where_the_hand_is(samples: dict[str, Samples], kind: str) -> 
     assert checked > 10
 
 
+@pytest.mark.parametrize("kind", ["photographed", "simulated"])
+def test_boxes_are_on_the_hand_to_a_fraction_of_a_pixel(
+    samples: dict[str, Samples], kind: str
+) -> None:
+    """Mirrored or not: what is off by a pixel one way is off the other way in the mirror."""
+    off = []
+    for index in range(60):
+        image, boxes = samples[kind][index]
+        gray = image.mean(2)
+        if not len(boxes) or boxes[0, :4].min() < 5 or boxes[0, :4].max() > len(image) - 5:
+            continue
+        level = 0.25 * gray.min() + 0.75 * gray.max()  # beyond the image is gray
+        bright = np.argwhere(gray > level)[:, ::-1] + 0.5
+        center = (boxes[0, :2] + boxes[0, 2:4]) / 2
+        off.append(bright.mean(0) - center)
+    assert len(off) > 10
+    assert np.median(np.abs(off), axis=0) == pytest.approx([0.0, 0.0], abs=0.15)
+
+
 def test_a_pasted_hand_is_one_more(samples: dict[str, Samples]) -> None:
     without = [len(samples["photographed"][index][1]) for index in range(30)]
     pasted = [len(samples["pasted"][index][1]) for index in range(30)]
