@@ -76,7 +76,7 @@ class Pace:
     """
 
     checkpoint_s: float = 180.0
-    validate_steps: int = 1000
+    validate_steps: int = 2000
     threads: int = 1
     workers: int = 1
 
