@@ -51,7 +51,7 @@ class Detections:
     Attributes
     ----------
     boxes_px : (N, 4) float64
-        x0, y0, x1, y1.
+        x0, y0, x1, y1 from the image's upper left corner.
     scores : (N,) float64
         0 to 1: the overlap with the true box that the network expects.
     """
