@@ -33,9 +33,6 @@ class DetectSettings:
     agreement_min : float
         A hand's box is the mean of the candidates, weighted by score, whose intersection over union
         with the best is as large (box voting, Gidaris & Komodakis 2015).
-    shrinking : float
-        Share by which that box's sides are then shortened: over photographs trained on, too, the
-        network's boxes are larger than the annotated ones.
     hands : int
         At most so many hands are returned.
     """
@@ -43,8 +40,7 @@ class DetectSettings:
     pixels: int = 110_592
     score_min: float = 0.3
     overlap_max: float = 0.4
-    agreement_min: float = 0.7
-    shrinking: float = 0.03
+    agreement_min: float = 0.6
     hands: int = 20
 
 
@@ -175,7 +171,7 @@ def decode(
 ) -> tuple[Float64, Float64]:
     """Return the boxes (N, 4) in the canvas and scores (N,) of raw predictions (5, P).
 
-    Sorted by score, the best first, after non-maximum suppression, box voting and shrinking.
+    Sorted by score, the best first, after non-maximum suppression and box voting.
     """
     logit_min = np.log(settings.score_min / (1.0 - settings.score_min))
     kept = np.flatnonzero(raw[0] > logit_min)
@@ -186,9 +182,7 @@ def decode(
     scores = 1.0 / (1.0 + np.exp(-raw[0, kept].astype(np.float64)))
     chosen = _suppress(boxes, settings.overlap_max, settings.hands)
     votes = (overlaps(boxes[chosen], boxes) >= settings.agreement_min) * scores
-    voted = votes @ boxes / votes.sum(axis=1, keepdims=True)
-    inset = settings.shrinking / 2.0 * (voted[:, 2:] - voted[:, :2])
-    return voted + np.concatenate([inset, -inset], axis=1), scores[chosen]
+    return votes @ boxes / votes.sum(axis=1, keepdims=True), scores[chosen]
 
 
 def overlaps(boxes: Float64, others: Float64) -> Float64:

@@ -30,11 +30,8 @@ def predictions(*found: tuple[int, float, list[float]]) -> Float32:
     return raw
 
 
-def decoded(
-    *found: tuple[int, float, list[float]], shrinking: float = 0.0
-) -> tuple[Float64, Float64]:
-    settings = DetectSettings(score_min=0.3, overlap_max=0.5, shrinking=shrinking)
-    return decode(predictions(*found), SHAPE, settings)
+def decoded(*found: tuple[int, float, list[float]]) -> tuple[Float64, Float64]:
+    return decode(predictions(*found), SHAPE, DetectSettings(score_min=0.3, overlap_max=0.5))
 
 
 @pytest.mark.parametrize("shape", [(720, 1280), (480, 640), (512, 300), (33, 47), (4, 3000)])
@@ -89,11 +86,6 @@ def test_of_two_boxes_that_share_half_the_surer_remains() -> None:
     boxes, scores = decoded((30, 1.0, [0, 5, 50, 40]), (29, 2.0, [0, 5, 90, 40]))
     assert boxes == pytest.approx(np.array([[0, 5, 90, 40]]), abs=1e-3)
     assert len(scores) == 1
-
-
-def test_boxes_shrink_about_their_center() -> None:
-    boxes, _ = decoded((30, 0.0, [0, 10, 80, 50]), shrinking=0.1)
-    assert boxes == pytest.approx(np.array([[4, 12, 76, 48]]), abs=1e-3)
 
 
 def test_doubtful_points_see_nothing() -> None:
