@@ -107,7 +107,7 @@ def blemish(rng: np.random.Generator, image: MatLike) -> MatLike:
     if rng.random() < 0.15:
         image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 2.0))
     if rng.random() < 0.1:
-        length = int(rng.integers(3, 10))
+        length = 2 * int(rng.integers(1, 5)) + 1  # odd, so that nothing is shifted
         line = np.zeros((length, length), np.float32)
         cv2.line(line, (0, length // 2), (length - 1, length // 2), 1.0)
         turn = cv2.getRotationMatrix2D((length / 2 - 0.5,) * 2, rng.uniform(0, 180), 1.0)

@@ -67,3 +67,13 @@ def test_light_and_blemishes_keep_the_picture_a_picture(seed: int) -> None:
     changed = blemish(rng, relight(rng, image))
     assert changed.shape == image.shape
     assert changed.dtype == np.uint8
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_blemishes_shift_nothing(seed: int) -> None:
+    rows, columns = np.mgrid[:64, :64] * 4
+    ramps = np.stack([rows, columns, rows], axis=2).astype(np.uint8)
+    inner = np.s_[8:-8, 8:-8]
+    blemished = blemish(np.random.default_rng(seed), ramps)
+    shift_px = (blemished[inner].mean((0, 1)) - ramps[inner].mean((0, 1))) / 4.0
+    assert shift_px == pytest.approx(np.zeros(3), abs=0.25)
