@@ -21,12 +21,11 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.detector import load_detector
     from handcal.evaluate.annotations import read_annotations
     from handcal.evaluate.contact_sheet import write_contact_sheet
-    from handcal.evaluate.detector import SCORE_MIN, detect_all, evaluation
-    from handcal.hand.detect import DetectSettings, HandDetector
+    from handcal.evaluate.detector import EVALUATED, detect_all, evaluation
+    from handcal.hand.detect import HandDetector
 
-    settings = DetectSettings(score_min=SCORE_MIN)
     model = arguments.model
-    finder = load_detector(settings) if model is None else HandDetector(model, settings)
+    finder = load_detector(EVALUATED) if model is None else HandDetector(model, EVALUATED)
     photos = read_annotations(arguments.images, arguments.annotations)
     with progress() as report:
         results = detect_all(photos, finder, lambda share: report("Looking for hands", share))

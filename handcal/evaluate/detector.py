@@ -15,10 +15,10 @@ from handcal.evaluate.precision import (
     PrecisionRecall,
     precision_recall,
 )
-from handcal.hand.detect import overlaps
+from handcal.hand.detect import CANDIDATE_SCORE_MIN, DetectSettings, overlaps
 from handcal.hand.roi import Detector
 
-SCORE_MIN = 0.02
+EVALUATED = DetectSettings(score_min=CANDIDATE_SCORE_MIN)
 """A precision/recall curve wants the doubtful detections too."""
 
 _CURVE_POINTS = 200

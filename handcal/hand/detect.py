@@ -14,6 +14,9 @@ from handcal.types import Float32, Float64, UInt8, freeze
 STRIDES = (8, 16, 32)
 """Pixels between the network's points on its three levels."""
 
+CANDIDATE_SCORE_MIN = 0.02
+"""What the network is less sure of has no say in where hands are."""
+
 _GRAY = 127  # what the network's zero padding looks like
 
 
@@ -26,22 +29,22 @@ class DetectSettings:
     pixels : int
         The network sees the image shrunk or grown to at most so many pixels.
     score_min : float
-        Candidates with a lower score are dropped.
+        Hands with a lower score are not returned; `CANDIDATE_SCORE_MIN` at least.
     overlap_max : float
         Of two candidates whose intersection over union is larger, the one with the lower score is
         dropped.
     agreement_min : float
         A hand's box is the mean of the candidates, weighted by score, whose intersection over union
-        with the best is as large (box voting, Gidaris & Komodakis 2015).
+        with the best is as large (box voting, Gidaris & Komodakis 2015), whatever `score_min` is.
     hands : int
-        At most so many hands are returned.
+        At most so many hands are returned, as in COCO's average precision.
     """
 
     pixels: int = 110_592
     score_min: float = 0.3
     overlap_max: float = 0.4
     agreement_min: float = 0.6
-    hands: int = 20
+    hands: int = 100
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,14 +176,15 @@ def decode(
 
     Sorted by score, the best first, after non-maximum suppression and box voting.
     """
-    logit_min = np.log(settings.score_min / (1.0 - settings.score_min))
+    logit_min = np.log(CANDIDATE_SCORE_MIN / (1.0 - CANDIDATE_SCORE_MIN))
     kept = np.flatnonzero(raw[0] > logit_min)
     kept = kept[np.argsort(-raw[0, kept], kind="stable")][:1000]
     at, strides = (values[kept] for values in points(*canvas_shape))
     left, top, right, bottom = np.exp(raw[1:, kept].astype(np.float64).clip(-6.0, 6.0)) * strides
     boxes = np.stack([at[:, 0] - left, at[:, 1] - top, at[:, 0] + right, at[:, 1] + bottom], axis=1)
     scores = 1.0 / (1.0 + np.exp(-raw[0, kept].astype(np.float64)))
-    chosen = _suppress(boxes, settings.overlap_max, settings.hands)
+    sure = boxes[: np.count_nonzero(scores >= settings.score_min)]
+    chosen = _suppress(sure, settings.overlap_max, settings.hands)
     votes = (overlaps(boxes[chosen], boxes) >= settings.agreement_min) * scores
     return votes @ boxes / votes.sum(axis=1, keepdims=True), scores[chosen]
 

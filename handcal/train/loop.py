@@ -17,9 +17,9 @@ from torch.utils.data import DataLoader
 
 from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo
-from handcal.evaluate.detector import SCORE_MIN, summary
+from handcal.evaluate.detector import EVALUATED, summary
 from handcal.evaluate.precision import ImageResult
-from handcal.hand.detect import DetectSettings, decode, letterbox, points
+from handcal.hand.detect import decode, letterbox, points
 from handcal.train.loss import Grid, detection_loss
 from handcal.train.model import HandNet
 from handcal.train.samples import Samples, SampleSettings, collate
@@ -140,7 +140,7 @@ class Training:
             if time.monotonic() - saved_s > self._pace.checkpoint_s:
                 self._save()
                 saved_s = time.monotonic()
-            if self._step % self._pace.validate_steps == 0:
+            if self._step % self._pace.validate_steps == 0 and self._step < self._settings.steps:
                 self._log(**self.validate(validated))
         self._save()
         self._log(**self.validate(validated))
@@ -149,14 +149,13 @@ class Training:
     def validate(self, photos: Sequence[Photo]) -> dict[str, float | None]:
         """Return the averaged network's average precisions on whole photographs."""
         net = self._average.module.eval()
-        settings = DetectSettings(score_min=SCORE_MIN)
         results = []
         for photo in photos:
-            canvas, scale = letterbox(photo.read(), settings.pixels)
+            canvas, scale = letterbox(photo.read(), EVALUATED.pixels)
             image = torch.from_numpy(canvas).to(self._device).permute(2, 0, 1)[None].float()
             with torch.inference_mode():
                 raw = net(image)[0].float().cpu().numpy()
-            boxes, scores = decode(raw, canvas.shape[:2], settings)
+            boxes, scores = decode(raw, canvas.shape[:2], EVALUATED)
             results.append(ImageResult(boxes / scale, scores, photo.boxes))
         return summary(photos, results)
 

@@ -15,10 +15,10 @@ import numpy as np
 from handcal.camera.synthetic import SyntheticCamera
 from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
 from handcal.evaluate.annotations import read_annotations
-from handcal.evaluate.detector import SCORE_MIN, detect_all, summary
+from handcal.evaluate.detector import EVALUATED, detect_all, summary
 from handcal.evaluate.precision import MATCH_OVERLAP
 from handcal.geometry import rigid
-from handcal.hand.detect import Detections, DetectSettings, HandDetector, overlaps
+from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.roi import RoiFinder
 from handcal.hand.settings import SegmentSettings
 from handcal.resources import resource_path
@@ -35,7 +35,6 @@ _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
 # What lights leave of red, green and blue.
 _LIGHTS = {"dim": (0.3, 0.3, 0.3), "warm": (1.0, 0.75, 0.45), "cold": (0.6, 0.8, 1.0)}
 _RUNS = 50
-_ALL = DetectSettings(score_min=SCORE_MIN)
 _FRAMES, _FRAME_NS = 120, 33_333_333
 
 
@@ -50,7 +49,7 @@ def main() -> None:
         path = resource_path(model)
         figures = {
             "model": model,
-            "photographs": photographed(HandDetector(path, _ALL), arguments.data / "val"),
+            "photographs": photographed(HandDetector(path, EVALUATED), arguments.data / "val"),
             "lights": {
                 light: photographed(_InLight(path, gains), arguments.data / "val")
                 for light, gains in _LIGHTS.items()
@@ -66,7 +65,7 @@ class _InLight(HandDetector):
     """The detector before which every image is dimmed or tinted."""
 
     def __init__(self, model: Path, gains: tuple[float, float, float]) -> None:
-        super().__init__(model, _ALL)
+        super().__init__(model, EVALUATED)
         self._gains = np.array(gains)
 
     def detect(self, color: UInt8, pixels: int | None = None) -> Detections:

@@ -82,6 +82,14 @@ def test_boxes_that_agree_are_averaged_by_their_scores() -> None:
     assert scores == pytest.approx([more])
 
 
+def test_a_doubtful_candidate_has_its_say_but_is_no_hand() -> None:
+    boxes, scores = decoded((30, -1.0, [0, 5, 50, 40]), (29, 2.0, [0, 5, 52, 40]))
+    less, more = 1 / (1 + np.exp(1)), 1 / (1 + np.exp(-2))
+    mean = (less * 50 + more * 52) / (less + more)
+    assert boxes == pytest.approx(np.array([[0, 5, mean, 40]]), abs=1e-3)
+    assert len(scores) == 1
+
+
 def test_of_two_boxes_that_share_half_the_surer_remains() -> None:
     boxes, scores = decoded((30, 1.0, [0, 5, 50, 40]), (29, 2.0, [0, 5, 90, 40]))
     assert boxes == pytest.approx(np.array([[0, 5, 90, 40]]), abs=1e-3)
