@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from handcal.cube_commands import add_cube_commands
-from handcal.files import make_folder
+from handcal.files import make_folder, require_suffix
 from handcal.terminal import Commands, Parser, add_command, console, progress, save, table
 
 
@@ -24,16 +24,15 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.evaluate.detector import EVALUATED, detect_all, evaluation
     from handcal.hand.detect import HandDetector
 
+    if arguments.sheet is not None:  # before the long work, lest its result is lost
+        require_suffix(arguments.sheet, ".png")
+        make_folder(arguments.sheet.parent)
     model = arguments.model
     finder = load_detector(EVALUATED) if model is None else HandDetector(model, EVALUATED)
     photos = read_annotations(arguments.images, arguments.annotations)
     with progress() as report:
         results = detect_all(photos, finder, lambda share: report("Looking for hands", share))
     result = evaluation(photos, results)
-    save(arguments.json, result)
-    if arguments.sheet is not None:
-        make_folder(arguments.sheet.parent)
-        write_contact_sheet(arguments.sheet, photos, results)
     shown_table = table("hands", "AP at IoU 0.5")
     for key, name in (
         ("ap50", "all"),
@@ -44,6 +43,9 @@ def detector(arguments: argparse.Namespace) -> None:
         shown_table.add_row(name, "–" if result[key] is None else f"{result[key]:.4g}")
     console.print(shown_table)
     console.print(f"{result['hands']} hands in {result['images']} photographs")
+    save(arguments.json, result)
+    if arguments.sheet is not None:
+        write_contact_sheet(arguments.sheet, photos, results)
 
 
 def users(arguments: argparse.Namespace) -> None:
@@ -87,7 +89,7 @@ def add_evaluate_commands(commands: Commands) -> None:
     one = add_command(commands, detector)
     one.add_argument("--images", type=Path, required=True, help="folder of photographs")
     one.add_argument("--annotations", type=Path, required=True, help="JSON: the hands in them")
-    one.add_argument("--sheet", type=Path, metavar="FILE", help="picture of the worst failures")
+    one.add_argument("--sheet", type=Path, metavar="FILE", help="PNG of the worst failures")
     one.add_argument("--model", type=Path, metavar="FILE", help="ONNX; the shipped one if absent")
 
     one = add_command(commands, users)

@@ -20,6 +20,7 @@ from handcal.image_file import read_image
 from handcal.types import Bool, Float64, UInt8
 
 _CORNER = 0.5  # the image's upper left corner, counted so
+_REACH = 10.0  # so many image sides away a box may end
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +65,8 @@ class Photo:
         FileError
             If it cannot be read, or is of another size than was annotated.
         """
-        image: UInt8 = read_image(self.path, cv2.IMREAD_COLOR_RGB)
+        flags = cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION
+        image: UInt8 = read_image(self.path, flags)
         height, width = image.shape[:2]
         if (width, height) != (self.width, self.height):
             raise FileError(
@@ -82,20 +84,27 @@ def read_annotations(images: Path, annotations: Path) -> list[Photo]:
         If the file cannot be read or is not of that format.
     """
     try:
-        return [_photo(images / name, entry) for name, entry in read_json(annotations).items()]
+        return [_photo(images, name, entry) for name, entry in read_json(annotations).items()]
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise FileError(f"{annotations} is not a file of hand annotations: {error!r}") from error
 
 
-def _photo(path: Path, entry: dict[str, Any]) -> Photo:
+def _photo(images: Path, name: str, entry: dict[str, Any]) -> Photo:
+    # A name out of the folder, or that no file can have, is an attack or a mistake.
+    if not name.isprintable() or {"..", Path(name).anchor} & set(Path(name).parts):
+        raise ValueError(f"{name!r} is not the name of a photograph in {images}")
     hands = entry["hands"]
     width, height = int(entry["width"]), int(entry["height"])
     if width < 1 or height < 1:
-        raise ValueError(f"{path.name} is {width}x{height} pixels large")
+        raise ValueError(f"{name} is {width}x{height} pixels large")
     boxes = np.array([hand["box"] for hand in hands], np.float64).reshape(-1, 4) - _CORNER
     quads = np.array([hand["quad"] for hand in hands], np.float64).reshape(-1, 4, 2) - _CORNER
-    if not (np.isfinite(boxes).all() and np.isfinite(quads).all()):
-        raise ValueError(f"{path.name} has a hand that is nowhere")
-    return Photo(
-        path, width, height, boxes, quads, np.array([hand["large"] for hand in hands], bool)
-    )
+    shown = boxes.clip(0.0, [width, height, width, height])
+    if not ((shown[:, :2] < shown[:, 2:]).all() and np.isfinite(quads).all()):
+        raise ValueError(f"{name} has a hand that is nowhere in it")
+    if (np.abs(boxes) > _REACH * max(width, height)).any():
+        raise ValueError(f"{name} has a hand many times its own size")
+    large = [hand["large"] for hand in hands]
+    if not all(isinstance(one, bool) for one in large):
+        raise TypeError(f'{name}: "large" must be true or false')
+    return Photo(images / name, width, height, boxes, quads, np.array(large, bool))

@@ -8,11 +8,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo
 from handcal.evaluate.precision import MATCH_OVERLAP, ImageResult
-from handcal.files import write_atomic
 from handcal.hand.detect import DetectSettings, overlaps
+from handcal.image_file import write_png
 from handcal.types import Float64, UInt8
 
 _COLUMNS = 6
@@ -58,21 +57,17 @@ def contact_sheet(
 def write_contact_sheet(
     path: Path, photos: Sequence[Photo], results: Sequence[ImageResult]
 ) -> None:
-    """Write a `contact_sheet` of what the detector shows by default, as PNG or JPEG.
+    """Write a `contact_sheet` of what the detector shows by default, as PNG.
 
     It is black where nothing went wrong.
 
     Raises
     ------
     FileError
-        If it cannot be written, or the name's ending is unknown.
+        If it cannot be written, or its name does not end in ``.png``.
     """
     sheet = contact_sheet(photos, results, DetectSettings().score_min)
-    if not cv2.haveImageWriter(str(path)):
-        raise FileError(f"{path} must end in .png or .jpg")
-    shown = sheet if sheet.size else np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8)
-    _, data = cv2.imencode(path.suffix, shown[..., ::-1])
-    write_atomic(path, data.tobytes())
+    write_png(path, sheet if sheet.size else np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8))
 
 
 def _area(boxes: Float64) -> float:
@@ -82,7 +77,8 @@ def _area(boxes: Float64) -> float:
 
 def _tile(photo: Photo, found: Float64, missed: Float64, false: Float64) -> UInt8:
     scale = _TILE_PX / max(photo.width, photo.height)
-    image = cv2.resize(photo.read(), None, fx=scale, fy=scale)
+    size = max(1, round(scale * photo.width)), max(1, round(scale * photo.height))
+    image = cv2.resize(photo.read(), size)
     for boxes, color, text in (
         (found, _FOUND, ""),
         (missed, _MISSED, "missed"),
@@ -92,5 +88,5 @@ def _tile(photo: Photo, found: Float64, missed: Float64, false: Float64) -> UInt
             cv2.rectangle(image, (x0, y0), (x1, y1), color, 2)
             cv2.putText(image, text, (x0, y0 - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.4, color, 1)
     tile = np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8)
-    tile[: image.shape[0], : image.shape[1]] = image[:_TILE_PX, :_TILE_PX]
+    tile[: size[1], : size[0]] = image
     return tile

@@ -17,6 +17,7 @@ STRIDES = (8, 16, 32)
 CANDIDATE_SCORE_MIN = 0.02
 """What the network is less sure of has no say in where hands are."""
 
+_ENDS = [("image", "tensor(uint8)"), ("raw", "tensor(float)")]
 _GRAY = 127  # what the network's zero padding looks like
 
 
@@ -83,7 +84,7 @@ class HandDetector:
     Raises
     ------
     FileError
-        If the model cannot be loaded, or onnxruntime not be imported.
+        If the model cannot be loaded or is another network, or onnxruntime cannot be imported.
     """
 
     def __init__(self, model: Path, settings: DetectSettings | None = None) -> None:
@@ -98,6 +99,9 @@ class HandDetector:
             self._session = onnxruntime.InferenceSession(
                 model, options, providers=["CPUExecutionProvider"]
             )
+            ends = [*self._session.get_inputs(), *self._session.get_outputs()]
+            if (found := [(end.name, end.type) for end in ends]) != _ENDS:
+                raise ValueError(f"it maps {found}, not {_ENDS}")
         except Exception as error:  # onnxruntime's exceptions have no common base
             raise FileError(f"cannot load the hand detector {model}: {error}") from error
 

@@ -30,12 +30,11 @@ def load_backbone(net: HandNet, folder: Path) -> None:
     FileError
         If the files are missing or not those of the package.
     """
-    tensors = _read(folder)
     try:
-        state = _state(tensors, len(net.blocks))
-    except KeyError as error:
-        raise FileError(f"{folder} holds another network: it lacks {error}") from error
-    net.load_state_dict({name: torch.from_numpy(value) for name, value in state.items()}, False)
+        state = _state(_read(folder), len(net.blocks))
+        net.load_state_dict({name: torch.from_numpy(value) for name, value in state.items()}, False)
+    except (LookupError, TypeError, ValueError, RuntimeError) as error:
+        raise FileError(f"{folder} holds another network: {error!r}") from error
 
 
 def _read(folder: Path) -> dict[str, NDArray[np.float32]]:

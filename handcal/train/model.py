@@ -29,6 +29,7 @@ _BLOCKS = (
 # The blocks whose outputs have the strides 8, 16 and 32.
 _TAPS = (5, 11, 13)
 _WIDTH = 96
+_FROZEN_BLOCKS = 3
 _PRIOR = 0.01
 
 
@@ -97,14 +98,10 @@ class HandNet(nn.Module):
 
     N counts the points of all strides, rows first; the five are the logit of the score and the
     logarithms of the distances, in strides, from the point to the box's left, top, right, bottom.
-
-    Parameters
-    ----------
-    frozen_blocks : int
-        That many of the first blocks, and the convolution before them, are not trained.
+    The first blocks, and the convolution before them, are not trained.
     """
 
-    def __init__(self, frozen_blocks: int = 3) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.stem = nn.Sequential(_Conv(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
         self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)
@@ -118,7 +115,7 @@ class HandNet(nn.Module):
         # At first a point is rarely a hand, and boxes are four strides wide.
         first_bias = [-math.log(1.0 / _PRIOR - 1.0)] + [math.log(2.0)] * 4
         self.predict.bias = nn.Parameter(torch.tensor(first_bias))
-        for part in (self.stem, *self.blocks[:frozen_blocks]):
+        for part in (self.stem, *self.blocks[:_FROZEN_BLOCKS]):
             part.requires_grad_(False)
 
     def bake(self) -> None:

@@ -97,6 +97,15 @@ def test_doubtful_detections_are_no_failures(photo: Photo) -> None:
     assert contact_sheet([photo], [doubtful], 0.05).size > 0
 
 
+def test_a_tile_may_be_one_pixel_wide(tmp_path: Path) -> None:
+    path = tmp_path / "strip.png"
+    cv2.imwrite(str(path), np.full((2, 1200, 3), 90, np.uint8))
+    boxes = np.array([[600.0, 0.0, 1200.0, 2.0]])
+    strip = Photo(path, 1200, 2, boxes, np.zeros((1, 4, 2)), np.array([True]))
+    sheet = contact_sheet([strip], [found([], strip)], 0.3)
+    assert ((sheet[..., 0] > 200) & (sheet[..., 1] < 100)).any()
+
+
 def test_the_sheet_is_written_as_a_picture(photo: Photo, tmp_path: Path) -> None:
     for number, boxes in enumerate(([SMALL], [SMALL, LARGE])):
         path = tmp_path / f"{number}.png"

@@ -119,3 +119,16 @@ def test_says_which_model_cannot_be_loaded(tmp_path: Path) -> None:
     broken.write_bytes(b"not a model")
     with pytest.raises(FileError, match=r"broken\.onnx"):
         HandDetector(broken)
+
+
+def test_refuses_another_network(tmp_path: Path) -> None:
+    helper = pytest.importorskip("onnx").helper
+    floats = [helper.make_tensor_value_info(name, 1, [1]) for name in ("x", "y")]
+    graph = helper.make_graph(
+        [helper.make_node("Identity", ["x"], ["y"])], "g", *[[f] for f in floats]
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    path = tmp_path / "other.onnx"
+    path.write_bytes(model.SerializeToString())
+    with pytest.raises(FileError, match=r"not \[\(.image"):
+        HandDetector(path)

@@ -96,9 +96,17 @@ def test_names_the_file_that_is_missing(tmp_path: Path) -> None:
         load_backbone(HandNet(), tmp_path)
 
 
-def test_refuses_another_network(package: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+@pytest.mark.parametrize("manifest", ["{", "[]", '{"a": 1}', '[{"weights": []}]'])
+def test_refuses_another_network(manifest: str, tmp_path: Path) -> None:
     (tmp_path / "ssd_mobilenetv1_model.bin").write_bytes(b"")
-    manifest = tmp_path / "ssd_mobilenetv1_model-weights_manifest.json"
-    manifest.write_text(json.dumps([{"weights": []}]))
+    (tmp_path / "ssd_mobilenetv1_model-weights_manifest.json").write_text(manifest)
+    with pytest.raises(FileError, match="another network"):
+        load_backbone(HandNet(), tmp_path)
+
+
+def test_refuses_half_a_file(package: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    for whole in package[0].iterdir():
+        half = tmp_path / whole.name
+        half.write_bytes(whole.read_bytes()[: 2**20])
     with pytest.raises(FileError, match="another network"):
         load_backbone(HandNet(), tmp_path)

@@ -23,11 +23,11 @@ def test_at_first_nothing_is_a_hand() -> None:
 
 
 def test_the_first_blocks_are_not_trained() -> None:
-    net = HandNet(frozen_blocks=5)
+    net = HandNet()
     net(torch.rand(2, 3, 64, 64)).sum().backward()
     trained = {name for name, value in net.named_parameters() if value.grad is not None}
-    assert "blocks.4.pointwise.weight" not in trained
-    assert "blocks.5.depthwise.weight" in trained
+    assert "blocks.2.pointwise.weight" not in trained
+    assert "blocks.3.depthwise.weight" in trained
     assert "predict.bias" in trained
 
 
