@@ -23,8 +23,21 @@ IMAGE: UInt8 = RNG.integers(0, 256, (1, 96, 64, 3), np.uint8)
 
 @pytest.fixture(scope="module")
 def net() -> HandNet:
+    """Return a network that what it sees makes a difference to, unlike an untrained one."""
     torch.manual_seed(0)
-    return HandNet().eval()
+    net = HandNet()
+    for module in net.modules():
+        if isinstance(module, torch.nn.Conv2d):
+            torch.nn.init.kaiming_normal_(module.weight)
+        if isinstance(module, torch.nn.BatchNorm2d):
+            module.momentum = None  # the moments of the one image
+    net.train()(seen(IMAGE))
+    net.bake()
+    return net.eval()
+
+
+def seen(image: UInt8) -> torch.Tensor:
+    return torch.from_numpy(image).permute(0, 3, 1, 2).float()
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +55,13 @@ def run(model: Path) -> Float32:
 
 def test_the_exported_network_computes_the_same(net: HandNet, float_model: Path) -> None:
     with torch.inference_mode():
-        expected = net(torch.from_numpy(IMAGE).permute(0, 3, 1, 2).float())[0].numpy()
+        expected, other = (
+            net(seen(image))[0].numpy() for image in (IMAGE, IMAGE[..., ::-1].copy())
+        )
     raw = run(float_model)
     assert raw.shape == (5, len(points(96, 64)[0]))
-    assert raw == pytest.approx(expected, abs=1e-4)
+    assert raw == pytest.approx(expected, abs=1e-3)
+    assert np.abs(raw - other).mean() > 0.1  # with red and blue exchanged
 
 
 def test_integers_come_close_in_a_quarter_of_the_bytes(float_model: Path, tmp_path: Path) -> None:
@@ -56,8 +72,8 @@ def test_integers_come_close_in_a_quarter_of_the_bytes(float_model: Path, tmp_pa
     integer_model = tmp_path / "integer.onnx"
     export_integer(float_model, integer_model, [photo])
     assert integer_model.stat().st_size < 0.35 * float_model.stat().st_size
-    difference = np.abs(run(integer_model) - run(float_model))
-    assert difference.mean() < 0.1
+    floats = run(float_model)
+    assert np.abs(run(integer_model) - floats).mean() < 0.2 * floats.std()
 
 
 def test_without_training_there_is_nothing_to_export(tmp_path: Path) -> None:
