@@ -408,7 +408,8 @@ def _add_roi(command: Parser) -> None:
         "--roi",
         choices=get_args(Roi),
         default="detector",
-        help="look for the hand where the detector sees it in the colour image, or by depth alone",
+        help="look for the hand where the detector sees it in the colour image (of several the "
+        "nearest, leftmost or rightmost), or by depth alone",
     )
 
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeAlias
+from typing import Protocol
 
 import cv2
 import numpy as np
 
 from handcal.geometry import camera_matrix, image_points, invert, transform
 from handcal.hand.detect import Detections, overlaps
-from handcal.hand.settings import SegmentSettings
+from handcal.hand.settings import Roi, SegmentSettings
 from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
 from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
-
-Wanted: TypeAlias = Literal["nearest", "left", "right"]
 
 _STEP_PX = 8  # of the depth image: fine enough to tell where a hand is
 _PIXELS_MIN = 6
@@ -35,10 +33,10 @@ class Detector(Protocol):
 class RoiSettings:
     """How the hand is chosen and followed.
 
+    Times are kept to the nearest frame.
+
     Attributes
     ----------
-    wanted : {"nearest", "left", "right"}
-        Which of several hands, as seen in the image.
     sure_min : float
         Hands whose score is below this share of the surest one's are not considered.
     check_s : float
@@ -48,7 +46,9 @@ class RoiSettings:
     check_pixels : int
         and with so few pixels, because this goes on all the time.
     search_s : float
-        While there is none, the detector looks this often.
+        While there is none, the detector looks this often, at the whole image.
+    choose_s : float
+        So it does, no more often than this, at a followed hand that may be the wrong one.
     misses : int
         A followed hand that the detector does not see in so many looks in a row is dropped.
     filled_min : float
@@ -57,12 +57,12 @@ class RoiSettings:
         Range of the square root of a hand's box's area, at its depth.
     """
 
-    wanted: Wanted = "nearest"
     sure_min: float = 0.7
     check_s: float = 0.19
     check_margin: float = 0.5
     check_pixels: int = 25_600
     search_s: float = 0.06
+    choose_s: float = 1.0
     misses: int = 2
     filled_min: float = 0.25
     side_min_m: float = 0.05
@@ -89,7 +89,7 @@ class RoiFinder:
     ----------
     detector : Detector
     segmenting : SegmentSettings
-        Its depth gate is where hands are.
+        Its depth gate is where hands are; its `roi` tells which of several is wanted.
     settings : RoiSettings, optional
     """
 
@@ -101,41 +101,60 @@ class RoiFinder:
     ) -> None:
         self._detector = detector
         self._gate_m = segmenting.depth_min_m, segmenting.depth_max_m
+        self._wanted = segmenting.roi
         self._settings = settings or RoiSettings()
         self._track: _Track | None = None
         self._misses = 0
+        self._seen_ns: int | None = None
         self._looked_ns: int | None = None
+        self._chosen_ns = 0
 
     def find(self, frame: Frame) -> Box | None:
         """Return the hand's box in the depth image; None if none is in sight or without colour."""
         if frame.color is None:
             return None
-        if self._looked_ns is not None and frame.t_camera_ns < self._looked_ns:
-            self._track = self._looked_ns = None  # a recording has begun again
+        now_ns = frame.t_camera_ns
+        if self._seen_ns is None or now_ns < self._seen_ns:
+            self._track = self._looked_ns = None  # a recording has begun, or begun again
+            self._seen_ns = now_ns
+        half_frame_ns, self._seen_ns = (now_ns - self._seen_ns) / 2, now_ns
         cloud = _CoarseCloud(frame, self._gate_m)
         self._track = self._track and cloud.follow(self._track)
         wait_s = self._settings.search_s
         if self._track is not None and not self._misses:
             wait_s = self._settings.check_s
-        if self._looked_ns is None or frame.t_camera_ns - self._looked_ns >= wait_s * 1e9:
-            self._looked_ns = frame.t_camera_ns
-            self._look(frame.color, cloud)
+        if self._looked_ns is None or now_ns - self._looked_ns >= wait_s * 1e9 - half_frame_ns:
+            self._looked_ns = now_ns
+            self._look(frame.color, cloud, now_ns)
         return None if self._track is None else cloud.clip(self._track.box)
 
-    def _look(self, color: UInt8, cloud: _CoarseCloud) -> None:
+    def _look(self, color: UInt8, cloud: _CoarseCloud, now_ns: int) -> None:
         """Let the detector confirm the track, drop it, or begin one."""
-        if self._track is not None:
-            confirmed = self._confirm(self._track, color, cloud)
-            self._misses = 0 if confirmed else self._misses + 1
+        confirmed = self._track and self._confirm(self._track, color, cloud)
+        if confirmed is not None:
+            self._track, self._misses = confirmed, 0
+            is_due = now_ns - self._chosen_ns >= self._settings.choose_s * 1e9
+            if not (is_due and cloud.may_precede(confirmed, self._wanted)):
+                return
+        elif self._track is not None:
+            self._misses += 1
             if self._misses < self._settings.misses:
-                self._track = confirmed or self._track
                 return
         self._misses = 0
+        self._chosen_ns = now_ns
+        self._track = self._choose(color, cloud) or confirmed
+
+    def _choose(self, color: UInt8, cloud: _CoarseCloud) -> _Track | None:
+        """Return the wanted one of the hands that the detector sees, near by as well as from far.
+
+        What it sees only from far it would soon drop, to see it again.
+        """
         height, width = color.shape[:2]
         hands = self._hands(color, (0, 0, width, height), None, cloud)
         least = self._settings.sure_min * max((hand.score for hand in hands), default=0.0)
-        sure = [hand for hand in hands if hand.score >= least]
-        self._track = min(sure, key=self._order, default=None)
+        sure = sorted((hand for hand in hands if hand.score >= least), key=self._order)
+        confirmed = (self._confirm(hand, color, cloud) for hand in sure)
+        return next(filter(None, confirmed), None)
 
     def _confirm(self, track: _Track, color: UInt8, cloud: _CoarseCloud) -> _Track | None:
         """Return the track as the detector sees it, None if it sees no hand there."""
@@ -170,9 +189,9 @@ class RoiFinder:
         )
 
     def _order(self, track: _Track) -> float:
-        if self._settings.wanted == "nearest":
-            return track.depth_m
-        return float(track.box[0] if self._settings.wanted == "left" else -track.box[2])
+        if self._wanted in ("left", "right"):
+            return float(track.box[0] if self._wanted == "left" else -track.box[2])
+        return track.depth_m
 
 
 class _CoarseCloud:
@@ -216,6 +235,14 @@ class _CoarseCloud:
             if np.abs(shift).max() < _STILL_PX:
                 break
         return replace(track, box=box, depth_m=float(np.median(depth_m[inside])))
+
+    def may_precede(self, track: _Track, wanted: Roi) -> bool:
+        """Tell whether something is there that, were it a hand, would be wanted rather."""
+        low, high = track.box[0::2] + np.array([-1, 1]) * (track.box[2] - track.box[0])
+        x = self._px[:, 0]
+        nearer = self._depth_m < track.depth_m - _DEPTH_SPREAD_M
+        precedes = {"left": x < low, "right": x > high}.get(wanted, nearer)
+        return bool(np.count_nonzero(precedes) >= _PIXELS_MIN)
 
     def surroundings(self, track: _Track, margin: float) -> Box:
         """Return the part of the colour image about a track."""

@@ -8,7 +8,7 @@ from typing import Literal
 # About: fewer cannot be registered, and more than 50,000 not be sent to the headset.
 _LEAST_POINTS, _MOST_POINTS = 200, 40_000
 
-Roi = Literal["detector", "depth"]
+Roi = Literal["detector", "left", "right", "depth"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,9 +17,10 @@ class SegmentSettings:
 
     Attributes
     ----------
-    roi : {"detector", "depth"}
-        Where to look: where the hand detector sees a hand in the colour image, if there is one, or
-        for the nearest hand-sized thing in the whole depth image.
+    roi : {"detector", "left", "right", "depth"}
+        Where to look: where the hand detector sees a hand in the colour image, if there is one (of
+        several the nearest, the leftmost or the rightmost), or for the nearest hand-sized thing in
+        the whole depth image.
     depth_min_m, depth_max_m : float
         Depth gate: within arm's reach and the camera's range (paper, section on segmentation).
     edge_jump_m : float

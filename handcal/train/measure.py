@@ -32,7 +32,7 @@ from handcal.types import UInt8
 
 # Luminance of the skin in even light that parts three groups of about the same size.
 _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
-# What lights leave of red, green and blue.
+# What lights leave of the values of red, green and blue.
 _LIGHTS = {"dim": (0.3, 0.3, 0.3), "warm": (1.0, 0.75, 0.45), "cold": (0.6, 0.8, 1.0)}
 _RUNS = 50
 _FRAMES, _FRAME_NS = 120, 33_333_333

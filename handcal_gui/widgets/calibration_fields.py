@@ -27,10 +27,16 @@ _METHOD_HELP = (
     "As in the paper: Hu et al. 2021; slow.\n"
     "Rigid ICP: the paper's baseline."
 )
-_ROIS: dict[Roi, str] = {"detector": "Colour and depth", "depth": "Depth alone"}
+_ROIS: dict[Roi, str] = {
+    "detector": "Colour and depth",
+    "left": "Colour and depth, leftmost",
+    "right": "Colour and depth, rightmost",
+    "depth": "Depth alone",
+}
 _ROI_HELP = (
     "How the hand is found.\n"
-    "Colour and depth: the hand detector says where to look first.\n"
+    "Colour and depth: the hand detector says where to look first; of several hands\n"
+    "the nearest, or the one leftmost or rightmost in the camera's image.\n"
     "Depth alone: the nearest hand-sized thing."
 )
 _GATE_M = 0.05

@@ -17,16 +17,19 @@ SETTINGS = SegmentSettings()
 
 @dataclass
 class Eyes:
-    """A detector that sees one box."""
+    """A detector that sees one box, be it shown the whole of a `coloured` frame or a part."""
 
     box: Box
 
     def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
-        return Detections(np.array([self.box], float), np.ones(1))
+        x, y = color[0, 0, ::2] * 8.0 + divmod(color[0, 0, 1], 8)
+        return Detections(np.array([self.box], float) - [x, y, x, y], np.ones(1))
 
 
 def coloured(frame: Frame) -> Frame:
-    color = np.zeros((*frame.depth.shape, 3), np.uint8)
+    """Return a frame whose colours tell where in the image they are."""
+    y, x = np.indices(frame.depth.shape)
+    color = np.dstack([x // 8, 8 * (x % 8) + y % 8, y // 8]).astype(np.uint8)
     return replace(frame, color=color, color_intrinsics=CAMERA)
 
 
