@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from time import perf_counter
+from dataclasses import replace
+from time import perf_counter, thread_time
 from typing import TypeVar
 
 import numpy as np
@@ -12,7 +13,10 @@ from handcal.bench.figure import Figure
 from handcal.bench.settings import BenchSettings
 from handcal.bench.trials import Measured, Progress, trial_hand
 from handcal.camera.synthetic import SyntheticCamera
+from handcal.detector import load_detector
+from handcal.errors import HandError
 from handcal.geometry import rigid
+from handcal.hand.roi import Detector, RoiFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
@@ -21,7 +25,7 @@ from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from handcal.types import EYES, Alignment, Float64
+from handcal.types import EYES, Alignment, Float64, Frame
 
 Input = TypeVar("Input")
 
@@ -30,7 +34,8 @@ _SHIFT_M = 0.005
 _PALM_H_M = np.array([0.0, 0.09, 0.5])
 _ICP_REACH_M = 0.05
 _SPEED_UP = 30.0
-_SOLVE_MS, _GUARD_MS, _SEGMENT_MS = 100.0, 10.0, 6.0
+_SOLVE_MS, _GUARD_MS, _SEGMENT_MS, _ROI_MS = 100.0, 10.0, 6.0, 2.0
+_FRAMES, _FRAME_NS = 120, 33_333_333
 
 
 def measure_speed(settings: BenchSettings, progress: Progress) -> Measured:
@@ -54,19 +59,46 @@ def _noisy_alignment(trial: int, points: int) -> Alignment:
 
 
 def _segmentation(repeats: int) -> list[Figure]:
-    """Time the segmentation of one simulated frame, 1280x720."""
-    T_W_D, T_W_hand = example_rig().T_H_D, rigid(translation_m=_PALM_H_M)
-    world = World(trial_hand(0), make_room(0))
-    with SyntheticCamera(world, lambda: SceneState(0, T_W_D, T_W_hand)) as camera:
-        frame = camera.read()
+    """Time the segmentation of one simulated frame, 1280x720, and the way to its ROI."""
+    frame = simulated_frame()
     segmenting = SegmentSettings()
     roi_px = segment_hand(frame, segmenting).box_px
     [with_roi_ms] = _medians_ms([frame] * repeats, lambda f: segment_hand(f, segmenting, roi_px))
     [alone_ms] = _medians_ms([frame] * repeats, lambda f: segment_hand(f, segmenting))
+    roi_ms = following_ms(load_detector(), frame)
     return [
+        Figure("ROI of a followed hand, mean a frame", roi_ms, "ms", at_most=_ROI_MS),
         Figure("segmentation, 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
         Figure("segmentation, 1280x720, no ROI", alone_ms, "ms"),
     ]
+
+
+def simulated_frame() -> Frame:
+    """Return a frame of a hand in a room, 1280x720."""
+    T_W_D, T_W_hand = example_rig().T_H_D, rigid(translation_m=_PALM_H_M)
+    world = World(trial_hand(0), make_room(0))
+    with SyntheticCamera(world, lambda: SceneState(0, T_W_D, T_W_hand)) as camera:
+        return camera.read()
+
+
+def following_ms(detector: Detector, frame: Frame) -> float:
+    """Return the mean processor time a frame of following a hand at 30 frames a second.
+
+    The detector's looks at it are counted in, but not those that found it.
+
+    Raises
+    ------
+    HandError
+        If there is no hand in the frame, or it is lost.
+    """
+    finder = RoiFinder(detector, SegmentSettings())
+    finder.find(frame)
+    started_s = thread_time()
+    for number in range(1, _FRAMES + 1):
+        t_ns = frame.t_camera_ns + number * _FRAME_NS
+        if finder.find(replace(frame, t_camera_ns=t_ns)) is None:
+            raise HandError("the detector has lost the simulated hand")
+    return 1e3 * (thread_time() - started_s) / _FRAMES
 
 
 def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:

@@ -6,27 +6,21 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handcal.camera.synthetic import SyntheticCamera
+from handcal.bench.speed import following_ms, simulated_frame
 from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
 from handcal.evaluate.annotations import read_annotations
 from handcal.evaluate.detector import EVALUATED, detect_all, summary
 from handcal.evaluate.precision import MATCH_OVERLAP
-from handcal.geometry import rigid
 from handcal.hand.detect import Detections, HandDetector, overlaps
-from handcal.hand.roi import RoiFinder
-from handcal.hand.settings import SegmentSettings
 from handcal.resources import resource_path
-from handcal.sim.hand import HandSettings, make_hand
+from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
-from handcal.sim.render import World
 from handcal.sim.room import make_room
-from handcal.sim.scene import SceneState
 from handcal.train.simulated import Picture, picture
 from handcal.types import UInt8
 
@@ -35,7 +29,6 @@ _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
 # What lights leave of the values of red, green and blue.
 _LIGHTS = {"dim": (0.3, 0.3, 0.3), "warm": (1.0, 0.75, 0.45), "cold": (0.6, 0.8, 1.0)}
 _RUNS = 50
-_FRAMES, _FRAME_NS = 120, 33_333_333
 
 
 def main() -> None:
@@ -56,7 +49,7 @@ def main() -> None:
             },
             "simulated": simulated(HandDetector(path), pictures),
             "median_ms": latency_ms(HandDetector(path), pictures[0].color),
-            "following_ms": following_ms(HandDetector(path)),
+            "following_ms": following_ms(HandDetector(path), simulated_frame()),
         }
         print(json.dumps(figures))  # noqa: T201
 
@@ -120,22 +113,6 @@ def latency_ms(detector: HandDetector, color: UInt8) -> float:
         detector.detect(color)
         times_ms.append(1e3 * (time.thread_time() - started_s))
     return float(np.median(times_ms))
-
-
-def following_ms(detector: HandDetector) -> float:
-    """Return the mean processor time a frame of following a hand, at 30 frames a second."""
-    T_W_hand = rigid(translation_m=[0.0, 0.05, 0.5])
-    world = World(make_hand(0, HandSettings()), make_room(0))
-    with SyntheticCamera(world, lambda: SceneState(0, np.eye(4), T_W_hand)) as camera:
-        frame = camera.read()
-    finder = RoiFinder(detector, SegmentSettings())
-    finder.find(frame)
-    started_s = time.thread_time()
-    for number in range(1, _FRAMES + 1):
-        t_ns = frame.t_camera_ns + number * _FRAME_NS
-        if finder.find(replace(frame, t_camera_ns=t_ns)) is None:
-            raise RuntimeError("the hand was lost")
-    return 1e3 * (time.thread_time() - started_s) / _FRAMES
 
 
 def _shown(drawn: Picture) -> float:
