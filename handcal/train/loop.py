@@ -39,9 +39,6 @@ class TrainSettings:
         Highest learning rates of AdamW, of the new layers and of the pretrained ones; rising over
         the first `rise` of the steps, falling linearly to 0 over the last `fall`.
     rise, fall : float
-    fixed : float
-        Over that last share of the steps batch normalisation keeps the moments it has, so that
-        what is trained is what is evaluated.
     weight_decay : float
     gradient_max : float
         Longer gradients are shortened to this norm.
@@ -59,7 +56,6 @@ class TrainSettings:
     backbone_rate: float = 3e-4
     rise: float = 0.03
     fall: float = 0.8
-    fixed: float = 0.25
     weight_decay: float = 0.03
     gradient_max: float = 10.0
     average: float = 0.998
@@ -174,8 +170,7 @@ class Training:
     def _learn(self, images: Tensor, targets: list[Tensor]) -> list[float]:
         """Take one step; return the losses of scores and boxes."""
         self._set_rates()
-        is_fixed = self._step >= (1.0 - self._settings.fixed) * self._settings.steps
-        self._net.train(not is_fixed)
+        self._net.train()
         images = images.to(self._device).float()
         with torch.autocast("cuda", torch.bfloat16, enabled=self._device.type == "cuda"):
             raw = self._net(images)

@@ -73,7 +73,7 @@ def _separable(inputs: int, outputs: int, stride: int) -> nn.Sequential:
 def _normalised(inputs: int, outputs: int, size: int = 1, groups: int = 1) -> nn.Sequential:
     return nn.Sequential(
         _Conv(inputs, outputs, size, padding=size // 2, groups=groups, bias=False),
-        nn.BatchNorm2d(outputs, momentum=0.003),
+        nn.BatchNorm2d(outputs, momentum=0.03),
         nn.ReLU6(inplace=True),
     )
 
