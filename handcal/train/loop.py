@@ -44,6 +44,9 @@ class TrainSettings:
         Longer gradients are shortened to this norm.
     average : float
         Decay per step of the running mean of the weights, which is what is evaluated.
+    settled : int
+        Batches over which batch normalisation takes the moments of the averaged weights, at the
+        end.
     validated : float
         Share of the photographs kept aside to judge progress by.
     samples : SampleSettings
@@ -59,6 +62,7 @@ class TrainSettings:
     weight_decay: float = 0.03
     gradient_max: float = 10.0
     average: float = 0.998
+    settled: int = 300
     validated: float = 0.1
     samples: SampleSettings = field(default_factory=SampleSettings)
 
@@ -126,9 +130,8 @@ class Training:
         trained, validated = split(photos, self._settings.validated)
         saved_s = time.monotonic()
         losses: list[list[float]] = []
-        for images, targets in self._batches(
-            Samples(trained, hands, self._settings.samples, self._settings.seed)
-        ):
+        samples = Samples(trained, hands, self._settings.samples, self._settings.seed)
+        for images, targets in self._batches(samples, self._step, self._settings.steps):
             losses.append(self._learn(images, targets))
             if self._step % 50 == 0:
                 self._log(losses=np.mean(losses, 0).round(4).tolist())
@@ -138,6 +141,7 @@ class Training:
                 saved_s = time.monotonic()
             if self._step % self._pace.validate_steps == 0 and self._step < self._settings.steps:
                 self._log(**self.validate(validated))
+        self._settle(samples)
         self._save()
         self._log(**self.validate(validated))
         return self._average.module
@@ -155,12 +159,14 @@ class Training:
             results.append(ImageResult(boxes / scale, scores, photo.boxes))
         return summary(photos, results)
 
-    def _batches(self, samples: Samples) -> Iterator[tuple[Tensor, list[Tensor]]]:
+    def _batches(
+        self, samples: Samples, first: int, end: int
+    ) -> Iterator[tuple[Tensor, list[Tensor]]]:
         batch = self._settings.batch
         loader = DataLoader(
             samples,
             batch_size=batch,
-            sampler=range(self._step * batch, self._settings.steps * batch),
+            sampler=range(first * batch, end * batch),
             num_workers=self._pace.workers,
             collate_fn=collate,
             worker_init_fn=_quiet_worker,
@@ -184,6 +190,13 @@ class Training:
         self._average.update_parameters(self._net)
         self._step += 1
         return [score_loss.item(), box_loss.item()]
+
+    def _settle(self, samples: Samples) -> None:
+        """Take the moments of the averaged weights: the mean of earlier weights' is not theirs."""
+        end = self._settings.steps
+        batches = self._batches(samples, end, end + self._settings.settled)
+        images = (images.to(self._device).float() for images, _ in batches)
+        torch.optim.swa_utils.update_bn(images, self._average.module)
 
     def _set_rates(self) -> None:
         settings = self._settings

@@ -13,11 +13,12 @@ from handcal.evaluate.annotations import Photo
 from handcal.files import make_folder, write_json
 from handcal.train.loop import Pace, Training, TrainSettings, split
 from handcal.train.model import HandNet
-from handcal.train.samples import SampleSettings
+from handcal.train.samples import Samples, SampleSettings, collate
 
 SETTINGS = TrainSettings(
     steps=4,
     batch=2,
+    settled=2,
     validated=0.25,
     samples=SampleSettings(side_px=64, simulated=0.0, pasted=0.0),
 )
@@ -82,6 +83,27 @@ def test_the_weights_that_are_trained_change(tmp_path: Path, photos: list[Photo]
     end = trained(tmp_path, photos)
     assert (start["blocks.12.pointwise.weight"] != end["blocks.12.pointwise.weight"]).any()
     assert (start["blocks.0.pointwise.weight"] == end["blocks.0.pointwise.weight"]).all()
+
+
+def test_the_moments_are_those_of_the_averaged_weights(tmp_path: Path, photos: list[Photo]) -> None:
+    done = training(tmp_path)
+    net = done.run(photos, photos[0].path.parent)
+    samples = Samples(
+        split(photos, 0.25)[0], photos[0].path.parent, SETTINGS.samples, SETTINGS.seed
+    )
+    inputs = []
+    hook = net.get_submodule("lateral.0.1").register_forward_hook(
+        lambda module, arguments, result: inputs.append(arguments[0])
+    )
+    # What follows the samples trained on: 4 steps of 2.
+    for first in (8, 10):
+        net.train()(collate([samples[first], samples[first + 1]])[0].float())
+    hook.remove()
+    mean = torch.stack([features.mean((0, 2, 3)) for features in inputs]).mean(0)
+    expected = Training(HandNet(), tmp_path, SETTINGS, PACE)._average.module.state_dict()
+    assert expected["lateral.0.1.running_mean"].numpy() == pytest.approx(
+        mean.detach().numpy(), abs=1e-4
+    )
 
 
 def test_the_same_tenth_is_kept_aside_every_time(photos: list[Photo]) -> None:
