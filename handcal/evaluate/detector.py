@@ -51,17 +51,24 @@ def summary(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str
     where there is no such hand. As in COCO's area ranges, of the last two a smaller box that is on
     no hand is not false either.
     """
+    return _averages(_curves(photos, results))
+
+
+def _curves(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, PrecisionRecall]:
     everything = [np.ones(len(photo.boxes), bool) for photo in photos]
     large = [photo.large for photo in photos]
-    precisions = {
+    return {
         "ap50": precision_recall(zip(results, everything, strict=True)),
         "ap50_large": precision_recall(zip(results, large, strict=True)),
         "ap50_rel15": _of_size(photos, results, 0.15),
         "ap50_rel25": _of_size(photos, results, 0.25),
     }
+
+
+def _averages(curves: dict[str, PrecisionRecall]) -> dict[str, float | None]:
     return {
         name: None if math.isnan(curve.average_precision) else curve.average_precision
-        for name, curve in precisions.items()
+        for name, curve in curves.items()
     }
 
 
@@ -80,13 +87,12 @@ def _of_size(
 
 def evaluation(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, Any]:
     """Return `summary` with counts and the precision/recall curve over all hands, JSON-able."""
-    everything = [np.ones(len(photo.boxes), bool) for photo in photos]
-    curve = precision_recall(zip(results, everything, strict=True))
+    curves = _curves(photos, results)
     return {
-        **summary(photos, results),
+        **_averages(curves),
         "images": len(photos),
         "hands": sum(len(photo.boxes) for photo in photos),
-        "curve": _thinned(curve),
+        "curve": _thinned(curves["ap50"]),
     }
 
 
