@@ -132,19 +132,19 @@ class History:
                 self.rig_sha256 = data["rig_sha256"]
                 self.wearer = clean_wearer(data.get("wearer", ""))
             case SessionEvent.ALIGNMENT_SAVED:
-                self.alignments.save(data["number"], data["sha256"])
+                self.alignments.save(_number(data), data["sha256"])
             case SessionEvent.ALIGNMENT_DROPPED:
-                self.alignments.kept.pop(data["number"])
+                self.alignments.kept.pop(_number(data))
             case SessionEvent.ALIGNMENT_DELETED:
-                self.alignments.delete(data["number"])
+                self.alignments.delete(_number(data))
             case SessionEvent.ALIGNMENT_RESTORED:
-                self.alignments.restore(data["number"])
+                self.alignments.restore(_number(data))
             case SessionEvent.TRIAL_SAVED:
-                self.trials.save(data["number"], read_trial(data["trial"], time))
+                self.trials.save(_number(data), read_trial(data["trial"], time))
             case SessionEvent.TRIAL_DELETED:
-                self.trials.delete(data["number"])
+                self.trials.delete(_number(data))
             case SessionEvent.TRIAL_RESTORED:
-                self.trials.restore(data["number"])
+                self.trials.restore(_number(data))
             case SessionEvent.SOLVED:
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
             case SessionEvent.APPLIED if "shift_m" in data:  # version 1 did not tell
@@ -155,6 +155,14 @@ class History:
                 self.applied_shift_m |= self.fine_tuned
         if name.startswith("alignment_"):
             self.is_solved = self.is_applied = False
+
+
+def _number(data: Mapping[str, Any]) -> int:
+    """Return the number in an event; true and 1.0 equal 1, but name other files."""
+    number = data["number"]
+    if type(number) is not int:
+        raise ValueError(f"a number is whole, not {number!r}")
+    return number
 
 
 def clean_wearer(name: str) -> str:

@@ -40,6 +40,16 @@ def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
             history.take(Event(1, "", name, data))
 
 
+@pytest.mark.parametrize("number", [True, 1.0, "1", None])
+@pytest.mark.parametrize("event", [SessionEvent.ALIGNMENT_SAVED, SessionEvent.ALIGNMENT_DELETED])
+def test_what_equals_a_number_but_is_none_is_refused(number: object, event: SessionEvent) -> None:
+    history = History()
+    if event == SessionEvent.ALIGNMENT_DELETED:
+        history.take(Event(1, "", SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}))
+    with pytest.raises(ValueError, match="a number is whole"):
+        history.take(Event(2, "", event, {"number": number, "sha256": "x"}))
+
+
 def test_an_event_of_others_changes_nothing_but_that_it_goes_on() -> None:
     history = History()
     history.take(Event(1, "", SessionEvent.FINISHED, {}))
