@@ -1,4 +1,4 @@
-"""Train the hand detector: ``python -m handcal.train --data DIR --backbone DIR``."""
+"""Train the hand detector: ``python -m handcal.train --data DIR --backbone DIR | --model FILE``."""
 
 from __future__ import annotations
 
@@ -9,37 +9,67 @@ from pathlib import Path
 from handcal.evaluate.annotations import read_annotations
 from handcal.files import make_folder
 from handcal.train.backbone import load_backbone
-from handcal.train.loop import Pace, Training, TrainSettings
+from handcal.train.exported import load_exported
+from handcal.train.loop import Pace, Training, TrainSettings, batches, split
 from handcal.train.model import HandNet
+from handcal.train.samples import Samples, SampleSettings
 from handcal.train.simulated import render_hands
 
 _SIMULATED = 1800
+_MOMENTS = 100
+
+# Weights that know hands already learn from larger crops, closer to what the detector will see.
+_FURTHER = TrainSettings(
+    seed=5,
+    steps=23_000,
+    rate=5e-4,
+    backbone_rate=1.5e-4,
+    fall=0.95,
+    average=0.999,
+    samples=SampleSettings(side_px=320, zoomed=0.35, pasted=0.06, disturbed=0.6),
+)
 
 
 def main() -> None:
     """Prepare, train or resume, and log to ``log.jsonl``."""
     parser = argparse.ArgumentParser(prog="python -m handcal.train", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="oxford_hands: train and val")
-    parser.add_argument(
+    start = parser.add_mutually_exclusive_group(required=True)
+    start.add_argument(
         "--backbone",
         type=Path,
-        required=True,
-        help="folder 'model' of the npm package @vladmandic/face-api",
+        help="start anew from this folder 'model' of the npm package @vladmandic/face-api",
+    )
+    start.add_argument(
+        "--model", type=Path, help="train this exported model of floats (ONNX) further"
     )
     parser.add_argument("--folder", type=Path, default=Path(".training"), help="working files")
-    parser.add_argument("--steps", type=int, default=TrainSettings().steps)
+    parser.add_argument("--steps", type=int, help="instead of the recipe's")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument(
+        "--bfloat16",
+        action="store_true",
+        help="faster on processors with AVX-512 BF16; CUDA devices always do so",
+    )
     arguments = parser.parse_args()
 
     hands = make_folder(arguments.folder) / "hands"
     render_hands(hands, _SIMULATED)
-    net = HandNet()
-    load_backbone(net, arguments.backbone)
     train = arguments.data / "train"
     photos = read_annotations(train, train / "annotations.json")
-    settings = replace(TrainSettings(), steps=arguments.steps)
-    pace = Pace(threads=arguments.threads, workers=arguments.workers)
+    settings = TrainSettings() if arguments.backbone else _FURTHER
+    if arguments.steps is not None:
+        settings = replace(settings, steps=arguments.steps)
+    net = HandNet()
+    if arguments.backbone:
+        load_backbone(net, arguments.backbone)
+    else:
+        trained, _ = split(photos, settings.validated)
+        samples = Samples(trained, hands, settings.samples, settings.seed)
+        shown = batches(samples, settings.batch, range(_MOMENTS))
+        load_exported(net, arguments.model, (images for images, _ in shown))
+    pace = Pace(threads=arguments.threads, workers=arguments.workers, bfloat16=arguments.bfloat16)
     Training(net, arguments.folder, settings, pace).run(photos, hands)
 
 

@@ -77,12 +77,15 @@ class Pace:
     validate_steps : int
     threads, workers : int
         Of the network, and processes that prepare samples.
+    bfloat16 : bool
+        Whether a processor computes gradients with numbers of 16 bits, as CUDA devices always do.
     """
 
     checkpoint_s: float = 180.0
     validate_steps: int = 2000
     threads: int = 1
     workers: int = 1
+    bfloat16: bool = False
 
 
 class Training:
@@ -131,7 +134,7 @@ class Training:
         saved_s = time.monotonic()
         losses: list[list[float]] = []
         samples = Samples(trained, hands, self._settings.samples, self._settings.seed)
-        for images, targets in self._batches(samples, self._step, self._settings.steps):
+        for images, targets in self._batches(samples, range(self._step, self._settings.steps)):
             losses.append(self._learn(images, targets))
             if self._step % 50 == 0:
                 self._log(losses=np.mean(losses, 0).round(4).tolist())
@@ -159,26 +162,16 @@ class Training:
             results.append(ImageResult(boxes / scale, scores, photo.boxes))
         return summary(photos, results)
 
-    def _batches(
-        self, samples: Samples, first: int, end: int
-    ) -> Iterator[tuple[Tensor, list[Tensor]]]:
-        batch = self._settings.batch
-        loader = DataLoader(
-            samples,
-            batch_size=batch,
-            sampler=range(first * batch, end * batch),
-            num_workers=self._pace.workers,
-            collate_fn=collate,
-            worker_init_fn=_quiet_worker,
-        )
-        yield from loader
+    def _batches(self, samples: Samples, steps: range) -> Iterator[tuple[Tensor, list[Tensor]]]:
+        return batches(samples, self._settings.batch, steps, self._pace.workers)
 
     def _learn(self, images: Tensor, targets: list[Tensor]) -> list[float]:
         """Take one step; return the losses of scores and boxes."""
         self._set_rates()
         self._net.train()
         images = images.to(self._device).float()
-        with torch.autocast("cuda", torch.bfloat16, enabled=self._device.type == "cuda"):
+        kind = self._device.type
+        with torch.autocast(kind, torch.bfloat16, enabled=kind == "cuda" or self._pace.bfloat16):
             raw = self._net(images)
         grid = _grid(images.shape[2], images.shape[3], self._device)
         hands = [target.to(self._device) for target in targets]
@@ -194,8 +187,8 @@ class Training:
     def _settle(self, samples: Samples) -> None:
         """Take the moments of the averaged weights: the mean of earlier weights' is not theirs."""
         end = self._settings.steps
-        batches = self._batches(samples, end, end + self._settings.settled)
-        images = (images.to(self._device).float() for images, _ in batches)
+        settling = self._batches(samples, range(end, end + self._settings.settled))
+        images = (images.to(self._device).float() for images, _ in settling)
         torch.optim.swa_utils.update_bn(images, self._average.module)
 
     def _set_rates(self) -> None:
@@ -260,6 +253,20 @@ def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[
     return (
         [photo for i, photo in enumerate(photos) if i not in aside],
         [photo for i, photo in enumerate(photos) if i in aside],
+    )
+
+
+def batches(
+    samples: Samples, size: int, steps: range, workers: int = 0
+) -> Iterator[tuple[Tensor, list[Tensor]]]:
+    """Yield what the network is shown at these steps, as `collate` gives it."""
+    yield from DataLoader(
+        samples,
+        batch_size=size,
+        sampler=range(steps.start * size, steps.stop * size),
+        num_workers=workers,
+        collate_fn=collate,
+        worker_init_fn=_quiet_worker,
     )
 
 

@@ -52,6 +52,8 @@ class SampleSettings:
         How much likelier a photograph is chosen if a hand fills 15 % of it or more.
     simulated, pasted : float
         Shares of samples that are simulated pictures, and photographs with a simulated hand.
+    disturbed : float
+        Share of samples whose light and sharpness are changed.
     """
 
     side_px: int = 288
@@ -62,6 +64,7 @@ class SampleSettings:
     large_weight: float = 2.0
     simulated: float = 0.1
     pasted: float = 0.08
+    disturbed: float = 1.0
 
 
 class Samples(Dataset[tuple[UInt8, Float32]]):
@@ -104,7 +107,9 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
             image, boxes = self._photographed(rng)
             if kind < self._settings.pasted:
                 image, boxes = self._paste(rng, image, boxes)
-        return blemish(rng, relight(rng, image)).astype(np.uint8, copy=False), boxes
+        if rng.random() < self._settings.disturbed:
+            image = blemish(rng, relight(rng, image)).astype(np.uint8, copy=False)
+        return image, boxes
 
     def _photographed(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
         photo = self._photos[int(np.searchsorted(self._bounds, rng.random()))]
