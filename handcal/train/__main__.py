@@ -10,13 +10,14 @@ from handcal.evaluate.annotations import read_annotations
 from handcal.files import make_folder
 from handcal.train.backbone import load_backbone
 from handcal.train.exported import load_exported
-from handcal.train.loop import Pace, Training, TrainSettings, batches, split
+from handcal.train.loop import Pace, Training, TrainSettings, split
 from handcal.train.model import HandNet
-from handcal.train.samples import Samples, SampleSettings
+from handcal.train.moments import take_moments
+from handcal.train.samples import Samples, SampleSettings, collate
 from handcal.train.simulated import render_hands
 
 _SIMULATED = 1800
-_MOMENTS = 100
+_MOMENTS = 80
 
 # Weights that know hands already learn from larger crops, closer to what the detector will see.
 _FURTHER = TrainSettings(
@@ -65,10 +66,10 @@ def main() -> None:
     if arguments.backbone:
         load_backbone(net, arguments.backbone)
     else:
-        trained, _ = split(photos, settings.validated)
-        samples = Samples(trained, hands, settings.samples, settings.seed)
-        shown = batches(samples, settings.batch, range(_MOMENTS))
-        load_exported(net, arguments.model, (images for images, _ in shown))
+        load_exported(net, arguments.model)
+    trained, _ = split(photos, settings.validated)
+    samples = Samples(trained, hands, settings.samples, settings.seed)
+    take_moments(net, collate([samples[number] for number in range(_MOMENTS)])[0])
     pace = Pace(threads=arguments.threads, workers=arguments.workers, bfloat16=arguments.bfloat16)
     Training(net, arguments.folder, settings, pace).run(photos, hands)
 

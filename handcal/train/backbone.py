@@ -12,11 +12,17 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 
 from handcal.errors import FileError
 from handcal.files import read_limited
 from handcal.train.model import HandNet
+from handcal.train.moments import fold_in
+from handcal.types import Float32
 
+_Tensors = dict[str, Float32]
+
+_ROOT = "MobilenetV1/Conv2d_"
 _NAME = "ssd_mobilenetv1_model"
 _EPSILON = 0.001
 _MOST_BYTES = 2**25
@@ -25,19 +31,28 @@ _MOST_BYTES = 2**25
 def load_backbone(net: HandNet, folder: Path) -> None:
     """Fill the network's stem and blocks from the package's folder `model`, in place.
 
+    Where a block has fewer channels than the package's, it takes those whose standard deviation
+    times the weight that the next block gives them is largest. `take_moments` must follow.
+
     Raises
     ------
     FileError
         If the files are missing or not those of the package.
     """
     try:
-        state = _state(_read(folder), len(net.blocks))
-        net.load_state_dict({name: torch.from_numpy(value) for name, value in state.items()}, False)
+        tensors = _read(folder)
+        blocks = [list(block.children()) for block in net.blocks]
+        kept = [_kept(tensors, number, depthwise) for number, (depthwise, _) in enumerate(blocks)]
+        kept.append(np.arange(_outputs(blocks[-1][1])))
+        _fill(net.stem, *_stem(tensors), kept[0], np.arange(3))
+        for number, (depthwise, pointwise) in enumerate(blocks):
+            _fill(depthwise, *_depthwise(tensors, number), kept[number], np.arange(1))
+            _fill(pointwise, *_pointwise(tensors, number), kept[number + 1], kept[number])
     except (LookupError, TypeError, ValueError, RuntimeError) as error:
         raise FileError(f"{folder} holds another network: {error!r}") from error
 
 
-def _read(folder: Path) -> dict[str, NDArray[np.float32]]:
+def _read(folder: Path) -> _Tensors:
     """Return the package's tensors by name, dequantised."""
     data = read_limited(folder / f"{_NAME}.bin", _MOST_BYTES)
     manifest = json.loads(read_limited(folder / f"{_NAME}-weights_manifest.json", _MOST_BYTES))
@@ -53,27 +68,53 @@ def _read(folder: Path) -> dict[str, NDArray[np.float32]]:
     return tensors
 
 
-def _state(tensors: dict[str, NDArray[np.float32]], blocks: int) -> dict[str, NDArray[np.float32]]:
-    """Return the network's parameters: axes in PyTorch's order, batch normalisation folded in."""
-    root = "MobilenetV1/Conv2d_"
-    state = {
-        "stem.0.weight": tensors[f"{root}0_pointwise/weights"].transpose(3, 2, 0, 1),
-        "stem.0.bias": tensors[f"{root}0_pointwise/convolution_bn_offset"],
-    }
-    for block in range(blocks):
-        depthwise, pointwise = f"{root}{block + 1}_depthwise", f"{root}{block + 1}_pointwise"
-        gamma, beta, mean, variance = (
-            tensors[f"{depthwise}/BatchNorm/{name}"]
-            for name in ("gamma", "beta", "moving_mean", "moving_variance")
-        )
-        factor = gamma / np.sqrt(variance + _EPSILON)
-        weights = tensors[f"{depthwise}/depthwise_weights"].transpose(2, 3, 0, 1)
-        state |= {
-            f"blocks.{block}.depthwise.weight": weights * factor[:, None, None, None],
-            f"blocks.{block}.depthwise.bias": beta - mean * factor,
-            f"blocks.{block}.pointwise.weight": tensors[f"{pointwise}/weights"].transpose(
-                3, 2, 0, 1
-            ),
-            f"blocks.{block}.pointwise.bias": tensors[f"{pointwise}/convolution_bn_offset"],
-        }
-    return {name: np.ascontiguousarray(value) for name, value in state.items()}
+def _stem(tensors: _Tensors) -> tuple[Float32, Float32]:
+    """Return weights, their axes in PyTorch's order, and biases."""
+    weights = tensors[f"{_ROOT}0_pointwise/weights"].transpose(3, 2, 0, 1)
+    return weights, tensors[f"{_ROOT}0_pointwise/convolution_bn_offset"]
+
+
+def _depthwise(tensors: _Tensors, number: int) -> tuple[Float32, Float32]:
+    """Return weights and biases, batch normalisation folded in."""
+    layer = f"{_ROOT}{number + 1}_depthwise"
+    gamma, beta, mean, variance = (
+        tensors[f"{layer}/BatchNorm/{name}"]
+        for name in ("gamma", "beta", "moving_mean", "moving_variance")
+    )
+    factor = gamma / np.sqrt(variance + _EPSILON)
+    weights = tensors[f"{layer}/depthwise_weights"].transpose(2, 3, 0, 1)
+    return weights * factor[:, None, None, None], beta - mean * factor
+
+
+def _pointwise(tensors: _Tensors, number: int) -> tuple[Float32, Float32]:
+    layer = f"{_ROOT}{number + 1}_pointwise"
+    weights = tensors[f"{layer}/weights"].transpose(3, 2, 0, 1)
+    return weights, tensors[f"{layer}/convolution_bn_offset"]
+
+
+def _kept(tensors: _Tensors, number: int, depthwise: nn.Module) -> NDArray[np.intp]:
+    """Return which channels a block gets."""
+    deviation = tensors[f"{_ROOT}{number + 1}_depthwise/BatchNorm/gamma"]
+    taken = np.square(deviation) * np.square(_pointwise(tensors, number)[0]).sum((0, 2, 3))
+    order = np.argsort(-taken, kind="stable")
+    return np.sort(order[: _outputs(depthwise)])
+
+
+def _fill(
+    layer: nn.Module,
+    weight: Float32,
+    bias: Float32,
+    outputs: NDArray[np.intp],
+    inputs: NDArray[np.intp],
+) -> None:
+    convolution, normalisation, *_ = layer.children()
+    state = {"weight": torch.from_numpy(weight[outputs][:, inputs])}
+    if isinstance(normalisation, nn.BatchNorm2d):
+        fold_in(normalisation, torch.ones(len(outputs)), torch.from_numpy(bias[outputs]))
+    else:
+        state["bias"] = torch.from_numpy(bias[outputs])
+    convolution.load_state_dict(state)
+
+
+def _outputs(layer: nn.Module) -> int:
+    return len(layer.get_parameter("0.weight"))

@@ -134,7 +134,7 @@ class Training:
         saved_s = time.monotonic()
         losses: list[list[float]] = []
         samples = Samples(trained, hands, self._settings.samples, self._settings.seed)
-        for images, targets in self._batches(samples, range(self._step, self._settings.steps)):
+        for images, targets in self._batches(samples, self._step, self._settings.steps):
             losses.append(self._learn(images, targets))
             if self._step % 50 == 0:
                 self._log(losses=np.mean(losses, 0).round(4).tolist())
@@ -162,8 +162,19 @@ class Training:
             results.append(ImageResult(boxes / scale, scores, photo.boxes))
         return summary(photos, results)
 
-    def _batches(self, samples: Samples, steps: range) -> Iterator[tuple[Tensor, list[Tensor]]]:
-        return batches(samples, self._settings.batch, steps, self._pace.workers)
+    def _batches(
+        self, samples: Samples, first: int, end: int
+    ) -> Iterator[tuple[Tensor, list[Tensor]]]:
+        batch = self._settings.batch
+        loader = DataLoader(
+            samples,
+            batch_size=batch,
+            sampler=range(first * batch, end * batch),
+            num_workers=self._pace.workers,
+            collate_fn=collate,
+            worker_init_fn=_quiet_worker,
+        )
+        yield from loader
 
     def _learn(self, images: Tensor, targets: list[Tensor]) -> list[float]:
         """Take one step; return the losses of scores and boxes."""
@@ -187,8 +198,8 @@ class Training:
     def _settle(self, samples: Samples) -> None:
         """Take the moments of the averaged weights: the mean of earlier weights' is not theirs."""
         end = self._settings.steps
-        settling = self._batches(samples, range(end, end + self._settings.settled))
-        images = (images.to(self._device).float() for images, _ in settling)
+        batches = self._batches(samples, end, end + self._settings.settled)
+        images = (images.to(self._device).float() for images, _ in batches)
         torch.optim.swa_utils.update_bn(images, self._average.module)
 
     def _set_rates(self) -> None:
@@ -253,20 +264,6 @@ def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[
     return (
         [photo for i, photo in enumerate(photos) if i not in aside],
         [photo for i, photo in enumerate(photos) if i in aside],
-    )
-
-
-def batches(
-    samples: Samples, size: int, steps: range, workers: int = 0
-) -> Iterator[tuple[Tensor, list[Tensor]]]:
-    """Yield what the network is shown at these steps, as `collate` gives it."""
-    yield from DataLoader(
-        samples,
-        batch_size=size,
-        sampler=range(steps.start * size, steps.stop * size),
-        num_workers=workers,
-        collate_fn=collate,
-        worker_init_fn=_quiet_worker,
     )
 
 

@@ -6,7 +6,7 @@ Howard et al. 2017 (MobileNet), Lin et al. 2017 (FPN), Tian et al. 2019 (FCOS).
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
+from collections.abc import Iterator
 
 import torch
 from torch import Tensor, nn
@@ -14,17 +14,21 @@ from torch.nn import functional
 
 from handcal.hand.detect import STRIDES
 
-# Channels in, channels out and stride of the thirteen separable convolutions.
+# Channels in, channels out and stride of the thirteen separable convolutions. They are those of
+# MobileNetV1 but for the first, where half of the pretrained channels are all zero, and the last
+# seven, where half as many do.
 _BLOCKS = (
-    (32, 64, 1),
+    (16, 64, 1),
     (64, 128, 2),
     (128, 128, 1),
     (128, 256, 2),
     (256, 256, 1),
     (256, 512, 2),
-    *((512, 512, 1),) * 5,
-    (512, 1024, 2),
-    (1024, 1024, 1),
+    (512, 384, 1),
+    (384, 256, 1),
+    *((256, 256, 1),) * 3,
+    (256, 512, 2),
+    (512, 512, 1),
 )
 # The blocks whose outputs have the strides 8, 16 and 32.
 _TAPS = (5, 11, 13)
@@ -58,24 +62,33 @@ class _Conv(nn.Conv2d):
         return self.weight + ((weight / scale).round() * scale - weight)
 
 
-def _separable(inputs: int, outputs: int, stride: int) -> nn.Sequential:
-    """Return a depthwise and a pointwise convolution, batch normalisation folded into both."""
+def _normalised(
+    inputs: int, outputs: int, size: int = 1, groups: int = 1, stride: int = 1
+) -> nn.Sequential:
     return nn.Sequential(
-        OrderedDict(
-            depthwise=_Conv(inputs, inputs, 3, stride, 1, groups=inputs),
-            depthwise_act=nn.ReLU6(inplace=True),
-            pointwise=_Conv(inputs, outputs, 1),
-            pointwise_act=nn.ReLU6(inplace=True),
-        )
-    )
-
-
-def _normalised(inputs: int, outputs: int, size: int = 1, groups: int = 1) -> nn.Sequential:
-    return nn.Sequential(
-        _Conv(inputs, outputs, size, padding=size // 2, groups=groups, bias=False),
+        _Conv(inputs, outputs, size, stride, size // 2, groups=groups, bias=False),
         nn.BatchNorm2d(outputs, momentum=0.03),
         nn.ReLU6(inplace=True),
     )
+
+
+def _folded(
+    inputs: int, outputs: int, size: int = 1, groups: int = 1, stride: int = 1
+) -> nn.Sequential:
+    """Return a convolution that batch normalisation is folded into; not to be trained."""
+    return nn.Sequential(
+        _Conv(inputs, outputs, size, stride, size // 2, groups=groups), nn.ReLU6(inplace=True)
+    ).requires_grad_(False)
+
+
+def _blocks() -> list[nn.Sequential]:
+    """Return the separable convolutions; the first are not trained."""
+    blocks = []
+    for number, (inputs, outputs, stride) in enumerate(_BLOCKS):
+        kind = _folded if number < _FROZEN_BLOCKS else _normalised
+        depthwise = kind(inputs, inputs, 3, inputs, stride)
+        blocks.append(nn.Sequential(depthwise, kind(inputs, outputs)))
+    return blocks
 
 
 def _tower() -> nn.Sequential:
@@ -103,8 +116,8 @@ class HandNet(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = nn.Sequential(_Conv(3, 32, 3, 2, 1), nn.ReLU6(inplace=True))
-        self.blocks = nn.ModuleList(_separable(*block) for block in _BLOCKS)
+        self.stem = _folded(3, _BLOCKS[0][0], 3, stride=2)
+        self.blocks = nn.ModuleList(_blocks())
         self.lateral = nn.ModuleList(_normalised(_BLOCKS[tap - 1][1], _WIDTH) for tap in _TAPS)
         towers = [_tower() for _ in _TAPS]
         for tower in towers[1:]:
@@ -115,8 +128,14 @@ class HandNet(nn.Module):
         # At first a point is rarely a hand, and boxes are four strides wide.
         first_bias = [-math.log(1.0 / _PRIOR - 1.0)] + [math.log(2.0)] * 4
         self.predict.bias = nn.Parameter(torch.tensor(first_bias))
-        for part in (self.stem, *self.blocks[:_FROZEN_BLOCKS]):
-            part.requires_grad_(False)
+
+    def normalised(self) -> Iterator[tuple[str, nn.Conv2d, nn.BatchNorm2d]]:
+        """Yield the convolutions that are normalised, the layers that do so, and both's name."""
+        for name, module in self.named_modules():
+            if isinstance(module, nn.Sequential):
+                convolution, normalisation, *_ = module
+                if isinstance(convolution, nn.Conv2d) and isinstance(normalisation, nn.BatchNorm2d):
+                    yield name, convolution, normalisation
 
     def bake(self) -> None:
         """Round the weights as training does, so that nothing is left to round; for export."""

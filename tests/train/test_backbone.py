@@ -14,6 +14,12 @@ from handcal.train.backbone import load_backbone
 from handcal.train.model import HandNet
 
 EPSILON = 0.001
+# Channels in and out of MobileNetV1's blocks.
+BLOCKS = (
+    *((32, 64), (64, 128), (128, 128), (128, 256), (256, 256), (256, 512)),
+    *((512, 512),) * 5,
+    *((512, 1024), (1024, 1024)),
+)
 
 
 def shapes() -> dict[str, tuple[int, ...]]:
@@ -23,9 +29,7 @@ def shapes() -> dict[str, tuple[int, ...]]:
         f"{root}0_pointwise/weights": (3, 3, 3, 32),
         f"{root}0_pointwise/convolution_bn_offset": (32,),
     }
-    parameters = dict(HandNet().named_parameters())
-    for number in range(1, 14):
-        outputs, inputs = parameters[f"blocks.{number - 1}.pointwise.weight"].shape[:2]
+    for number, (inputs, outputs) in enumerate(BLOCKS, 1):
         found[f"{root}{number}_depthwise/depthwise_weights"] = (3, 3, inputs, 1)
         for name in ("gamma", "beta", "moving_mean", "moving_variance"):
             found[f"{root}{number}_depthwise/BatchNorm/{name}"] = (inputs,)
@@ -54,41 +58,53 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, A
     return folder, tensors
 
 
+def kept(tensors: dict[str, Any], number: int) -> list[int]:
+    """Return which channels the block of that number gets: those it makes the most of."""
+    root = f"MobilenetV1/Conv2d_{number}_"
+    gamma, weights = (
+        tensors[f"{root}depthwise/BatchNorm/gamma"],
+        tensors[f"{root}pointwise/weights"],
+    )
+    makes = np.abs(gamma) * np.sqrt((weights**2).sum((0, 1, 3)))
+    count = len(HandNet().blocks[number - 1].get_parameter("0.0.weight"))
+    return sorted(np.argsort(-makes)[:count].tolist())
+
+
+@pytest.mark.parametrize(("number", "stride"), [(2, 2), (10, 1)], ids=["folded", "normalised"])
 def test_a_block_computes_what_the_packages_layers_do(
-    package: tuple[Path, dict[str, Any]],
+    number: int, stride: int, package: tuple[Path, dict[str, Any]]
 ) -> None:
     folder, tensors = package
-    net = HandNet()
+    net = HandNet().eval()
     load_backbone(net, folder)
-    root = "MobilenetV1/Conv2d_2_"
-    depthwise, offset, gamma, beta, mean, variance, pointwise = (
+    depthwise, pointwise = net.blocks[number - 1].children()
+    inputs, outputs = kept(tensors, number), kept(tensors, number + 1)
+    root = f"MobilenetV1/Conv2d_{number}_"
+    kernel, gamma, beta, mean, variance, mixed, offset = (
         torch.tensor(tensors[root + name], dtype=torch.float32)
         for name in (
             "depthwise/depthwise_weights",
-            "pointwise/convolution_bn_offset",
             "depthwise/BatchNorm/gamma",
             "depthwise/BatchNorm/beta",
             "depthwise/BatchNorm/moving_mean",
             "depthwise/BatchNorm/moving_variance",
             "pointwise/weights",
+            "pointwise/convolution_bn_offset",
         )
     )
-    features = torch.rand(1, 64, 9, 9)
-    kernel = depthwise.permute(2, 3, 0, 1)
-    expected = functional.conv2d(features, kernel, stride=2, padding=1, groups=64)
-    expected = functional.batch_norm(expected, mean, variance, gamma, beta, eps=EPSILON)
-    expected = functional.relu6(expected)
-    expected = functional.relu6(functional.conv2d(expected, pointwise.permute(3, 2, 0, 1), offset))
-    loaded = net.blocks[1].state_dict()  # as it is, not rounded
-    computed = functional.relu6(
-        functional.conv2d(
-            features, loaded["depthwise.weight"], loaded["depthwise.bias"], 2, 1, groups=64
-        )
-    )
-    computed = functional.relu6(
-        functional.conv2d(computed, loaded["pointwise.weight"], loaded["pointwise.bias"])
-    )
-    assert computed.numpy() == pytest.approx(expected.numpy(), abs=1e-4)
+    features = torch.rand(1, len(inputs), 9, 9)
+    kernel = kernel.permute(2, 3, 0, 1)[inputs]
+    expected = functional.conv2d(features, kernel, stride=stride, padding=1, groups=len(inputs))
+    moments = mean[inputs], variance[inputs], gamma[inputs], beta[inputs]
+    expected = functional.relu6(functional.batch_norm(expected, *moments, eps=EPSILON))
+    mixed = mixed.permute(3, 2, 0, 1)[outputs][:, inputs]
+    expected = functional.conv2d(expected, mixed, offset[outputs])
+
+    for layer in (depthwise, pointwise):
+        layer.get_submodule("0")._is_baked = True  # type: ignore[assignment]  # not to round
+    with torch.inference_mode():
+        computed = pointwise(depthwise(features))
+    assert computed.numpy() == pytest.approx(functional.relu6(expected).numpy(), abs=1e-3)
 
 
 def test_names_the_file_that_is_missing(tmp_path: Path) -> None:

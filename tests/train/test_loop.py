@@ -81,8 +81,8 @@ def test_the_weights_that_are_trained_change(tmp_path: Path, photos: list[Photo]
     torch.manual_seed(0)
     start = HandNet().state_dict()
     end = trained(tmp_path, photos)
-    assert (start["blocks.12.pointwise.weight"] != end["blocks.12.pointwise.weight"]).any()
-    assert (start["blocks.0.pointwise.weight"] == end["blocks.0.pointwise.weight"]).all()
+    assert (start["blocks.12.1.0.weight"] != end["blocks.12.1.0.weight"]).any()
+    assert (start["blocks.0.1.0.weight"] == end["blocks.0.1.0.weight"]).all()
 
 
 def test_the_moments_are_those_of_the_averaged_weights(tmp_path: Path, photos: list[Photo]) -> None:

@@ -26,8 +26,8 @@ def test_the_first_blocks_are_not_trained() -> None:
     net = HandNet()
     net(torch.rand(2, 3, 64, 64)).sum().backward()
     trained = {name for name, value in net.named_parameters() if value.grad is not None}
-    assert "blocks.2.pointwise.weight" not in trained
-    assert "blocks.3.depthwise.weight" in trained
+    assert "blocks.2.1.0.weight" not in trained
+    assert "blocks.3.0.0.weight" in trained
     assert "predict.bias" in trained
 
 
@@ -42,14 +42,14 @@ def test_levels_share_what_they_look_for_but_not_how_they_are_normalised() -> No
 def test_weights_are_rounded_as_the_export_to_integers_does() -> None:
     torch.manual_seed(0)
     net, image = HandNet().eval(), 255.0 * torch.rand(1, 3, 64, 64)
-    layer = dict(net.named_parameters())["blocks.6.pointwise.weight"]
+    layer = dict(net.named_parameters())["blocks.6.1.0.weight"]
     weights = layer.detach().clone()
     with torch.inference_mode():
         before = net(image)
         net.bake()
         after = net(image)
     assert torch.equal(before, after)
-    baked = dict(net.named_parameters())["blocks.6.pointwise.weight"].detach()
+    baked = dict(net.named_parameters())["blocks.6.1.0.weight"].detach()
     assert not torch.equal(baked, weights)
     steps = baked / (weights.abs().amax((1, 2, 3), keepdim=True) / 64.0)
     assert steps.numpy() == pytest.approx(steps.round().numpy(), abs=1e-3)
@@ -59,6 +59,6 @@ def test_weights_are_rounded_as_the_export_to_integers_does() -> None:
 def test_rounding_does_not_stop_gradients() -> None:
     net = HandNet()
     net(torch.rand(1, 3, 64, 64)).sum().backward()
-    gradient = dict(net.named_parameters())["blocks.12.pointwise.weight"].grad
+    gradient = dict(net.named_parameters())["blocks.12.1.0.weight"].grad
     assert gradient is not None
     assert gradient.abs().max() > 0.0
