@@ -22,12 +22,10 @@ _MOMENTS = 80
 # Weights that know hands already learn from larger crops, closer to what the detector will see.
 _FURTHER = TrainSettings(
     seed=5,
-    steps=23_000,
+    steps=24_000,
     rate=5e-4,
-    backbone_rate=1.5e-4,
     fall=0.95,
-    average=0.999,
-    samples=SampleSettings(side_px=320, zoomed=0.35, pasted=0.06, disturbed=0.6),
+    samples=SampleSettings(side_px=320, zoomed=0.4, pasted=0.06, disturbed=0.7),
 )
 
 

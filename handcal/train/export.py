@@ -99,8 +99,9 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
             weight_type=QuantType.QInt8,
             reduce_range=True,
             op_types_to_quantize=["Conv", "Clip", "Add", "Resize"],
-            # Logits and logarithms of distances have no range in common.
-            nodes_to_exclude=[name for name in nodes if "predict" in name],
+            # Logits and logarithms of distances have no range in common; and of three channels
+            # integers make nothing faster.
+            nodes_to_exclude=[name for name in nodes if "predict" in name or "stem" in name],
         )
 
 

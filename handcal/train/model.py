@@ -14,9 +14,9 @@ from torch.nn import functional
 
 from handcal.hand.detect import STRIDES
 
-# Channels in, channels out and stride of the thirteen separable convolutions. They are those of
-# MobileNetV1 but for the first, where half of the pretrained channels are all zero, and the last
-# seven, where half as many do.
+# Channels in, channels out and stride of the thirteen separable convolutions: those of MobileNetV1,
+# but fewer where few are of use: at the stem, where 14 of 32 pretrained ones are all zero, and
+# from the seventh on.
 _BLOCKS = (
     (16, 64, 1),
     (64, 128, 2),
