@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,13 @@ def viewpoint_in_H_m(display: EyeDisplay) -> Float64:
 def test_the_shipped_file_is_the_example(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     write_rig(path, example_rig())
-    assert path.read_text() == resource_path("example_rig.yaml").read_text()
+    number = re.compile(r"-?\d+\.\d*(?:e[-+]\d+)?")
+    written, shipped = path.read_text(), resource_path("example_rig.yaml").read_text()
+    # Processors differ in the last digits, and lines may break elsewhere.
+    assert number.sub("", written).split() == number.sub("", shipped).split()
+    values, expected = (np.array(number.findall(text), float) for text in (written, shipped))
+    assert len(expected) > 50
+    np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-15)
 
 
 def test_it_is_plausible() -> None:
