@@ -77,7 +77,7 @@ def test_an_interrupted_study_goes_on(
         def ask() -> bool:
             nonlocal asked
             asked += 1
-            return asked > 2
+            return asked > 1  # there are two cases: a quick machine asks no more often
 
         yield ask
 
