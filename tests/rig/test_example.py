@@ -28,7 +28,7 @@ def test_the_shipped_file_is_the_example(tmp_path: Path) -> None:
     assert number.sub("", written).split() == number.sub("", shipped).split()
     values, expected = (np.array(number.findall(text), float) for text in (written, shipped))
     assert len(expected) > 50
-    np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-15)
 
 
 def test_it_is_plausible() -> None:

@@ -8,46 +8,22 @@ import torch
 
 from handcal.errors import FileError
 from handcal.resources import resource_path
-from handcal.train.export import export_float
 from handcal.train.exported import load_exported
 from handcal.train.model import HandNet
+from handcal.types import UInt8
 
 
 @pytest.fixture(scope="module")
-def images() -> torch.Tensor:
-    torch.manual_seed(1)
-    return 255.0 * torch.rand(2, 3, 64, 96)
-
-
-@pytest.fixture(scope="module")
-def net(images: torch.Tensor) -> HandNet:
-    """Return a network with weights, moments and signs of its own in every layer."""
-    torch.manual_seed(0)
-    net = HandNet()
-    for module in net.modules():
-        if isinstance(module, torch.nn.Conv2d):
-            torch.nn.init.kaiming_normal_(module.weight)
-        if isinstance(module, torch.nn.BatchNorm2d):
-            module.momentum = None
-            torch.nn.init.normal_(module.weight)
-            torch.nn.init.normal_(module.bias)
-    net.train()(images)
-    net.bake()
-    return net.eval()
-
-
-@pytest.fixture(scope="module")
-def again(net: HandNet, tmp_path_factory: pytest.TempPathFactory) -> HandNet:
-    path = tmp_path_factory.mktemp("models") / "float.onnx"
-    export_float(net, path)
+def again(float_model: Path) -> HandNet:
     again = HandNet()
-    load_exported(again, path)
+    load_exported(again, float_model)
     return again.eval()
 
 
 def test_what_was_exported_computes_the_same_again(
-    net: HandNet, again: HandNet, images: torch.Tensor
+    net: HandNet, again: HandNet, noise: UInt8
 ) -> None:
+    images = torch.from_numpy(noise).permute(0, 3, 1, 2).float()
     with torch.inference_mode():
         expected, other, found = net(images), net(images.flip(1)), again(images)
     assert found.numpy() == pytest.approx(expected.numpy(), abs=1e-2)
