@@ -27,6 +27,7 @@ from handcal.terminal import (
     Parser,
     add_command,
     console,
+    errors_in_one_line,
     fail,
     number,
     progress,
@@ -259,17 +260,8 @@ def doctor(_arguments: argparse.Namespace) -> None:
 def main() -> None:
     """Run a command; every foreseen error is one line."""
     arguments = _parser().parse_args()
-    try:
+    with errors_in_one_line():
         arguments.command(arguments)
-    except HandcalError as error:
-        fail(str(error), 1)
-    except KeyboardInterrupt:
-        fail("interrupted", 130)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
-    except OSError as error:
-        fail(f"cannot write the output: {error.strerror or error}", 1)
 
 
 def _parser() -> argparse.ArgumentParser:

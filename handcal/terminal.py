@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from handcal.errors import HandcalError
 from handcal.files import make_folder, write_json
 
 console = Console(soft_wrap=True, highlight=False)
@@ -57,6 +58,22 @@ def fail(message: str, code: int) -> NoReturn:
     """Say one line on standard error, and end with an exit code."""
     sys.stderr.write(f"handcal: {' '.join(message.split())}\n")
     sys.exit(code)
+
+
+@contextmanager
+def errors_in_one_line() -> Iterator[None]:
+    """End the program with one line for every foreseen error inside the block."""
+    try:
+        yield
+    except HandcalError as error:
+        fail(str(error), 1)
+    except KeyboardInterrupt:
+        fail("interrupted", 130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+    except OSError as error:
+        fail(f"cannot write the output: {error.strerror or error}", 1)
 
 
 def number(kind: type[int] | type[float], low: float, high: float) -> Callable[[str], float]:

@@ -24,11 +24,16 @@ def box_corners(boxes: Float64) -> Float64:
 
 
 def random_warp(
-    rng: np.random.Generator, size_px: tuple[int, int], center: Float64, scale: float, side_px: int
+    rng: np.random.Generator,
+    size_px: tuple[int, int],
+    center: Float64,
+    scale: float,
+    side_px: int,
+    turn_rad: float,
 ) -> Float64:
     """Return a map (2, 3) of an image to a square of that side that shows `center`.
 
-    Scaled, turned by up to 25° half the time, mirrored half the time, and stretched by up to 10 %;
+    Scaled, turned half the time, mirrored half the time, and stretched by up to 10 %;
     mostly moved so that little of the square is outside the image.
 
     Parameters
@@ -39,8 +44,10 @@ def random_warp(
     center : (2,) float64
     scale : float
     side_px : int
+    turn_rad : float
+        Most that it is turned by.
     """
-    angle = rng.uniform(-0.44, 0.44) * (rng.random() < 0.5)
+    angle = rng.uniform(-turn_rad, turn_rad) * (rng.random() < 0.5)
     stretch = np.exp(rng.uniform(-0.1, 0.1) / 2)
     mirror = rng.choice([-1.0, 1.0])
     cos, sin = np.cos(angle), np.sin(angle)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import warnings
 from collections.abc import Iterator, Sequence
@@ -27,6 +26,7 @@ from torch import Tensor, nn
 from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
 from handcal.evaluate.annotations import Photo, read_annotations
 from handcal.hand.detect import DetectSettings, letterbox
+from handcal.terminal import Parser, errors_in_one_line
 from handcal.train.loop import read_average
 from handcal.train.model import HandNet
 
@@ -34,9 +34,10 @@ _OPSET = 17
 _CALIBRATED = 200
 
 
+@errors_in_one_line()
 def main() -> None:
     """Export the averaged weights of the last checkpoint."""
-    parser = argparse.ArgumentParser(prog="python -m handcal.train.export", description=__doc__)
+    parser = Parser(prog="python -m handcal.train.export", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="oxford_hands: train and val")
     parser.add_argument("--folder", type=Path, default=Path(".training"), help="working files")
     parser.add_argument("--output", type=Path, default=Path("resources"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Iterator
@@ -21,6 +20,7 @@ from handcal.resources import resource_path
 from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
 from handcal.sim.room import make_room
+from handcal.terminal import Parser, errors_in_one_line, number
 from handcal.train.simulated import Picture, picture
 from handcal.types import UInt8
 
@@ -31,11 +31,14 @@ _LIGHTS = {"dim": (0.3, 0.3, 0.3), "warm": (1.0, 0.75, 0.45), "cold": (0.6, 0.8,
 _RUNS = 50
 
 
+@errors_in_one_line()
 def main() -> None:
     """Measure both models and print JSON."""
-    parser = argparse.ArgumentParser(prog="python -m handcal.train.measure", description=__doc__)
+    parser = Parser(prog="python -m handcal.train.measure", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="oxford_hands: train and val")
-    parser.add_argument("--seeds", type=int, default=200, help="simulated frames")
+    parser.add_argument(
+        "--seeds", type=number(int, 1, 10_000), default=200, help="simulated frames"
+    )
     arguments = parser.parse_args()
     pictures = list(simulated_pictures(arguments.seeds))
     for model in (FLOAT_MODEL, INTEGER_MODEL):

@@ -28,6 +28,12 @@ from handcal.types import Float32, Float64, UInt8
 _SHOWN_MIN = 0.35
 _SMALLEST_PX = 9.0
 _GRAY = (127, 127, 127)
+# Hands of photographs are annotated by turned rectangles, which may be turned further; the upright
+# boxes of simulated ones only grow.
+_PHOTO_TURN_RAD = 0.6
+_SIMULATED_TURN_RAD = 0.2
+# A hand with a smaller share of a blend is neither right nor wrong.
+_BLEND_MIN = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +58,8 @@ class SampleSettings:
         How much likelier a photograph is chosen if a hand fills 15 % of it or more.
     simulated, pasted : float
         Shares of samples that are simulated pictures, and photographs with a simulated hand.
+    blended : float
+        Share of samples that are two of the others, one seen through the other.
     disturbed : float
         Share of samples whose light and sharpness are changed.
     """
@@ -64,6 +72,7 @@ class SampleSettings:
     large_weight: float = 2.0
     simulated: float = 0.1
     pasted: float = 0.08
+    blended: float = 0.2
     disturbed: float = 1.0
 
 
@@ -100,24 +109,29 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
     def __getitem__(self, index: int) -> tuple[UInt8, Float32]:
         """Return a crop (side, side, 3) and its boxes (M, 5) as `clipped` gives them."""
         rng = np.random.default_rng((self._seed, index))
-        kind = rng.random() - self._settings.simulated
-        if kind < 0.0:
-            image, boxes = self._simulated(rng)
-        else:
-            image, boxes = self._photographed(rng)
-            if kind < self._settings.pasted:
-                image, boxes = self._paste(rng, image, boxes)
+        image, boxes = self._view(rng)
+        if rng.random() < self._settings.blended:
+            image, boxes = _blend(rng, image, boxes, *self._view(rng))
         if rng.random() < self._settings.disturbed:
             image = blemish(rng, relight(rng, image)).astype(np.uint8, copy=False)
         return image, boxes
 
+    def _view(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
+        kind = rng.random() - self._settings.simulated
+        if kind < 0.0:
+            return self._simulated(rng)
+        image, boxes = self._photographed(rng)
+        if kind < self._settings.pasted:
+            image, boxes = self._paste(rng, image, boxes)
+        return image, boxes
+
     def _photographed(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
         photo = self._photos[int(np.searchsorted(self._bounds, rng.random()))]
-        warp = self._view(rng, photo)
+        warp = self._part(rng, photo)
         image = self._warped(photo.read(), warp)
         return image, self._clipped(transform_corners(warp, photo.quads))
 
-    def _view(self, rng: np.random.Generator, photo: Photo) -> Float64:
+    def _part(self, rng: np.random.Generator, photo: Photo) -> Float64:
         """Choose a part of a photograph: about one of its hands, or anywhere."""
         settings = self._settings
         image_px = np.sqrt(photo.width * photo.height)
@@ -132,7 +146,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
             if rng.random() < settings.centered:
                 center = (photo.boxes[hand, :2] + photo.boxes[hand, 2:]) / 2
         size_px = photo.width, photo.height
-        return random_warp(rng, size_px, center, scale, settings.side_px)
+        return random_warp(rng, size_px, center, scale, settings.side_px, _PHOTO_TURN_RAD)
 
     def _simulated(self, rng: np.random.Generator) -> tuple[UInt8, Float32]:
         picture, boxes, warp = self._raised(rng)
@@ -159,7 +173,12 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         wanted_px = self._settings.side_px * np.exp(rng.uniform(np.log(0.2), np.log(0.8)))
         center = (box[0, :2] + box[0, 2:]) / 2
         warp = random_warp(
-            rng, picture.shape[1::-1], center, wanted_px / hand_px, self._settings.side_px
+            rng,
+            picture.shape[1::-1],
+            center,
+            wanted_px / hand_px,
+            self._settings.side_px,
+            _SIMULATED_TURN_RAD,
         )
         boxes = self._clipped(transform_corners(warp, box_corners(box)))
         return picture, boxes, warp
@@ -179,6 +198,17 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
 
     def _clipped(self, boxes: Float64) -> Float32:
         return clipped(boxes, self._settings.side_px, _SHOWN_MIN, _SMALLEST_PX)
+
+
+def _blend(
+    rng: np.random.Generator, image: UInt8, boxes: Float32, other: UInt8, other_boxes: Float32
+) -> tuple[UInt8, Float32]:
+    """Return an image seen through another (mixup, Zhang et al. 2019 for detectors)."""
+    share = rng.uniform(0.5, 0.8)
+    blend = cv2.addWeighted(image, share, other, 1.0 - share, 0.0).astype(np.uint8, copy=False)
+    if 1.0 - share < _BLEND_MIN:
+        other_boxes[:, 4] = 1.0
+    return blend, np.concatenate([boxes, other_boxes])
 
 
 def collate(samples: list[tuple[UInt8, Float32]]) -> tuple[Tensor, list[Tensor]]:

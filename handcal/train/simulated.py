@@ -21,7 +21,7 @@ CAMERA = Intrinsics(width=424, height=240, fx=306.0, fy=306.0, cx=211.5, cy=119.
 _FIRST_SEED = 1_000_000  # tests and benchmarks count from 0
 _HANDS_PER_ROOM = 25
 _GRID_M = 0.003
-_TILT = 1.6  # foreshortened hands are the hardest to find
+_TILT = 1.6  # foreshortened and sideways hands are the hardest to find
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ def picture(
 ) -> Picture:
     """Draw the hand of a seed, raised somewhere before a camera in a room.
 
-    With a larger `tilt`, hands are more often seen foreshortened than a wearer's are.
+    With a larger `tilt`, hands are more often foreshortened or sideways than a wearer's are.
     """
     rng = np.random.default_rng(seed)
     hand = make_hand(seed, settings)
@@ -102,5 +102,5 @@ def _raised(rng: np.random.Generator, camera: Intrinsics, tilt: float) -> Float6
     y = z * rng.uniform(0.3, 0.75) * camera.height / camera.fy - z * camera.cy / camera.fy
     facing = rigid([0.0, np.pi * rng.integers(2), 0.0])
     tilted = rigid([tilt * rng.normal(0.0, 0.35), tilt * rng.normal(0.0, 0.4), 0.0])
-    rolled = rigid([0.0, 0.0, rng.normal(0.0, 0.6)])
+    rolled = rigid([0.0, 0.0, tilt * rng.normal(0.0, 0.6)])
     return rigid(translation_m=[x, y, z]) @ rolled @ tilted @ facing

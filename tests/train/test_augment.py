@@ -27,17 +27,18 @@ def test_a_turned_quadrilateral_gets_the_box_about_it() -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_a_random_map_has_the_scale(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    warp = random_warp(rng, (400, 300), np.array([200.0, 150.0]), 1.5, 192)
+    warp = random_warp(rng, (400, 300), np.array([200.0, 150.0]), 1.5, 192, 0.4)
     assert abs(np.linalg.det(warp[:, :2])) == pytest.approx(1.5**2)
     across, down = np.linalg.norm(warp[:, :2], axis=0)
     assert across / down == pytest.approx(1.0, abs=0.11)
+    assert abs(np.arctan2(warp[1, 0], abs(warp[0, 0]))) <= 0.4
 
 
 def test_a_random_map_shows_the_centre_of_a_large_picture() -> None:
     rng = np.random.default_rng(0)
     center = np.array([2000.0, 1500.0])
     for _ in range(50):
-        warp = random_warp(rng, (4000, 3000), center, 1.0, 192)
+        warp = random_warp(rng, (4000, 3000), center, 1.0, 192, 0.4)
         shown = warp[:, :2] @ center + warp[:, 2]
         assert (shown > 0.09 * 192).all()
         assert (shown < 0.91 * 192).all()

@@ -26,7 +26,7 @@ def photo(path: Path) -> Photo:
 
 @pytest.fixture(scope="module")
 def samples(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Samples]:
-    """Return samples of photographs, of simulated pictures, and of one pasted on the other."""
+    """Return samples of photographs, of simulated pictures, and of the two in one."""
     folder = tmp_path_factory.mktemp("pictures")
     picture = np.zeros((240, 424, 4), np.uint8)
     picture[60:160, 200:280] = 255
@@ -34,11 +34,17 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Samples]:
     write_json(folder / "boxes.json", {"00000.png": [200, 60, 280, 160]})
     photos = [photo(folder / "photo.png")]
     return {
-        name: Samples(photos, folder, SampleSettings(simulated=sim, pasted=pasted), seed=1)
-        for name, sim, pasted in (
-            ("photographed", 0.0, 0.0),
-            ("simulated", 1.0, 0.0),
-            ("pasted", 0.0, 1.0),
+        name: Samples(
+            photos,
+            folder,
+            SampleSettings(simulated=sim, pasted=pasted, blended=blended, disturbed=disturbed),
+            seed=1,
+        )
+        for name, sim, pasted, blended, disturbed in (
+            ("photographed", 0.0, 0.0, 0.0, 1.0),
+            ("simulated", 1.0, 0.0, 0.0, 1.0),
+            ("pasted", 0.0, 1.0, 0.0, 1.0),
+            ("blended", 0.0, 0.0, 1.0, 0.0),
         )
     }
 
@@ -66,6 +72,22 @@ def test_a_pasted_hand_is_one_more(samples: dict[str, Samples]) -> None:
     without = [len(samples["photographed"][index][1]) for index in range(30)]
     pasted = [len(samples["pasted"][index][1]) for index in range(30)]
     assert sum(pasted) > sum(without)
+
+
+def test_a_blend_shows_both_hands_and_leaves_out_the_fainter_one(
+    samples: dict[str, Samples],
+) -> None:
+    """Of hands of 220 before walls of 30, blended: as bright as their share."""
+    left_out = 0
+    for index in range(60):
+        image, boxes = samples["blended"][index]
+        whole = [box for box in boxes if (box[2:4] - box[:2] > 20).all()]
+        for x0, y0, x1, y1, is_left_out in whole:
+            middle = image[int(y0 + y1) // 2, int(x0 + x1) // 2].mean()
+            share_min = 0.2 if is_left_out else 0.35
+            assert middle > 30 + share_min * 190 - 3
+            left_out += bool(is_left_out)
+    assert left_out > 5
 
 
 def test_a_sample_is_the_same_every_time(samples: dict[str, Samples]) -> None:
