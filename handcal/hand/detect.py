@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -137,7 +138,17 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
     scale : float
         Of the image in the canvas.
     """
-    height, width = color.shape[:2]
+    scale, size, canvas_shape = _fit(*color.shape[:2], pixels)
+    canvas = np.full((*canvas_shape, 3), _GRAY, np.uint8)
+    while color.shape[0] >= 2 * size[1] and color.shape[1] >= 2 * size[0]:  # against aliasing
+        color = _halved(color)
+    cv2.resize(color, size, dst=canvas[: size[1], : size[0]])
+    return canvas, scale
+
+
+@lru_cache
+def _fit(height: int, width: int, pixels: int) -> tuple[float, tuple[int, int], tuple[int, int]]:
+    """Return an image's scale in its canvas, its width and height there, the canvas's shape."""
     cell = STRIDES[-1]
     scale, canvas_width, canvas_height = max(
         (min(columns * cell / width, rows * cell / height), columns * cell, rows * cell)
@@ -149,12 +160,7 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
         min(max(1, round(scale * width)), canvas_width),
         min(max(1, round(scale * height)), canvas_height),
     )
-    canvas_shape = tuple(-(-side // cell) * cell for side in size[::-1])
-    canvas = np.full((*canvas_shape, 3), _GRAY, np.uint8)
-    while color.shape[0] >= 2 * size[1] and color.shape[1] >= 2 * size[0]:  # against aliasing
-        color = _halved(color)
-    cv2.resize(color, size, dst=canvas[: size[1], : size[0]])
-    return canvas, scale
+    return scale, size, (-(-size[1] // cell) * cell, -(-size[0] // cell) * cell)
 
 
 def _halved(color: UInt8) -> UInt8:
@@ -163,14 +169,21 @@ def _halved(color: UInt8) -> UInt8:
     return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
+@lru_cache
 def points(height: int, width: int) -> tuple[Float32, Float32]:
-    """Return the network's points for a canvas: x and y in pixels (N, 2), and strides (N,)."""
+    """Return the network's points for a canvas: x and y in pixels (N, 2), and strides (N,).
+
+    Both arrays are read-only.
+    """
     places, strides = [], []
     for stride in STRIDES:
         y, x = np.mgrid[0:height:stride, 0:width:stride]
         places.append(np.column_stack([x.ravel(), y.ravel()]))
         strides.append(np.full(x.size, stride))
-    return np.concatenate(places).astype(np.float32), np.concatenate(strides).astype(np.float32)
+    both = np.concatenate(places).astype(np.float32), np.concatenate(strides).astype(np.float32)
+    for values in both:
+        values.flags.writeable = False
+    return both
 
 
 def decode(

@@ -57,7 +57,7 @@ class _Camera(nn.Module):
         self._net = net
 
     def forward(self, image: Tensor) -> Tensor:
-        raw: Tensor = self._net(image.permute(0, 3, 1, 2).float())
+        raw: Tensor = self._net(image.float().permute(0, 3, 1, 2))
         return raw[0]
 
 

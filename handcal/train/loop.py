@@ -299,7 +299,7 @@ def _ema(decay: float) -> Any:
 
 def _grid(height: int, width: int, device: torch.device) -> Grid:
     places, strides = points(height, width)
-    return Grid(torch.from_numpy(places).to(device), torch.from_numpy(strides).to(device))
+    return Grid(torch.tensor(places, device=device), torch.tensor(strides, device=device))
 
 
 def _quiet_worker(_: int) -> None:
