@@ -10,7 +10,7 @@ from handcal.train.loss import Grid, detection_loss
 from handcal.types import Float32
 
 PLACES, STRIDES = points(64, 64)
-GRID = Grid(torch.from_numpy(PLACES), torch.from_numpy(STRIDES))
+GRID = Grid(torch.tensor(PLACES), torch.tensor(STRIDES))
 HAND = [8.0, 12.0, 40.0, 44.0]
 
 
