@@ -20,6 +20,8 @@ CANDIDATE_SCORE_MIN = 0.02
 
 _ENDS = [("image", "tensor(uint8)"), ("raw", "tensor(float)")]
 _GRAY = 127  # what the network's zero padding looks like
+# Of the largest scale. For 16:9 it saves an eighth of the canvas, much of it gray.
+_LARGE_ENOUGH = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,7 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
     ----------
     color : (h, w, 3) uint8
     pixels : int
-        At most so many has the canvas, chosen to show the image as large as possible.
+        At most so many has the canvas: the smallest that shows the image nearly as large as any.
 
     Returns
     -------
@@ -150,17 +152,21 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
 def _fit(height: int, width: int, pixels: int) -> tuple[float, tuple[int, int], tuple[int, int]]:
     """Return an image's scale in its canvas, its width and height there, the canvas's shape."""
     cell = STRIDES[-1]
-    scale, canvas_width, canvas_height = max(
-        (min(columns * cell / width, rows * cell / height), columns * cell, rows * cell)
-        for columns in range(1, pixels // cell**2 + 1)
-        for rows in [pixels // cell**2 // columns]
+    cells = pixels // cell**2
+    fits = [
+        (min(columns * cell / width, rows * cell / height), columns, rows)
+        for columns in range(1, cells + 1)
+        for rows in range(1, cells // columns + 1)
+    ]
+    scale_min = _LARGE_ENOUGH * max(fits)[0]
+    scale, columns, rows = min(
+        (fit for fit in fits if fit[0] >= scale_min), key=lambda fit: (fit[1] * fit[2], -fit[0])
     )
-    # The image may need fewer cells than the largest canvas has.
     size = (
-        min(max(1, round(scale * width)), canvas_width),
-        min(max(1, round(scale * height)), canvas_height),
+        min(max(1, round(scale * width)), columns * cell),
+        min(max(1, round(scale * height)), rows * cell),
     )
-    return scale, size, (-(-size[1] // cell) * cell, -(-size[0] // cell) * cell)
+    return scale, size, (rows * cell, columns * cell)
 
 
 def _halved(color: UInt8) -> UInt8:

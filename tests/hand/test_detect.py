@@ -53,6 +53,13 @@ def test_a_wide_image_loses_little_of_the_canvas() -> None:
     assert canvas.size <= 3 * 92_160
 
 
+def test_a_smaller_canvas_is_taken_if_it_shows_the_image_nearly_as_large() -> None:
+    canvas, scale = letterbox(np.zeros((720, 1280, 3), np.uint8), 110_592)
+    largest = 416 / 1280  # in 416x256, the lower strip of which were gray
+    assert canvas.shape == (224, 416, 3)
+    assert 0.95 * largest <= scale < largest
+
+
 def test_the_canvas_shows_things_in_their_place() -> None:
     color = np.zeros((720, 1280, 3), np.uint8)
     color[400:500, 900:1000] = 255
