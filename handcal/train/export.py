@@ -43,9 +43,9 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("resources"))
     arguments = parser.parse_args()
     net = read_average(arguments.folder)
-    export_float(net, arguments.output / FLOAT_MODEL)
     train = arguments.data / "train"
     photos = read_annotations(train, train / "annotations.json")
+    export_float(net, arguments.output / FLOAT_MODEL)
     export_integer(arguments.output / FLOAT_MODEL, arguments.output / INTEGER_MODEL, photos)
 
 
