@@ -259,8 +259,8 @@ def doctor(_arguments: argparse.Namespace) -> None:
 
 def main() -> None:
     """Run a command; every foreseen error is one line."""
-    arguments = _parser().parse_args()
     with errors_in_one_line():
+        arguments = _parser().parse_args()
         arguments.command(arguments)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from rich import box
 from rich.console import Console
@@ -20,11 +21,18 @@ from rich.table import Table
 from handcal.errors import HandcalError
 from handcal.files import make_folder, write_json
 
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
+
 console = Console(soft_wrap=True, highlight=False)
 
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line."""
+
+    def print_help(self, file: SupportsWrite[str] | None = None) -> None:
+        """Print the help; unlike argparse, OSError if it cannot be written."""
+        print(self.format_help(), end="", file=file)
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong with the arguments, and end."""
@@ -64,16 +72,41 @@ def fail(message: str, code: int) -> NoReturn:
 def errors_in_one_line() -> Iterator[None]:
     """End the program with one line for every foreseen error inside the block."""
     try:
-        yield
+        with _flushed():
+            yield
     except HandcalError as error:
         fail(str(error), 1)
     except KeyboardInterrupt:
         fail("interrupted", 130)
     except BrokenPipeError:
-        sys.stderr.close()
+        _discard_output()
         sys.exit(1)
     except OSError as error:
+        _discard_output()
         fail(f"cannot write the output: {error.strerror or error}", 1)
+
+
+@contextmanager
+def _flushed() -> Iterator[None]:
+    """Write out what the block printed, also if it ends the program, as ``--help`` does."""
+    try:
+        yield
+    except SystemExit:
+        _flush()
+        raise
+    _flush()
+
+
+def _flush() -> None:
+    if sys.stdout is not None:  # None where the output is closed
+        sys.stdout.flush()
+
+
+def _discard_output() -> None:
+    """Discard buffered output: flushing it at exit would fail again, with exit code 120."""
+    sink = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(sink, sys.stdout.fileno())
+    os.close(sink)
 
 
 def number(kind: type[int] | type[float], low: float, high: float) -> Callable[[str], float]:

@@ -358,10 +358,11 @@ def test_a_folder_that_cannot_be_made_is_one_line(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="writes to /dev/full")
-def test_an_output_that_cannot_be_written_is_one_line() -> None:
+@pytest.mark.parametrize("argument", ["doctor", "--help"])
+def test_an_output_that_cannot_be_written_is_one_line(argument: str) -> None:
     with Path("/dev/full").open("wb", buffering=0) as full:
         ended = subprocess.run(
-            [sys.executable, "-m", "handcal", "doctor"],
+            [sys.executable, "-m", "handcal", argument],
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
