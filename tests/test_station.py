@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +26,7 @@ from handcal.station import Station
 from handcal.station_settings import StationSettings
 from handcal.trial import make_trial
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
+from tests.helpers import Patience
 
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
@@ -69,9 +69,9 @@ def alignment_of(seed: int) -> Alignment:
 def step_until(
     station: Station, what: str, condition: Callable[[Snapshot], bool], patience_s: float
 ) -> Snapshot:
-    deadline_s = time.monotonic() + patience_s
+    patience = Patience(patience_s)
     while not condition(snapshot := station.step()):
-        assert time.monotonic() < deadline_s, f"{what} did not come"
+        assert not patience.is_over(), f"{what} did not come"
     return snapshot
 
 

@@ -14,6 +14,8 @@ from handcal_gui.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7
 _PATIENCE_S = 120.0
+_PATIENCE_STEPS = 600
+"""Steps of the engine, at least five a second on an idle machine: a starved one gets longer."""
 
 
 class Autopilot(QObject):
@@ -51,6 +53,7 @@ class Autopilot(QObject):
         self._look = look
         self._view: View | None = None
         self._since_s = self._moved_s = time.monotonic()
+        self._moved_at = 0
         self._is_paused = self._is_done = False
         live.polled.connect(self._watch)
 
@@ -61,18 +64,19 @@ class Autopilot(QObject):
     def go_on(self) -> None:
         """Go on after a pause."""
         self._is_paused = False
-        self._since_s = self._moved_s = time.monotonic()
+        self._view = None
 
-    def _watch(self, _snapshot: Snapshot) -> None:
+    def _watch(self, snapshot: Snapshot) -> None:
         view = self._wizard_panel.shown
         if view is None or self._is_paused or self._is_done:
             return
         now_s = time.monotonic()
         if self._view is None or (view.step, view.main) != (self._view.step, self._view.main):
             if self._view is None or view.step is not self._view.step:
-                self._moved_s = now_s
+                self._moved_s, self._moved_at = now_s, snapshot.number
             self._view, self._since_s = view, now_s
-        if now_s - self._moved_s > _PATIENCE_S:
+        steps = snapshot.number - self._moved_at
+        if now_s - self._moved_s > _PATIENCE_S and steps > _PATIENCE_STEPS:
             self._end(lambda: self.stuck.emit(self._complaint(view)))
         elif now_s - self._since_s > _LOOK_S and (
             view.main.is_enabled or view.main.action is Action.CONFIRM

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from handcal.closable import Closable
 from handcal.errors import FileError
 from handcal.session import Session, SessionRecord
 from handcal_gui.start.session_entries import find_offers
+from tests.helpers import Patience
 
 ARTEFACTS = Path(__file__).parents[2] / "artefacts"
 PATIENCE_S = 90.0
@@ -73,8 +75,12 @@ class Window(Closable):
 
     def end(self) -> tuple[int, str]:
         """Wait for the end; return the exit status and what was complained of."""
-        _, errors = self.process.communicate(timeout=PATIENCE_S)
-        return self.process.returncode, errors
+        patience = Patience(PATIENCE_S)
+        while True:
+            with suppress(subprocess.TimeoutExpired):
+                _, errors = self.process.communicate(timeout=1.0)
+                return self.process.returncode, errors
+            assert not patience.is_over(), "the program did not end"
 
     def end_well(self) -> None:
         """Wait for the end; a busy computer may make the link complain, and nothing else may."""
@@ -93,15 +99,15 @@ class Window(Closable):
             check=True,
             capture_output=True,
             text=True,
-            timeout=PATIENCE_S,
+            timeout=10 * PATIENCE_S,  # `search --sync` waits for a window
         ).stdout
 
 
 def wait_for(what: str, condition: Callable[[], bool], window: Window) -> None:
-    deadline_s = time.monotonic() + PATIENCE_S
+    patience = Patience(PATIENCE_S)
     while not condition():
         assert window.process.poll() is None, window.end()
-        assert time.monotonic() < deadline_s, f"{what} did not come"
+        assert not patience.is_over(), f"{what} did not come"
         time.sleep(0.2)
 
 
@@ -215,9 +221,9 @@ def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
     assert not session.is_finished
     (offer,) = find_offers(sessions, ()).unfinished
     assert offer.is_enabled
-    deadline_s = time.monotonic() + PATIENCE_S
+    patience = Patience(PATIENCE_S)
     while Path(f"/proc/{headset}").exists():  # it hears no PC any more
-        assert time.monotonic() < deadline_s
+        assert not patience.is_over()
         time.sleep(0.2)
 
     with Window(display, session.path, "--preferences", preferences) as window:

@@ -1,0 +1,37 @@
+"""Helpers that several test modules share."""
+
+from __future__ import annotations
+
+import time
+
+_PROBE = range(400_000)
+_PROBE_PERIOD_S = 1.0
+
+
+class Patience:
+    """A time limit that passes more slowly where the machine gives less than a whole core.
+
+    While one waits, a short computation is timed now and then: where it takes ten times longer
+    than the processor worked on it, a second counts as a tenth.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self._left_s = limit_s
+        self._seen_s = time.monotonic()
+
+    def is_over(self) -> bool:
+        """Count the time since the last call; return whether the limit is reached."""
+        now_s = time.monotonic()
+        if now_s - self._seen_s < _PROBE_PERIOD_S:
+            return self._left_s <= 0.0
+        self._left_s -= (now_s - self._seen_s) / _slowness()
+        self._seen_s = now_s
+        return self._left_s <= 0.0
+
+
+def _slowness() -> float:
+    """Return how much longer a computation takes than the processor works on it; at least 1."""
+    wall_s, worked_s = time.perf_counter(), time.thread_time()
+    sum(_PROBE)
+    wall_s, worked_s = time.perf_counter() - wall_s, time.thread_time() - worked_s
+    return max(1.0, wall_s / max(worked_s, 1e-6))
