@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+DATA = ROOT / "tests/data"
 
 _PROBE = range(400_000)
 _PROBE_PERIOD_S = 1.0

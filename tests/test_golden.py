@@ -40,8 +40,9 @@ from handcal.solve_again import solve_again
 from handcal.study.wearers import align_hand, draw_wearer
 from handcal.trial import make_trial
 from handcal.types import EYES, METHODS, Alignment, Eye, Float64
+from tests.helpers import DATA
 
-GOLDEN = Path(__file__).parent / "data/golden.json"
+GOLDEN = DATA / "golden.json"
 MODE = os.environ.get("HANDCAL_GOLDEN", "")
 TEXTS = "*.csv", "*.json", "*.yaml"
 POINTS, DEPTH_SIGMA_M = 1500, 0.001

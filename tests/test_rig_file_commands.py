@@ -24,6 +24,7 @@ from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
 from handcal.terminal import Parser
 from handcal.types import Intrinsics
+from tests.helpers import DATA
 
 RIG = example_rig()
 CAMERA = Intrinsics(960, 540, 1350.0, 1348.0, 482.0, 267.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
@@ -117,7 +118,7 @@ def test_a_rig_in_doubt_fails_the_check(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_an_old_rig_file_is_migrated(tmp_path: Path) -> None:
-    old = Path(__file__).parent / "data" / "session-v1" / "rig.yaml"
+    old = DATA / "session-v1" / "rig.yaml"
     assert "handcal_rig: 1\n" in old.read_text()
     run("migrate", old, "--output", tmp_path / "new.yaml")
     assert "handcal_rig: 2\n" in (tmp_path / "new.yaml").read_text()

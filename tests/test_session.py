@@ -29,9 +29,10 @@ from handcal.session import (
 )
 from handcal.trial import Trial, make_trial, trial_json
 from handcal.types import Alignment
+from tests.helpers import DATA
 
 SETTINGS = {"method": "consistent", "gate_m": [0.35, 0.7], "third": 1 / 3}
-VERSION_1 = Path(__file__).parent / "data" / "session-v1"
+VERSION_1 = DATA / "session-v1"
 SHIFT_M = np.array([0.001, -0.002, 1e-17])
 RESULTS = {"left": {"shift_m": [0.1 + 0.2, -1e-17, 3.0]}}
 

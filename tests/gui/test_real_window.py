@@ -19,9 +19,9 @@ from handcal.closable import Closable
 from handcal.errors import FileError
 from handcal.session import Session, SessionRecord
 from handcal_gui.start.session_entries import find_offers
-from tests.helpers import Patience
+from tests.helpers import ROOT, Patience
 
-ARTEFACTS = Path(__file__).parents[2] / "artefacts"
+ARTEFACTS = ROOT / "artefacts"
 PATIENCE_S = 90.0
 
 

@@ -14,8 +14,8 @@ import pytest
 from handcal.errors import CancelledError, FileError, HandcalError
 from handcal.study.run import Case, Study, run_study, share_done
 from handcal.study.store import Row
+from tests.helpers import ROOT
 
-ROOT = Path(__file__).parents[2]
 CASES, MIDDLE = 90, 45
 
 

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ from handcal_gui.records.session_rows import (
     statistics_text,
     trial_rows,
 )
+from tests.helpers import DATA
 
 
 def trial(eye: Eye, depth_m: float, off_m: float) -> Trial:
@@ -113,6 +113,6 @@ def test_deletions_in_their_order(record: SessionRecord) -> None:
 
 
 def test_an_old_session_has_nothing_to_take_back() -> None:
-    old = Session.open(Path(__file__).parents[2] / "data" / "session-v1")
+    old = Session.open(DATA / "session-v1")
     assert deletions(old) == []
     assert list(alignment_rows(old, None)) == list(old.alignment_numbers)
