@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 from pathlib import Path
@@ -87,8 +88,8 @@ def digest(values: Any) -> dict[str, Any]:
     flat = np.nan_to_num(np.asarray(values, dtype=np.float64).ravel(), nan=-1.0)
     return {
         "count": flat.size,
-        "sum": float(flat.sum()),
-        "weighted": float(flat @ np.linspace(1.0, 2.0, flat.size)),
+        "sum": math.fsum(flat),
+        "weighted": math.fsum(flat * np.linspace(1.0, 2.0, flat.size)),
         "sha256": hashlib.sha256(flat.tobytes()).hexdigest(),
     }
 
