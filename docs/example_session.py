@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from handcal.calibrate import CalibrationSettings
-from handcal.config import settings_json
 from handcal.display import TARGET_DEPTHS_M
+from handcal.io.settings import settings_json
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.session import Session
 from handcal.sim.wearer import WearerSettings

@@ -18,8 +18,8 @@ from handcal.camera_options import add_realsense_options, realsense_of
 from handcal.errors import FileError, HandcalError
 from handcal.evaluate_commands import add_evaluate_commands
 from handcal.export.formats import FORMATS
-from handcal.files import make_folder
 from handcal.hand.settings import Roi
+from handcal.io.files import make_folder
 from handcal.rig_commands import add_rig_commands
 from handcal.rig_file_commands import add_rig_file_commands
 from handcal.study_commands import add_study_commands
@@ -426,7 +426,7 @@ def _open_source(arguments: argparse.Namespace) -> Camera:
 
 
 def _rig_path(rig: Path | None) -> Path:
-    from handcal.resources import resource_path
+    from handcal.io.resources import resource_path
 
     return rig or resource_path("example_rig.yaml")
 

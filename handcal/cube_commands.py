@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from handcal.errors import CameraError, HandcalError
-from handcal.files import make_folder
+from handcal.io.files import make_folder
 from handcal.rig_commands import add_square_option, grid_of
 from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
 
@@ -221,7 +221,7 @@ def _grid(arguments: argparse.Namespace) -> Grid:
 
 
 def _rig(arguments: argparse.Namespace) -> Rig:
-    from handcal.resources import resource_path
+    from handcal.io.resources import resource_path
     from handcal.rig.rig_file import read_rig
 
     return read_rig(arguments.rig or resource_path("example_rig.yaml"))

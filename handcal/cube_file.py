@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict
 from pathlib import Path
 
-from handcal.config import read_settings
 from handcal.errors import FileError
-from handcal.files import read_json, write_json
+from handcal.io.files import read_json, write_json
+from handcal.io.settings import read_settings
 from handcal.rig.cube import Cube
 
 CUBE_VERSION = 1

@@ -11,7 +11,7 @@ from handcal.errors import FileError
 from handcal.hand.detect import DetectSettings, HandDetector
 from handcal.hand.finder import HandFinder
 from handcal.hand.settings import SegmentSettings
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 
 FLOAT_MODEL, INTEGER_MODEL = "hand_detector.onnx", "hand_detector_int8.onnx"
 

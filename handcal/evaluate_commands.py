@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from handcal.cube_commands import add_cube_commands
-from handcal.files import make_folder, require_suffix
+from handcal.io.files import make_folder, require_suffix
 from handcal.terminal import Commands, Parser, add_command, console, progress, save, table
 
 

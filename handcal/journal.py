@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from handcal.errors import FileError
-from handcal.files import read_limited
+from handcal.io.files import read_limited
 
 JOURNAL_VERSION = 2
 """2 brought alignments deleted and restored, trials and fine-tuning; 1 is read as well."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from handcal.camera.camera import Camera
 from handcal.camera.recordings import record_frames
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
-from handcal.files import make_folder
+from handcal.io.files import make_folder
 from handcal.types import Frame
 
 _POLL_S = 0.2

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera_options import add_realsense_options, realsense_of
 from handcal.errors import FileError, HandcalError
-from handcal.files import make_folder, write_json
+from handcal.io.files import make_folder, write_json
 from handcal.terminal import (
     Commands,
     Parser,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 def board(arguments: argparse.Namespace) -> None:
     """Make a board to put up: a PDF at true size, or a PNG for a screen."""
-    from handcal.image_file import write_png
+    from handcal.io.images import write_png
     from handcal.rig.board_print import draw_board, write_board_pdf
 
     if arguments.pdf is None and arguments.png is None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handcal.errors import HandcalError
-from handcal.files import make_folder
+from handcal.io.files import make_folder
 from handcal.rig_commands import (
     add_board_options,
     add_square_option,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def grid(arguments: argparse.Namespace) -> None:
     """Make the image that a display shows to the viewpoint camera, pixel for pixel."""
-    from handcal.image_file import write_png
+    from handcal.io.images import write_png
     from handcal.rig.grid import draw_grid
 
     made = grid_of(arguments, *arguments.display)
@@ -246,7 +246,7 @@ def _distance(arguments: argparse.Namespace) -> DisplaySettings:
 
 
 def _read_rig(path: Path | None) -> Rig:
-    from handcal.resources import resource_path
+    from handcal.io.resources import resource_path
     from handcal.rig.rig_file import read_rig
 
     return read_rig(path or resource_path("example_rig.yaml"))

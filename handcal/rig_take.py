@@ -11,8 +11,8 @@ from pathlib import Path
 
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraEndError, CameraTimeoutError
-from handcal.files import make_folder
-from handcal.image_file import write_png
+from handcal.io.files import make_folder
+from handcal.io.images import write_png
 from handcal.rig.board import Board, BoardError, BoardView, find_board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.formats import write_intrinsics, write_pose

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.files import make_folder, write_atomic, write_json, write_ply
 from handcal.geometry import image_points
+from handcal.io.files import make_folder, write_atomic, write_json, write_ply
 from handcal.types import Frame, HandCloud, UInt8
 
 _HAND_RGB = (0, 200, 80)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from handcal.calibrate import CalibrationSettings
-from handcal.config import read_settings
 from handcal.errors import FileError
+from handcal.io.settings import read_settings
 from handcal.results import Results, SolveSettings, solve_session
 from handcal.session import SessionRecord
 

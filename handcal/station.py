@@ -18,11 +18,11 @@ from handcal.camera.feed import CameraFeed
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
 from handcal.camera.synthetic import SyntheticCamera
-from handcal.closable import Closable
-from handcal.config import settings_json
 from handcal.display import target_corners_m, view_of_eye
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
+from handcal.io.closable import Closable
+from handcal.io.settings import settings_json
 from handcal.link.pairing import new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address

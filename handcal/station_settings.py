@@ -9,7 +9,7 @@ from typing import Literal
 from handcal.calibrate import CalibrationSettings
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 
 Source = Literal["simulator", "recording", "realsense"]
 HeadsetKind = Literal["virtual", "network"]

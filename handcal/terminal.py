@@ -19,7 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from handcal.errors import HandcalError
-from handcal.files import make_folder, write_json
+from handcal.io.files import make_folder, write_json
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.history import SessionEvent
+from handcal.io.lock import FileLock
 from handcal.journal import read_journal
-from handcal.lock import FileLock
 from handcal.session import Session
 
 

@@ -26,8 +26,8 @@ from PySide6.QtWidgets import QApplication
 from handcal.bench.figure import Figure
 from handcal.calibrate import State
 from handcal.camera.camera import Camera
-from handcal.closable import Closable
 from handcal.geometry import rigid
+from handcal.io.closable import Closable
 from handcal.link.pairing import new_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport

@@ -17,8 +17,8 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QWidget
 
 from handcal.errors import HandcalError
-from handcal.files import make_folder
-from handcal.resources import resource_path
+from handcal.io.files import make_folder
+from handcal.io.resources import resource_path
 from handcal.station_settings import StationSettings
 from handcal_gui.demonstration.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile

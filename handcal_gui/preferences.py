@@ -9,10 +9,10 @@ from typing import Literal, Self, TypeAlias
 
 from PySide6.QtCore import QStandardPaths
 
-from handcal.config import read_settings, settings_json
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings
-from handcal.files import make_folder, read_json, write_json
+from handcal.io.files import make_folder, read_json, write_json
+from handcal.io.settings import read_settings, settings_json
 from handcal.link.pairing import read_pairing_key, write_pairing_key
 from handcal.station_settings import StationSettings
 from handcal_gui.evaluation.entries import EvaluationEntries

@@ -19,7 +19,7 @@ from PySide6.QtGui import (
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QApplication, QHeaderView, QWidget
 
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 
 SPACING_PX = 8
 """The unit of all margins and gaps, in device-independent pixels; use 0.5, 1, 2 or 3 of it."""

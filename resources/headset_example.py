@@ -16,9 +16,9 @@ import numpy as np
 
 from handcal.display import view_of_eye
 from handcal.errors import HandcalError
+from handcal.io.resources import resource_path
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.pairing import read_pairing_key
-from handcal.resources import resource_path
 from handcal.rig.rig_file import read_rig
 from handcal.types import EYES, Float64
 

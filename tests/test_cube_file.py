@@ -4,7 +4,7 @@ import pytest
 
 from handcal.cube_file import read_cube, write_cube
 from handcal.errors import FileError
-from handcal.files import write_json
+from handcal.io.files import write_json
 from handcal.rig.cube import Cube
 
 

@@ -10,7 +10,7 @@ from handcal.detector import load_detector, make_finder
 from handcal.errors import FileError, HandError
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.settings import Roi, SegmentSettings
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.types import Frame, Intrinsics, UInt8
 
 

@@ -20,7 +20,6 @@ import pytest
 
 from handcal.calibrate import CalibrationSettings
 from handcal.camera.synthetic import SyntheticCamera
-from handcal.config import settings_json
 from handcal.detector import FLOAT_MODEL
 from handcal.display import projection_matrix
 from handcal.export.export import ExportSettings, export_session
@@ -28,7 +27,8 @@ from handcal.geometry import rigid
 from handcal.hand.detect import HandDetector
 from handcal.hand.finder import HandFinder
 from handcal.hand.settings import SegmentSettings
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
+from handcal.io.settings import settings_json
 from handcal.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session import Session

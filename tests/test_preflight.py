@@ -21,9 +21,9 @@ from handcal.camera.sdk_devices import Device
 from handcal.camera.settings import RealSenseSettings
 from handcal.doctor import Finding, Health
 from handcal.errors import LinkError
+from handcal.io.resources import resource_path
 from handcal.link.pairing import new_pairing_key
 from handcal.preflight import PARTS, Part, check_station, is_ready
-from handcal.resources import resource_path
 from handcal.station_settings import StationSettings
 from handcal.types import Frame, Intrinsics
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from handcal.camera.recordings import open_recording
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
+from handcal.io.closable import Closable
 from handcal.record import Recorded, RecordSettings, record
 from handcal.types import Frame, Intrinsics
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import rigid
 from handcal.hand.segment import SegmentSettings
+from handcal.io.closable import Closable
 from handcal.replay import replay
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import draw_hand

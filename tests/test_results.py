@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from handcal.calibrate import CalibrationSettings
-from handcal.config import read_settings, settings_json
 from handcal.errors import CancelledError
-from handcal.files import write_json
+from handcal.io.files import write_json
+from handcal.io.settings import read_settings, settings_json
 from handcal.register.verdict import VerdictSettings, expected_error_arcmin
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig

@@ -14,7 +14,7 @@ import pytest
 
 from handcal.__main__ import main
 from handcal.geometry import rigid
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.board import Board, find_board
 from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
 from handcal.sim.boards import BoardPainter, board_poses

@@ -12,10 +12,10 @@ import pytest
 
 from handcal.__main__ import main
 from handcal.camera.viewpoint import open_viewpoint
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import interpolate_pose, rigid
-from handcal.image_file import read_image
+from handcal.io.closable import Closable
+from handcal.io.images import read_image
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal.rig.formats import read_intrinsics, read_pose

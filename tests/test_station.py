@@ -14,8 +14,8 @@ import pytest
 import handcal.station
 from handcal.calibrate import CalibrationSettings, ProcedureError, State
 from handcal.camera.synthetic import SyntheticCamera
-from handcal.config import settings_json
 from handcal.errors import CameraError, FileError, LinkError
+from handcal.io.settings import settings_json
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session import Session
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from handcal.camera.camera import Camera
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.io.closable import Closable
 from handcal.types import Frame
 
 _RATE_WINDOW_S = 1.0

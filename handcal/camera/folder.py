@@ -27,8 +27,8 @@ from handcal.camera.images import (
 from handcal.camera.one_camera import of_one_camera
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.errors import CameraEndError, CameraError, FileError
-from handcal.files import make_folder, read_json, read_limited, write_json
 from handcal.geometry import is_rigid
+from handcal.io.files import make_folder, read_json, read_limited, write_json
 from handcal.types import Float64, Frame
 
 DESCRIPTION = "recording.json"

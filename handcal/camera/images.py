@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import FileError
-from handcal.files import read_json
-from handcal.image_file import MAX_SIDE_PX, read_image
+from handcal.io.files import read_json
+from handcal.io.images import MAX_SIDE_PX, read_image
 from handcal.types import Frame, Intrinsics, UInt8, UInt16
 
 DEPTH_SCALES_M = 1e-6, 0.1

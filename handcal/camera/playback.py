@@ -6,8 +6,8 @@ import time
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.io.closable import Closable
 from handcal.types import Frame, Intrinsics
 
 _LATE_S = 0.05

@@ -24,8 +24,8 @@ from handcal.camera.sdk_frames import (
 )
 from handcal.camera.sdk_options import apply_options, depth_filter
 from handcal.camera.settings import Profile, RealSenseSettings
-from handcal.closable import Closable
 from handcal.errors import CameraError, CameraTimeoutError
+from handcal.io.closable import Closable
 from handcal.types import Frame
 
 _SIZES = ("1280x720", "848x480")

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from handcal.closable import Closable
 from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import invert, rigid
+from handcal.io.closable import Closable
 from handcal.sim.raster import D415
 from handcal.sim.render import World, render
 from handcal.sim.scene import SceneState

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 
 from handcal.errors import FileError
-from handcal.files import read_json
-from handcal.image_file import read_image
+from handcal.io.files import read_json
+from handcal.io.images import read_image
 from handcal.types import Bool, Float64, UInt8
 
 _CORNER = 0.5  # the image's upper left corner, counted so

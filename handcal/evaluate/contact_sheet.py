@@ -11,7 +11,7 @@ import numpy as np
 from handcal.evaluate.annotations import Photo
 from handcal.evaluate.precision import MATCH_OVERLAP, ImageResult
 from handcal.hand.detect import DetectSettings, overlaps
-from handcal.image_file import write_png
+from handcal.io.images import write_png
 from handcal.types import Float64, UInt8
 
 _COLUMNS = 6

@@ -16,8 +16,8 @@ from handcal.evaluate.cube_folder import (
     PlannedCapture,
     missing_captures,
 )
-from handcal.files import make_folder
-from handcal.image_file import write_png
+from handcal.io.files import make_folder
+from handcal.io.images import write_png
 from handcal.rig.board import BoardError
 from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.grid import Grid, find_grid

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handcal.errors import FileError
-from handcal.image_file import IMAGE_SUFFIXES
+from handcal.io.images import IMAGE_SUFFIXES
 
 MAX_POSES = 1000
 REAL, VIRTUAL, GRID = "real", "virtual", "grid"

@@ -15,7 +15,7 @@ import numpy as np
 from handcal.errors import FileError
 from handcal.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.evaluate.cube_folder import GRID, find_captures, images_in
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.board import BoardError
 from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.display import fit_homography, pose_before

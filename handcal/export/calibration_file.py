@@ -19,7 +19,7 @@ from handcal.conventions import (
     unity_world_to_camera,
 )
 from handcal.export.outcome import Origin, Outcome, printable
-from handcal.files import write_atomic, write_json
+from handcal.io.files import write_atomic, write_json
 from handcal.rig.rig_file import quoted
 from handcal.types import EYES, Eye, Projection
 

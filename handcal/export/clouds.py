@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from handcal.export.outcome import Outcome
-from handcal.files import make_folder, write_ply
+from handcal.io.files import make_folder, write_ply
 
 
 def write_clouds(folder: Path, outcome: Outcome, checkpoint: Callable[[float], None]) -> None:

@@ -11,10 +11,10 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from handcal.closable import Closable
 from handcal.errors import FileError
-from handcal.files import make_folder
-from handcal.lock import FileLock
+from handcal.io.closable import Closable
+from handcal.io.files import make_folder
+from handcal.io.lock import FileLock
 
 
 class Staging(Closable):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from handcal.export.outcome import Origin, Outcome
-from handcal.files import write_atomic
+from handcal.io.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.rows import rows_csv
 from handcal.trial import Trial

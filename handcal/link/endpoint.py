@@ -11,8 +11,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from handcal.closable import Closable
 from handcal.errors import LinkError
+from handcal.io.closable import Closable
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
 from handcal.link.messages import MalformedError

@@ -7,7 +7,7 @@ import secrets
 from pathlib import Path
 
 from handcal.errors import LinkError
-from handcal.files import make_folder, read_limited, write_atomic
+from handcal.io.files import make_folder, read_limited, write_atomic
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 
 KEY_VARIABLE = "HANDCAL_PAIRING_KEY"

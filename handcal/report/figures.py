@@ -10,7 +10,7 @@ from typing import Any, Literal
 from matplotlib import rc_context
 from matplotlib.figure import Figure as Canvas
 
-from handcal.files import make_folder, write_atomic
+from handcal.io.files import make_folder, write_atomic
 from handcal.report.document import Figure, Report
 from handcal.report.page import CONTENT_MM, MM_PER_INCH, add_strip
 from handcal.report.rows import rows_csv

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from handcal.files import write_atomic
+from handcal.io.files import write_atomic
+from handcal.io.resources import resource_path
 from handcal.report.document import Figure, Report, Table
 from handcal.report.figures import picture
 from handcal.report.rows import rows_csv
-from handcal.resources import resource_path
 
 _NO_BREAK = "\u00a0"
 

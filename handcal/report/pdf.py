@@ -12,7 +12,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure as Page
 
-from handcal.files import write_atomic
+from handcal.io.files import write_atomic
 from handcal.report.document import Figure, Item, Report, Table
 from handcal.report.page import Document, plain
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from handcal.files import make_folder
+from handcal.io.files import make_folder
 from handcal.report.document import Report
 from handcal.report.figures import write_figures
 from handcal.report.html import write_html

@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 
 from handcal.errors import FileError
-from handcal.files import read_json, read_limited, write_atomic, write_json
 from handcal.geometry import camera_matrix, is_rigid, rigid
+from handcal.io.files import read_json, read_limited, write_atomic, write_json
 from handcal.rig.camera import CameraCalibration
 from handcal.rig.check import check_intrinsics, require
 from handcal.rig.stereo import StereoCalibration

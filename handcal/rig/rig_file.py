@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 
 from handcal.errors import FileError
-from handcal.files import read_limited, write_atomic
+from handcal.io.files import read_limited, write_atomic
 from handcal.rig.check import check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.types import EYES, RIG_PARTS, EyeDisplay, Intrinsics, Origin, Rig, RigPart

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from handcal.errors import FileError
-from handcal.files import read_json, write_json
 from handcal.geometry import is_rigid
+from handcal.io.files import read_json, write_json
 from handcal.rig.views import MAX_VIEWS
 from handcal.types import Float64
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import FileError, HandcalError
-from handcal.image_file import IMAGE_SUFFIXES, read_image
+from handcal.io.images import IMAGE_SUFFIXES, read_image
 from handcal.rig.board import Board, BoardError, BoardView, find_board
 from handcal.types import Intrinsics, UInt8
 

@@ -20,9 +20,9 @@ from scipy.spatial.transform import Rotation
 from handcal.cube_file import write_cube
 from handcal.display import eye_projection, view_of_eye
 from handcal.errors import FileError
-from handcal.files import make_folder, write_json
 from handcal.geometry import image_points, invert, project, rigid, transform
-from handcal.image_file import write_png
+from handcal.io.files import make_folder, write_json
+from handcal.io.images import write_png
 from handcal.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.formats import write_intrinsics

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from handcal.display import view_of_eye
-from handcal.files import make_folder
 from handcal.geometry import invert, rigid
-from handcal.image_file import write_png
+from handcal.io.files import make_folder
+from handcal.io.images import write_png
 from handcal.rig.board import Board
 from handcal.rig.grid import Grid, draw_grid
 from handcal.rig.tracked_file import write_tracked

@@ -8,8 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from handcal.closable import Closable
 from handcal.errors import LinkError
+from handcal.io.closable import Closable
 from handcal.link.pairing import KEY_VARIABLE
 
 _END_S = 5.0

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.closable import Closable
 from handcal.geometry import is_rigid
+from handcal.io.closable import Closable
 from handcal.types import Float64, freeze
 
 _MAGIC = b"hcS1"

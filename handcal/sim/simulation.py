@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from handcal.closable import Closable
+from handcal.io.closable import Closable
 from handcal.sim.hand import make_hand
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.render import World

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from handcal.errors import FileError
-from handcal.files import make_folder, read_json, write_atomic, write_json
+from handcal.io.files import make_folder, read_json, write_atomic, write_json
 from handcal.report.rows import rows_csv
 
 Row: TypeAlias = dict[str, float | int | str | bool | None]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from handcal.evaluate.annotations import read_annotations
-from handcal.files import make_folder
+from handcal.io.files import make_folder
 from handcal.terminal import Parser, errors_in_one_line, number
 from handcal.train.backbone import load_backbone
 from handcal.train.exported import load_exported

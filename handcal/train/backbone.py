@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from handcal.errors import FileError
-from handcal.files import read_limited
+from handcal.io.files import read_limited
 from handcal.train.model import HandNet
 from handcal.train.moments import fold_in
 from handcal.types import Float32

@@ -16,7 +16,7 @@ from handcal.evaluate.annotations import read_annotations
 from handcal.evaluate.detector import EVALUATED, detect_all, summary
 from handcal.evaluate.precision import MATCH_OVERLAP
 from handcal.hand.detect import Detections, HandDetector, overlaps
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
 from handcal.sim.room import make_room

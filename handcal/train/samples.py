@@ -13,8 +13,8 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from handcal.evaluate.annotations import Photo
-from handcal.files import read_json
-from handcal.image_file import read_image
+from handcal.io.files import read_json
+from handcal.io.images import read_image
 from handcal.train.augment import (
     blemish,
     box_corners,

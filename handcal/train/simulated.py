@@ -8,8 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.files import make_folder, read_json, write_json
 from handcal.geometry import rigid, transform
+from handcal.io.files import make_folder, read_json, write_json
 from handcal.sim.hand import HandModel, HandSettings, make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.render import World, render

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError
-from handcal.files import make_folder
+from handcal.io.files import make_folder
 from handcal_gui.wizard.steps import STEPS, Action, Step, View
 
 

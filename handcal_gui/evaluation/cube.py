@@ -11,8 +11,8 @@ from handcal.evaluate.cube_folder import CapturePlan
 from handcal.evaluate.cube_report import cube_report
 from handcal.evaluate.cube_summary import cube_summary
 from handcal.evaluate.cube_test import judge_captures
+from handcal.io.resources import resource_path
 from handcal.report.document import Report
-from handcal.resources import resource_path
 from handcal.rig.cube import Cube
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid

@@ -12,7 +12,7 @@ import numpy as np
 
 from handcal.doctor import Finding, Health
 from handcal.errors import CancelledError, FileError
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.study.run import Study, run_study, share_done

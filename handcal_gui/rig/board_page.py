@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
-from handcal.image_file import write_png
+from handcal.io.images import write_png
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.print_page import Paper

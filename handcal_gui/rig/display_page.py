@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
-from handcal.image_file import write_png
+from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid

@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError, HandcalError
-from handcal.files import read_json
+from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
 from handcal_gui.rig.solve import Solved

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from handcal.errors import CancelledError, FileError
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.board import Board
 from handcal.rig.views import View, image_files, pair_views, read_views
 from handcal.types import UInt8

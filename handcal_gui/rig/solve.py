@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from handcal.errors import HandcalError
-from handcal.files import write_json
+from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
 from handcal.rig.display import (

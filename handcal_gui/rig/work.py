@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from handcal.config import read_settings, settings_json
 from handcal.errors import FileError
-from handcal.files import make_folder, read_json, write_json
-from handcal.resources import resource_path
+from handcal.io.files import make_folder, read_json, write_json
+from handcal.io.resources import resource_path
+from handcal.io.settings import read_settings, settings_json
 from handcal.rig.board import Board
 from handcal.rig.camera import LensModel
 from handcal.rig.print_page import Paper

@@ -7,8 +7,8 @@ import tempfile
 from pathlib import Path
 
 from handcal.errors import FileError
-from handcal.files import make_folder
-from handcal.resources import resource_path
+from handcal.io.files import make_folder
+from handcal.io.resources import resource_path
 
 _NAME = "example-session"
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from handcal.camera import sdk_devices
-from handcal.closable import Closable
 from handcal.geometry import rigid
+from handcal.io.closable import Closable
 from handcal.types import Float64, Frame, Intrinsics
 
 _SCALE_M = 0.000125

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from handcal.camera.feed import CameraFeed, FeedSettings
-from handcal.closable import Closable
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.io.closable import Closable
 from handcal.types import Frame, Intrinsics
 
 CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)

@@ -7,7 +7,7 @@ import pytest
 
 from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo, read_annotations
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 
 HAND = {"box": [10, 20, 30, 60], "quad": [[10, 20], [30, 20], [30, 60], [10, 60]], "large": True}
 

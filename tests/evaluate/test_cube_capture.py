@@ -16,7 +16,7 @@ from handcal.evaluate.cube_folder import (
     missing_captures,
 )
 from handcal.geometry import rigid
-from handcal.image_file import write_png
+from handcal.io.images import write_png
 from handcal.rig.cube import Cube, CubeError
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings

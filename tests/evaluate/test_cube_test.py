@@ -8,9 +8,9 @@ import pytest
 from handcal.errors import CancelledError, FileError
 from handcal.evaluate.cube import CubeMisalignment
 from handcal.evaluate.cube_test import cube_row, judge_captures
-from handcal.files import make_folder
 from handcal.geometry import invert, rigid
-from handcal.image_file import write_png
+from handcal.io.files import make_folder
+from handcal.io.images import write_png
 from handcal.rig.cube import Cube
 from handcal.rig.example import example_rig
 from handcal.rig.grid import Grid, draw_grid

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from handcal.calibrate import CalibrationSettings
-from handcal.config import settings_json
 from handcal.export.outcome import Outcome, conclude
+from handcal.io.settings import settings_json
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session import Session, SessionRecord

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.config import read_settings, settings_json
 from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.formats import FORMATS, Format
+from handcal.io.settings import read_settings, settings_json
 from handcal.session import SessionRecord
 
 resource = pytest.importorskip("resource")

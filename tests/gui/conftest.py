@@ -18,12 +18,12 @@ from scipy.spatial.transform import Rotation
 from handcal.calibrate import CalibrationSettings, Observation, PlacedHand, State
 from handcal.camera.feed import CameraStatus
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.closable import Closable
-from handcal.config import settings_json
 from handcal.display import view_of_eye
 from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import rigid, transform
 from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.io.closable import Closable
+from handcal.io.settings import settings_json
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from handcal.closable import Closable
 from handcal.errors import FileError
+from handcal.io.closable import Closable
 from handcal.session import Session, SessionRecord
 from handcal_gui.start.session_entries import find_offers
 from tests.helpers import ROOT, Patience

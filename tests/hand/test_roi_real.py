@@ -15,7 +15,7 @@ from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.finder import HandFinder
 from handcal.hand.roi import RoiFinder
 from handcal.hand.settings import SegmentSettings
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 
 SETTINGS = SegmentSettings()

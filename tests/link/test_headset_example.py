@@ -11,9 +11,9 @@ from typing import IO
 import numpy as np
 
 from handcal.display import target_corners_m, view_of_eye
+from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.server import Confirmation, HeadsetServer
-from handcal.resources import resource_path
 from handcal.rig.rig_file import read_rig
 from handcal.types import Target
 

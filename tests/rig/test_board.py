@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from handcal.geometry import image_points, rigid, transform
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.board import Board, BoardError, corners_m, find_board
 from handcal.rig.board_print import draw_board
 from handcal.sim.boards import BoardPainter

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.board import Board, charuco, find_board
 from handcal.rig.board_print import MAX_SIDE_PX, draw_board, write_board_pdf
 

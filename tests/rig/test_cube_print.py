@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.cube import Cube
 from handcal.rig.cube_print import net_rectangles_m, write_cube_pdf
 

@@ -6,7 +6,7 @@ import pytest
 
 from handcal.display import projection_matrix
 from handcal.geometry import camera_matrix, invert, project, transform
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig

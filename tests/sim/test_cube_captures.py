@@ -7,7 +7,7 @@ import pytest
 from handcal.cube_file import read_cube
 from handcal.errors import CancelledError, FileError
 from handcal.evaluate.cube_test import judge_captures
-from handcal.files import read_json
+from handcal.io.files import read_json
 from handcal.rig.cube import Cube, CubeError
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics

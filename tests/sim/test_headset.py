@@ -15,9 +15,9 @@ import pytest
 from handcal.display import view_of_eye
 from handcal.errors import LinkError
 from handcal.geometry import transform
+from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.server import Confirmation, HeadsetServer
-from handcal.resources import resource_path
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.headset import HeadsetSettings, run_headset

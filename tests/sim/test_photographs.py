@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from handcal.geometry import invert
-from handcal.image_file import read_image
+from handcal.io.images import read_image
 from handcal.rig.board import find_board
 from handcal.rig.example import example_rig
 from handcal.rig.tracked_file import read_tracked

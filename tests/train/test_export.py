@@ -13,7 +13,7 @@ from handcal.detector import FLOAT_MODEL
 from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo
 from handcal.hand.detect import points
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 from handcal.train.export import export_integer
 from handcal.train.loop import read_average
 from handcal.train.model import HandNet

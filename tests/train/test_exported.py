@@ -7,7 +7,7 @@ pytest.importorskip("onnx")
 import torch
 
 from handcal.errors import FileError
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 from handcal.train.exported import load_exported
 from handcal.train.model import HandNet
 from handcal.types import UInt8

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("torch")
 
 from handcal.evaluate.annotations import Photo
-from handcal.files import write_json
+from handcal.io.files import write_json
 from handcal.train.samples import Samples, SampleSettings, collate
 
 HAND = (120, 80, 180, 160)

@@ -3,7 +3,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.files import read_json
+from handcal.io.files import read_json
 from handcal.train.simulated import CAMERA, render_hands
 
 

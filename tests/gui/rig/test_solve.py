@@ -11,8 +11,8 @@ import pytest
 
 from handcal.display import view_of_eye
 from handcal.errors import HandcalError
-from handcal.files import write_json
 from handcal.geometry import invert, rigid
+from handcal.io.files import write_json
 from handcal.rig.assemble import screen_of
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics, stereo_json, write_intrinsics

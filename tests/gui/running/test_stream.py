@@ -11,8 +11,8 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import ProcedureError
-from handcal.closable import Closable
 from handcal.errors import FileError
+from handcal.io.closable import Closable
 from handcal.station import Station
 from handcal_gui.running.stream import Stream
 

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.calibrate import CalibrationSettings
-from handcal.config import read_settings, settings_json
 from handcal.demo import DemoSettings
 from handcal.errors import FileError
+from handcal.io.settings import read_settings, settings_json
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses

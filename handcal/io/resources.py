@@ -15,7 +15,7 @@ def resource_path(name: str) -> Path:
     FileError
         If it is missing: the installation is damaged.
     """
-    package = Path(__file__).parent
+    package = Path(__file__).parents[1]
     for folder in (package / "_resources", package.parent / "resources"):
         if (path := folder / name).exists():
             return path

@@ -1,7 +1,7 @@
 import pytest
 
 from handcal.errors import FileError
-from handcal.resources import resource_path
+from handcal.io.resources import resource_path
 
 
 def test_a_shipped_file_is_found() -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from handcal.errors import FileError
-from handcal.lock import FileLock
+from handcal.io.lock import FileLock
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from handcal.lock import FileLock
+from handcal.io.lock import FileLock
 lock = FileLock(Path(sys.argv[1]))
 print("held", flush=True)
 time.sleep(60)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handcal.errors import FileError
-from handcal.files import (
+from handcal.io.files import (
     make_folder,
     read_json,
     read_limited,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import FileError
-from handcal.files import read_limited, require_suffix, write_atomic
+from handcal.io.files import read_limited, require_suffix, write_atomic
 from handcal.types import UInt8
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")

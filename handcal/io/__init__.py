@@ -1,0 +1,1 @@
+"""Files, images, settings and shipped resources: bounded reading, atomic writing."""
