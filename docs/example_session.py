@@ -12,10 +12,10 @@ from handcal.calibrate import CalibrationSettings
 from handcal.display import TARGET_DEPTHS_M
 from handcal.io.settings import settings_json
 from handcal.results import SolveSettings, results_json, solve_session
-from handcal.session import Session
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.sim.wearer import WearerSettings
 from handcal.study.wearers import StudyWearer, align_hand, draw_wearer
-from handcal.trial import make_trial
 from handcal.types import EYES, Alignment, Eye, Float64
 
 TARGET = Path(__file__).parents[1] / "resources/example_session"

@@ -94,7 +94,7 @@ def solve(arguments: argparse.Namespace) -> None:
     import numpy as np
 
     from handcal.results import results_json
-    from handcal.session import Session
+    from handcal.session.session import Session
     from handcal.solve_again import solve_again, stored_solve_settings
 
     record = Session.open(arguments.session)
@@ -127,7 +127,7 @@ def solve(arguments: argparse.Namespace) -> None:
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
-    from handcal.session import Session
+    from handcal.session.session import Session
 
     try:
         settings = ExportSettings(

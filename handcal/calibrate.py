@@ -32,12 +32,12 @@ from handcal.display import projection_matrix, view_of_eye
 from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
 from handcal.geometry import invert, transform
 from handcal.hand.settings import SegmentSettings
-from handcal.history import MAX_ALIGNMENTS, Shelf, read_shifts
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.results import Results, SolveSettings, results_json, solve_session
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
+from handcal.session.state import MAX_ALIGNMENTS, Shelf, read_shifts
 from handcal.types import (
     EYES,
     Alignment,

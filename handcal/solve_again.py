@@ -8,7 +8,7 @@ from handcal.calibrate import CalibrationSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
 from handcal.results import Results, SolveSettings, solve_session
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 
 
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:

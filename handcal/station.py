@@ -27,13 +27,13 @@ from handcal.link.pairing import new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
-from handcal.session import Session
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
 from handcal.snapshot import Procedure, Snapshot
 from handcal.station_settings import StationSettings
-from handcal.trial import make_trial
 from handcal.types import Eye, Float64, Frame, Target
 from handcal.wearer_view import EyeView, see
 

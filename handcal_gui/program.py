@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal.station import Station
 from handcal.station_settings import StationSettings
 from handcal_gui.app import FIRST_SIZE

@@ -31,7 +31,7 @@ from handcal.link.settings import LinkSettings
 from handcal.register.guard import RotationGuard
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
@@ -57,7 +57,7 @@ T_D_TURNED = rigid([-0.2, 0.0, 0.0], [0.006, -0.004, 0.5]) @ rigid([0.0, 0.0, np
 KILLED = """
 import os, sys
 from pathlib import Path
-from handcal.session import Session
+from handcal.session.session import Session
 record = Session.open(Path(sys.argv[1]))
 session = Session.create(Path(sys.argv[2]), record.rig, record.settings, name="killed")
 session.save_alignment(record.alignments[0])

@@ -18,7 +18,7 @@ from handcal.__main__ import main
 from handcal.display import reprojection_arcmin
 from handcal.geometry import rigid
 from handcal.rig.example import Z_E_S_M, example_rig
-from handcal.session import Session
+from handcal.session.session import Session
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.types import EYES, Eye
 

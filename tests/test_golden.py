@@ -31,7 +31,8 @@ from handcal.io.resources import resource_path
 from handcal.io.settings import settings_json
 from handcal.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
-from handcal.session import Session
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
@@ -39,7 +40,6 @@ from handcal.sim.scene import SceneState
 from handcal.sim.wearer import WearerSettings
 from handcal.solve_again import solve_again
 from handcal.study.wearers import align_hand, draw_wearer
-from handcal.trial import make_trial
 from handcal.types import EYES, METHODS, Alignment, Eye, Float64
 from tests.helpers import DATA
 

@@ -25,7 +25,7 @@ from handcal.doctor import Finding, Health
 from handcal.geometry import rigid
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.rig.example import example_rig
-from handcal.session import Session
+from handcal.session.session import Session
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth

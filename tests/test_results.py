@@ -17,7 +17,7 @@ from handcal.io.settings import read_settings, settings_json
 from handcal.register.verdict import VerdictSettings, expected_error_arcmin
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
-from handcal.session import Session
+from handcal.session.session import Session
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
 from handcal.types import EYES, METHODS, Alignment, Eye, Method

@@ -17,14 +17,14 @@ from handcal.camera.synthetic import SyntheticCamera
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
 from handcal.rig.example import Z_E_S_M, example_rig
-from handcal.session import Session
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.snapshot import Snapshot
 from handcal.station import Station
 from handcal.station_settings import StationSettings
-from handcal.trial import make_trial
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
 from tests.helpers import Patience
 

@@ -14,7 +14,8 @@ from typing import Any, Literal, TypeAlias
 
 from handcal.errors import FileError
 from handcal.export.tables import trial_rows
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
+from handcal.session.trial import calibration_numbers
 from handcal.statistics import (
     MeanInterval,
     Summary,
@@ -23,7 +24,6 @@ from handcal.statistics import (
     summarise,
     variance_components,
 )
-from handcal.trial import calibration_numbers
 
 CornerRow: TypeAlias = dict[str, Any]
 """One corner of one trial: the columns of `trial_rows`, and whose it is."""

@@ -12,8 +12,8 @@ from handcal.methods.published import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Row, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
+from handcal.session.trial import calibration_numbers
 from handcal.statistics import INTERVAL_METHOD
-from handcal.trial import calibration_numbers
 
 # Wearers in one figure, and the height of each.
 _WEARERS, _WEARER_MM, _FIGURE_MM = 24, 6.0, 30.0

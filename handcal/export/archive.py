@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from handcal.errors import FileError
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 
 MAX_ARCHIVE_BYTES = 4 * 2**30
 _CHUNK_BYTES = 2**19

@@ -15,7 +15,7 @@ from handcal.export.formats import FORMATS, Format
 from handcal.export.outcome import Outcome, conclude
 from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 
 _SOLVING = "Solving the alignments again"
 

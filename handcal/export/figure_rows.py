@@ -9,7 +9,7 @@ import numpy as np
 from handcal.export.figures import ResidualCells
 from handcal.report.document import Row
 from handcal.results import Results
-from handcal.trial import Trial
+from handcal.session.trial import Trial
 from handcal.types import Eye, Float64
 
 

@@ -21,7 +21,7 @@ from handcal.display import eye_projection
 from handcal.export.outcome import Outcome
 from handcal.geometry import project, transform
 from handcal.results import Results
-from handcal.trial import Trial
+from handcal.session.trial import Trial
 from handcal.types import EYES, Alignment, Eye, EyeDisplay, EyeShift, Float64
 
 COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}

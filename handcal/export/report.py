@@ -24,8 +24,8 @@ from handcal.report.cells import extremes, interval_ends, mean_sd, median_quarti
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.results import Results
+from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise
 from handcal.statistics import mean_interval
-from handcal.trial import ErrorStatistics, calibration_numbers, summarise
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
 
 _ORIGINS: Mapping[Origin, str] = {

@@ -12,7 +12,7 @@ from handcal.export.outcome import Origin, Outcome
 from handcal.io.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.rows import rows_csv
-from handcal.trial import Trial
+from handcal.session.trial import Trial
 from handcal.types import EYES, Eye, EyeShift, Float64
 
 _WHOSE = ("session", "wearer")

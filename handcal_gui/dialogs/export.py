@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from handcal.export.export import ExportSettings, export_session
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
 from handcal_gui.running.jobs import Job

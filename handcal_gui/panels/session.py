@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.results import Results
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal.snapshot import Snapshot
 from handcal_gui.records.notes_editor import NotesEditor
 from handcal_gui.records.record_table import RecordTable

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 
 from handcal.calibrate import State
 from handcal.display import TARGET_DEPTHS_M
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
+from handcal.session.trial import summarise
 from handcal.snapshot import Snapshot
-from handcal.trial import summarise
 from handcal.types import EYES, Eye
 from handcal_gui.records.record_table import RecordTable
 from handcal_gui.records.record_tabs import RecordTabs

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QSignalBlocker, QTimer, Signal
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
-from handcal.session import MAX_NOTES_CHARACTERS
+from handcal.session.session import MAX_NOTES_CHARACTERS
 from handcal_gui.theme import SPACING_PX
 
 SAVE_MS = 800

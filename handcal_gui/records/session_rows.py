@@ -9,10 +9,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.history import SessionEvent
 from handcal.results import Results
-from handcal.session import SessionRecord
-from handcal.trial import ErrorStatistics, TrialStatistics
+from handcal.session.session import SessionRecord
+from handcal.session.state import SessionEvent
+from handcal.session.trial import ErrorStatistics, TrialStatistics
 from handcal.types import EYES, Eye, EyeShift
 from handcal_gui.records.record_table import Column
 from handcal_gui.results.rows import EYE_NAMES, NOTHING

@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.display import TARGET_DEPTHS_M
-from handcal.trial import Trial, TrialStatistics
+from handcal.session.trial import Trial, TrialStatistics
 from handcal.types import EYES, Eye, Float64
 from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.widgets.plots import Plot

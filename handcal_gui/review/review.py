@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
 from handcal.results import Results, SolveSettings
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
 from handcal.solve_again import solve_again, stored_solve_settings
 from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review_page import ReviewPage

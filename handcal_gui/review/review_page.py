@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.results import Results
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button, main_button, paragraph

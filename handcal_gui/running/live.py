@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from handcal.calibrate import Calibration, State
 from handcal.errors import FileError
 from handcal.results import SolveSettings
-from handcal.session import Session
+from handcal.session.session import Session
 from handcal.snapshot import Snapshot
 from handcal.station import Station
 from handcal_gui.review.compare import Comparison

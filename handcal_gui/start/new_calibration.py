@@ -9,8 +9,8 @@ from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit
 
 from handcal.doctor import Finding, Health
-from handcal.history import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.preflight import Part, is_ready
+from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station_settings import StationSettings
 from handcal_gui.preferences import Preferences
 from handcal_gui.running.latest_job import LatestJob

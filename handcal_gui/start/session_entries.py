@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handcal.errors import FileError
-from handcal.history import History
-from handcal.journal import read_journal
-from handcal.unfinished import UnfinishedSession, unfinished_sessions
+from handcal.session.journal import read_journal
+from handcal.session.state import History
+from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
 from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.times import local_time
 

@@ -20,9 +20,9 @@ from handcal.evaluate.user_test_report import user_test_report
 from handcal.report.cells import median_quartiles
 from handcal.report.document import Table
 from handcal.rig.example import example_rig
-from handcal.session import Session
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.statistics import mean_interval
-from handcal.trial import make_trial
 from handcal.types import EYES, Float64
 
 RIG = example_rig()

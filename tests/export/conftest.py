@@ -10,10 +10,10 @@ from handcal.export.outcome import Outcome, conclude
 from handcal.io.settings import settings_json
 from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
+from handcal.session.trial import make_trial
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
-from handcal.trial import make_trial
 from handcal.types import EYES, Alignment, Eye
 
 RIG = example_rig()

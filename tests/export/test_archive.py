@@ -12,7 +12,7 @@ import pytest
 from handcal.errors import CancelledError, FileError
 from handcal.export import archive
 from handcal.export.archive import write_archive
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
 
 
 def ignore(_share: float) -> None:

@@ -13,7 +13,7 @@ import pytest
 from handcal.conventions import opengl_projection, openxr_view, unity_world_to_camera
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.outcome import Origin, Outcome, conclude
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal.types import EYES, Eye, Rig
 
 

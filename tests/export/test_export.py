@@ -19,7 +19,7 @@ from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.formats import FORMATS, Format
 from handcal.io.settings import read_settings, settings_json
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 
 resource = pytest.importorskip("resource")
 
@@ -57,7 +57,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from handcal.export.export import ExportSettings, export_session
-from handcal.session import Session
+from handcal.session.session import Session
 
 def report(what, share):
     if share > 0.5:

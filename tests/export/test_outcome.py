@@ -11,7 +11,7 @@ from handcal.display import projection_matrix
 from handcal.errors import FileError
 from handcal.export.outcome import Outcome, conclude
 from handcal.results import results_json
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 
 
 def test_the_session_is_solved_to_what_it_was(outcome: Outcome) -> None:

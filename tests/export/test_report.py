@@ -19,8 +19,8 @@ from handcal.export.outcome import Outcome, conclude
 from handcal.export.report import session_report
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.pdf import compose, write_pdf
-from handcal.session import SessionRecord
-from handcal.trial import Trial
+from handcal.session.session import SessionRecord
+from handcal.session.trial import Trial
 
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
 

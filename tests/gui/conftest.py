@@ -29,7 +29,7 @@ from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
 from handcal.snapshot import Snapshot
 from handcal.station import Station
 from handcal_gui import launch

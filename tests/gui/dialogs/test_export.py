@@ -22,7 +22,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.widgets.path_field import PathField
 

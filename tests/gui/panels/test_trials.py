@@ -12,9 +12,9 @@ from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
 from handcal.results import Results
-from handcal.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord
+from handcal.session.trial import make_trial
 from handcal.snapshot import Snapshot
-from handcal.trial import make_trial
 from handcal.types import Eye, Rig
 from handcal_gui.panels.trials import TrialsPanel
 from handcal_gui.records.record_table import RecordTable

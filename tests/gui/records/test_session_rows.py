@@ -8,8 +8,8 @@ import pytest
 
 from handcal.results import Results
 from handcal.rig.example import example_rig
-from handcal.session import Session, SessionRecord
-from handcal.trial import Trial, make_trial, summarise
+from handcal.session.session import Session, SessionRecord
+from handcal.session.trial import Trial, make_trial, summarise
 from handcal.types import Alignment, Eye
 from handcal_gui.records.session_rows import (
     ALIGNMENT_COLUMNS,

@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError
 from handcal.results import Results
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 

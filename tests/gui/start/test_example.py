@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from handcal.errors import FileError
-from handcal.session import Session
+from handcal.session.session import Session
 from handcal.types import EYES
 from handcal_gui.start.example import copy_example
 

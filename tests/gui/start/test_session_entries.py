@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from handcal.rig.example import example_rig
-from handcal.session import Session
+from handcal.session.session import Session
 from handcal.types import Alignment
 from handcal_gui.start.session_entries import find_offers
 

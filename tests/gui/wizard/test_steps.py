@@ -8,7 +8,7 @@ import pytest
 
 from handcal.calibrate import State
 from handcal.errors import FileError
-from handcal.session import SessionRecord
+from handcal.session.session import SessionRecord
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye
 from handcal_gui.wizard.steps import (

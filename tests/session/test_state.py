@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.history import History, SessionEvent, Shelf, read_shifts
-from handcal.journal import Event
+from handcal.session.journal import Event
+from handcal.session.state import History, SessionEvent, Shelf, read_shifts
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))

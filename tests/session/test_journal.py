@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from handcal import journal
 from handcal.errors import FileError
-from handcal.journal import JournalWriter, happens_now, journal_line, read_journal
+from handcal.session import journal
+from handcal.session.journal import JournalWriter, happens_now, journal_line, read_journal
 
 
 def begin(path: Path) -> JournalWriter:

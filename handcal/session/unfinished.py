@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handcal.errors import FileError
-from handcal.history import SessionEvent
 from handcal.io.lock import FileLock
-from handcal.journal import read_journal
-from handcal.session import Session
+from handcal.session.journal import read_journal
+from handcal.session.session import Session
+from handcal.session.state import SessionEvent
 
 
 @dataclass(frozen=True, slots=True)

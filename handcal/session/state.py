@@ -10,8 +10,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.journal import Event
-from handcal.trial import Trial, read_trial
+from handcal.session.journal import Event
+from handcal.session.trial import Trial, read_trial
 from handcal.types import EYES, Eye, Float64, readonly
 
 MAX_ALIGNMENTS = 100
@@ -96,7 +96,7 @@ class History:
     is_solved, is_applied, is_finished : bool
     applied_shift_m : dict of eye to (3,) float64
     fine_tuned : dict of eye to (3,) float64, or None
-        As in `handcal.session.SessionRecord`.
+        As in `handcal.session.session.SessionRecord`.
     """
 
     def __init__(self) -> None:

@@ -7,7 +7,14 @@ import pytest
 
 from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, update_matrix
 from handcal.rig.example import example_rig
-from handcal.trial import Trial, calibration_numbers, make_trial, read_trial, summarise, trial_json
+from handcal.session.trial import (
+    Trial,
+    calibration_numbers,
+    make_trial,
+    read_trial,
+    summarise,
+    trial_json,
+)
 from handcal.types import EYES, Float64
 
 RIG = example_rig()

@@ -2,9 +2,9 @@ import json
 from pathlib import Path
 
 from handcal.rig.example import example_rig
-from handcal.session import Session
+from handcal.session.session import Session
+from handcal.session.unfinished import unfinished_sessions
 from handcal.types import Alignment
-from handcal.unfinished import unfinished_sessions
 
 
 def make(parent: Path, name: str, wearer: str = "") -> Session:

@@ -26,13 +26,13 @@ from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
-from handcal.alignment_file import decode_alignment, encode_alignment
 from handcal.errors import FileError
-from handcal.history import History, SessionEvent, Shelf, clean_wearer, read_shifts
 from handcal.io.closable import Closable
 from handcal.io.files import make_folder, read_json, read_limited, write_atomic, write_json
 from handcal.io.lock import FileLock
-from handcal.journal import (
+from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
+from handcal.session.alignment_file import decode_alignment, encode_alignment
+from handcal.session.journal import (
     Event,
     JournalContent,
     JournalWriter,
@@ -40,8 +40,8 @@ from handcal.journal import (
     journal_line,
     read_journal,
 )
-from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
-from handcal.trial import Trial, trial_json
+from handcal.session.state import History, SessionEvent, Shelf, clean_wearer, read_shifts
+from handcal.session.trial import Trial, trial_json
 from handcal.types import Alignment, Eye, Float64, Rig
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20

@@ -18,16 +18,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handcal.errors import FileError
-from handcal.history import MAX_ALIGNMENTS, MAX_TRIALS, SessionEvent
-from handcal.journal import JOURNAL_VERSION
 from handcal.rig.example import example_rig
-from handcal.session import (
+from handcal.session.journal import JOURNAL_VERSION
+from handcal.session.session import (
     MAX_ALIGNMENT_BYTES,
     MAX_NOTES_CHARACTERS,
     Session,
     SessionRecord,
 )
-from handcal.trial import Trial, make_trial, trial_json
+from handcal.session.state import MAX_ALIGNMENTS, MAX_TRIALS, SessionEvent
+from handcal.session.trial import Trial, make_trial, trial_json
 from handcal.types import Alignment
 from tests.helpers import DATA
 
@@ -42,8 +42,8 @@ WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from handcal.session import Session
-from handcal.trial import make_trial
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.types import Alignment
 
 path = Path(sys.argv[1])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.alignment_file import decode_alignment, encode_alignment
+from handcal.session.alignment_file import decode_alignment, encode_alignment
 from handcal.types import Alignment
 
 

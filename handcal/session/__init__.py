@@ -1,0 +1,1 @@
+"""A stored session: folder, journal, alignments, trials."""
