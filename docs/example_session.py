@@ -11,7 +11,7 @@ import numpy as np
 from handcal.calibrate import CalibrationSettings
 from handcal.display import TARGET_DEPTHS_M
 from handcal.io.settings import settings_json
-from handcal.results import SolveSettings, results_json, solve_session
+from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.wearer import WearerSettings

@@ -93,7 +93,7 @@ def solve(arguments: argparse.Namespace) -> None:
     """Solve a session's alignments again; the session itself stays as it is."""
     import numpy as np
 
-    from handcal.results import results_json
+    from handcal.register.results import results_json
     from handcal.session.session import Session
     from handcal.solve_again import solve_again, stored_solve_settings
 

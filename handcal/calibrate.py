@@ -35,7 +35,7 @@ from handcal.hand.settings import SegmentSettings
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
-from handcal.results import Results, SolveSettings, results_json, solve_session
+from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, Shelf, read_shifts
 from handcal.types import (

@@ -9,7 +9,7 @@ from pathlib import Path
 from handcal.calibrate import Observation, PlacedHand, State
 from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.types import Alignment, Eye, Float64, Frame
 from handcal.wearer_view import EyeView

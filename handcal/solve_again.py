@@ -7,7 +7,7 @@ from collections.abc import Callable
 from handcal.calibrate import CalibrationSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
-from handcal.results import Results, SolveSettings, solve_session
+from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
 
 

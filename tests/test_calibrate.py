@@ -29,7 +29,7 @@ from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.register.guard import RotationGuard
-from handcal.results import SolveSettings, results_json, solve_session
+from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.hand import make_hand

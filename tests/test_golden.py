@@ -29,7 +29,7 @@ from handcal.hand.finder import HandFinder
 from handcal.hand.settings import SegmentSettings
 from handcal.io.resources import resource_path
 from handcal.io.settings import settings_json
-from handcal.results import Results, SolveSettings, results_json, solve_session
+from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.errors import FileError
-from handcal.results import SolveSettings
+from handcal.register.results import SolveSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.solve_again import solve_again, stored_solve_settings

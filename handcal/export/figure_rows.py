@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from handcal.export.figures import ResidualCells
+from handcal.register.results import Results
 from handcal.report.document import Row
-from handcal.results import Results
 from handcal.session.trial import Trial
 from handcal.types import Eye, Float64
 

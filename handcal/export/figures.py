@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from handcal.display import eye_projection
 from handcal.export.outcome import Outcome
 from handcal.geometry import project, transform
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.trial import Trial
 from handcal.types import EYES, Alignment, Eye, EyeDisplay, EyeShift, Float64
 

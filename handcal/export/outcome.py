@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from handcal.display import projection_matrix
-from handcal.results import Results, SolveSettings
+from handcal.register.results import Results, SolveSettings
 from handcal.session.session import SessionRecord
 from handcal.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, Eye, Float64, Projection

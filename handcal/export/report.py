@@ -19,11 +19,11 @@ from handcal.export.figure_rows import (
 from handcal.export.figures import ResidualCells
 from handcal.export.outcome import Origin, Outcome
 from handcal.export.tables import parameter_rows, trial_rows
+from handcal.register.results import Results
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
-from handcal.results import Results
 from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise
 from handcal.statistics import mean_interval
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName

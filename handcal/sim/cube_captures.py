@@ -23,7 +23,7 @@ from handcal.errors import FileError
 from handcal.geometry import image_points, invert, project, rigid, transform
 from handcal.io.files import make_folder, write_json
 from handcal.io.images import write_png
-from handcal.results import SolveSettings, solve_session
+from handcal.register.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid

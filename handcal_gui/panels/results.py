@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig
 from handcal_gui.results.compare_tab import CompareTab

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.snapshot import Snapshot
 from handcal_gui.records.notes_editor import NotesEditor

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.session.trial import ErrorStatistics, TrialStatistics

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.types import METHODS, Method, Rig
 from handcal_gui.results.rows import comparison_rows
 from handcal_gui.theme import SPACING_PX

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.widgets.plots import Plot
 

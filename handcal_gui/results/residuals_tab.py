@@ -9,7 +9,7 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
 
 from handcal.geometry import transform
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.types import Alignment, Eye, EyeShift
 from handcal_gui.results.residual_map import ResidualMap
 from handcal_gui.results.rows import EYE_NAMES

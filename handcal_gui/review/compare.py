@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject
 
-from handcal.results import SolveSettings, solve_session
+from handcal.register.results import SolveSettings, solve_session
 from handcal.types import Alignment, Method, Rig
 from handcal_gui.panels.results import ResultsPanel
 from handcal_gui.running.jobs import IsCancelled, Job, Report

@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
-from handcal.results import Results, SolveSettings
+from handcal.register.results import Results, SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.solve_again import solve_again, stored_solve_settings
 from handcal_gui.review.compare import Comparison

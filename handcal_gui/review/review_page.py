@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX, scale_font

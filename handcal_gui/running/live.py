@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.calibrate import Calibration, State
 from handcal.errors import FileError
-from handcal.results import SolveSettings
+from handcal.register.results import SolveSettings
 from handcal.session.session import Session
 from handcal.snapshot import Snapshot
 from handcal.station import Station

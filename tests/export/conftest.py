@@ -8,7 +8,7 @@ import pytest
 from handcal.calibrate import CalibrationSettings
 from handcal.export.outcome import Outcome, conclude
 from handcal.io.settings import settings_json
-from handcal.results import SolveSettings, results_json, solve_session
+from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial

@@ -10,7 +10,7 @@ import pytest
 from handcal.display import projection_matrix
 from handcal.errors import FileError
 from handcal.export.outcome import Outcome, conclude
-from handcal.results import results_json
+from handcal.register.results import results_json
 from handcal.session.session import SessionRecord
 
 

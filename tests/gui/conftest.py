@@ -27,7 +27,7 @@ from handcal.io.settings import settings_json
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
-from handcal.results import Results, SolveSettings, results_json, solve_session
+from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import Alignment
 from handcal_gui.cloud.cloud_view import CloudView

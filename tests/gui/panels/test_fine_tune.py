@@ -22,7 +22,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import MAX_HAND_SET_SHIFT_M, State
 from handcal.display import effect_at
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
 from handcal_gui.panels.fine_tune import FineTunePanel

@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
 from handcal.geometry import transform
-from handcal.results import Results, SolveSettings, solve_session
+from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig, Verdict
 from handcal_gui.panels.results import ResultsPanel

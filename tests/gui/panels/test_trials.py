@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton, QToolBu
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.snapshot import Snapshot

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.calibrate import State
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal.wearer_view import EyeView

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial, summarise

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLabel, QProgressDialog, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError
-from handcal.results import Results
+from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program

@@ -14,8 +14,8 @@ from handcal.calibrate import CalibrationSettings
 from handcal.errors import CancelledError
 from handcal.io.files import write_json
 from handcal.io.settings import read_settings, settings_json
+from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.register.verdict import VerdictSettings, expected_error_arcmin
-from handcal.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
