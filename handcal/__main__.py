@@ -76,8 +76,8 @@ def demo(arguments: argparse.Namespace) -> None:
 def segment(arguments: argparse.Namespace) -> None:
     """Segment the hand in one image pair: hand.ply, contour.ply, mask, overlay and hand.json."""
     from handcal.camera.images import read_frame
-    from handcal.detector import make_finder
     from handcal.hand.settings import SegmentSettings
+    from handcal.hand.shipped import make_finder
     from handcal.segmentation_file import write_segmentation
 
     frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)

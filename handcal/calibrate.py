@@ -27,11 +27,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
-from handcal.detector import make_finder
 from handcal.display import projection_matrix, view_of_eye
 from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
 from handcal.geometry import invert, transform
 from handcal.hand.settings import SegmentSettings
+from handcal.hand.shipped import make_finder
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from handcal.camera.sdk_devices import Device, connected_devices
 from handcal.camera.usb import explain_absence
-from handcal.detector import load_detector
 from handcal.errors import HandcalError
+from handcal.hand.shipped import load_detector
 from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS

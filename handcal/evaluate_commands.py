@@ -18,11 +18,11 @@ from handcal.terminal import Commands, Parser, add_command, console, progress, s
 
 def detector(arguments: argparse.Namespace) -> None:
     """Measure on annotated photographs how well hands are found."""
-    from handcal.detector import load_detector
     from handcal.evaluate.annotations import read_annotations
     from handcal.evaluate.contact_sheet import write_contact_sheet
     from handcal.evaluate.detector import EVALUATED, detect_all, evaluation
     from handcal.hand.detect import HandDetector
+    from handcal.hand.shipped import load_detector
 
     if arguments.sheet is not None:  # before the long work, lest its result is lost
         require_suffix(arguments.sheet, ".png")

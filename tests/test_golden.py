@@ -20,13 +20,13 @@ import pytest
 
 from handcal.calibrate import CalibrationSettings
 from handcal.camera.synthetic import SyntheticCamera
-from handcal.detector import FLOAT_MODEL
 from handcal.display import projection_matrix
 from handcal.export.export import ExportSettings, export_session
 from handcal.geometry import rigid
 from handcal.hand.detect import HandDetector
 from handcal.hand.finder import HandFinder
 from handcal.hand.settings import SegmentSettings
+from handcal.hand.shipped import FLOAT_MODEL
 from handcal.io.resources import resource_path
 from handcal.io.settings import settings_json
 from handcal.register.results import Results, SolveSettings, results_json, solve_session

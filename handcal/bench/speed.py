@@ -13,11 +13,11 @@ from handcal.bench.figure import Figure
 from handcal.bench.settings import BenchSettings
 from handcal.bench.trials import Measured, Progress, trial_hand
 from handcal.camera.synthetic import SyntheticCamera
-from handcal.detector import load_detector
 from handcal.errors import HandError
 from handcal.geometry import rigid
 from handcal.hand.roi import Detector, RoiFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.shipped import load_detector
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig

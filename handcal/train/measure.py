@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from handcal.bench.speed import following_ms, simulated_frame
-from handcal.detector import FLOAT_MODEL, INTEGER_MODEL
 from handcal.evaluate.annotations import read_annotations
 from handcal.evaluate.detector import EVALUATED, detect_all, summary
 from handcal.evaluate.precision import MATCH_OVERLAP
 from handcal.hand.detect import Detections, HandDetector, overlaps
+from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
 from handcal.io.resources import resource_path
 from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415

@@ -38,7 +38,7 @@ def test_writes_the_figures_and_the_failures(
     annotations.write_text(json.dumps({"a.png": {"width": 128, "height": 96, "hands": hands}}))
     figures, sheet = tmp_path / "out" / "figures.json", tmp_path / "out" / "sheet.png"
     files = ("--images", tmp_path, "--annotations", annotations)
-    monkeypatch.setattr("handcal.detector.load_detector", lambda settings: Seer())
+    monkeypatch.setattr("handcal.hand.shipped.load_detector", lambda settings: Seer())
     evaluate(monkeypatch, *files, "--json", figures, "--sheet", sheet)
     result = json.loads(figures.read_text())
     assert result["ap50"] == result["ap50_large"] == result["ap50_rel15"] == 1.0

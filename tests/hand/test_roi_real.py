@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from handcal.camera.images import read_depth
-from handcal.detector import load_detector
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.finder import HandFinder
 from handcal.hand.roi import RoiFinder
 from handcal.hand.settings import SegmentSettings
+from handcal.hand.shipped import load_detector
 from handcal.io.images import read_image
 from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 

@@ -9,10 +9,10 @@ pytest.importorskip("onnx")
 import onnxruntime
 import torch
 
-from handcal.detector import FLOAT_MODEL
 from handcal.errors import FileError
 from handcal.evaluate.annotations import Photo
 from handcal.hand.detect import points
+from handcal.hand.shipped import FLOAT_MODEL
 from handcal.io.resources import resource_path
 from handcal.train.export import export_integer
 from handcal.train.loop import read_average

@@ -5,11 +5,11 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal import detector
-from handcal.detector import load_detector, make_finder
 from handcal.errors import FileError, HandError
+from handcal.hand import shipped as detector
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.settings import Roi, SegmentSettings
+from handcal.hand.shipped import load_detector, make_finder
 from handcal.io.images import read_image
 from handcal.types import Frame, Intrinsics, UInt8
 
