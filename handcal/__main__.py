@@ -409,7 +409,7 @@ def _open_source(arguments: argparse.Namespace) -> Camera:
     """Open the camera that a command's ``--source`` names."""
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
-    from handcal.camera.synthetic import SyntheticCamera
+    from handcal.sim.camera import SyntheticCamera
     from handcal.sim.hand import make_hand
     from handcal.sim.render import World
     from handcal.sim.room import make_room

@@ -17,7 +17,6 @@ from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
-from handcal.camera.synthetic import SyntheticCamera
 from handcal.display import target_corners_m, view_of_eye
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
@@ -29,6 +28,7 @@ from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
+from handcal.sim.camera import SyntheticCamera
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation

@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 
 from handcal.calibrate import CalibrationSettings
-from handcal.camera.synthetic import SyntheticCamera
 from handcal.display import projection_matrix
 from handcal.export.export import ExportSettings, export_session
 from handcal.geometry import rigid
@@ -33,6 +32,7 @@ from handcal.register.results import Results, SolveSettings, results_json, solve
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
+from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room

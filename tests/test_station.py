@@ -13,13 +13,13 @@ import pytest
 
 import handcal.station
 from handcal.calibrate import CalibrationSettings, ProcedureError, State
-from handcal.camera.synthetic import SyntheticCamera
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
+from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.snapshot import Snapshot

@@ -12,7 +12,6 @@ import numpy as np
 from handcal.bench.figure import Figure
 from handcal.bench.settings import BenchSettings
 from handcal.bench.trials import Measured, Progress, trial_hand
-from handcal.camera.synthetic import SyntheticCamera
 from handcal.errors import HandError
 from handcal.geometry import rigid
 from handcal.hand.roi import Detector, RoiFinder
@@ -21,6 +20,7 @@ from handcal.hand.shipped import load_detector
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
+from handcal.sim.camera import SyntheticCamera
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.render import World
 from handcal.sim.room import make_room

@@ -13,8 +13,8 @@ import pytest
 from handcal.camera.camera import Camera
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording, record_frames
-from handcal.camera.synthetic import SyntheticCamera
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import RoomSettings, make_room

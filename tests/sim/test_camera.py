@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from handcal.camera.camera import Camera
-from handcal.camera.synthetic import SyntheticCamera, SyntheticSettings
 from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import rigid, transform
+from handcal.sim.camera import SyntheticCamera, SyntheticSettings
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import RoomSettings, make_room
