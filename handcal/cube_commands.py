@@ -32,8 +32,8 @@ _SHOWN = (
 
 def net(arguments: argparse.Namespace) -> None:
     """Make a cube: its net to print at true size, and the file that describes it."""
-    from handcal.cube_file import write_cube
     from handcal.rig.cube import Cube
+    from handcal.rig.cube_file import write_cube
     from handcal.rig.cube_print import write_cube_pdf
 
     try:
@@ -210,7 +210,7 @@ def _add_rig(command: Parser) -> None:
 
 
 def _cube(arguments: argparse.Namespace) -> Cube:
-    from handcal.cube_file import read_cube
+    from handcal.rig.cube_file import read_cube
 
     return read_cube(arguments.cube or arguments.folder / "cube.json")
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from handcal.__main__ import main
-from handcal.cube_file import read_cube, write_cube
 from handcal.geometry import rigid
 from handcal.io.images import write_png
 from handcal.rig.cube import Cube
+from handcal.rig.cube_file import read_cube, write_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter

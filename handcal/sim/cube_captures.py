@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.cube_file import write_cube
 from handcal.display import eye_projection, view_of_eye
 from handcal.errors import FileError
 from handcal.geometry import image_points, invert, project, rigid, transform
@@ -25,6 +24,7 @@ from handcal.io.files import make_folder, write_json
 from handcal.io.images import write_png
 from handcal.register.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
+from handcal.rig.cube_file import write_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings

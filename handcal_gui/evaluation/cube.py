@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from handcal.cube_file import read_cube
 from handcal.errors import FileError, HandcalError
 from handcal.evaluate.cube_folder import CapturePlan
 from handcal.evaluate.cube_report import cube_report
@@ -14,6 +13,7 @@ from handcal.evaluate.cube_test import judge_captures
 from handcal.io.resources import resource_path
 from handcal.report.document import Report
 from handcal.rig.cube import Cube
+from handcal.rig.cube_file import read_cube
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid
 from handcal.rig.rig_file import read_rig

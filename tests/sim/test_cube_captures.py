@@ -4,11 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.cube_file import read_cube
 from handcal.errors import CancelledError, FileError
 from handcal.evaluate.cube_test import judge_captures
 from handcal.io.files import read_json
 from handcal.rig.cube import Cube, CubeError
+from handcal.rig.cube_file import read_cube
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid

@@ -15,10 +15,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.cube_file import write_cube
 from handcal.errors import CameraError
 from handcal.geometry import rigid
 from handcal.rig.cube import Cube
+from handcal.rig.cube_file import write_cube
 from handcal.rig.example import example_rig
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings

@@ -2,10 +2,10 @@ from pathlib import Path
 
 import pytest
 
-from handcal.cube_file import read_cube, write_cube
 from handcal.errors import FileError
 from handcal.io.files import write_json
 from handcal.rig.cube import Cube
+from handcal.rig.cube_file import read_cube, write_cube
 
 
 def test_a_cube_comes_back(tmp_path: Path) -> None:
