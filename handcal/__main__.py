@@ -169,8 +169,8 @@ def replay(arguments: argparse.Namespace) -> None:
 
 def record(arguments: argparse.Namespace) -> None:
     """Record a camera: into a .db3 file through librealsense, or into a folder of images."""
-    from handcal.record import RecordSettings
-    from handcal.record import record as record_camera
+    from handcal.camera.record import RecordSettings
+    from handcal.camera.record import record as record_camera
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
     with _open_source(arguments) as camera, until_interrupted() as is_stopped:

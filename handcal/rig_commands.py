@@ -64,9 +64,9 @@ def board(arguments: argparse.Namespace) -> None:
 def take(arguments: argparse.Namespace) -> None:
     """Take images of a board, or of a display's grid, from a camera, a recording or a video."""
     from handcal.camera.playback import PlaybackSettings
+    from handcal.camera.take_board import TakeSettings, keep_imager, take_views
     from handcal.camera.view_source import open_view_source
     from handcal.rig.choose import ALIKE, ChooseSettings
-    from handcal.rig_take import TakeSettings, keep_imager, take_views
 
     sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
     if len(set(sources)) < len(sources):

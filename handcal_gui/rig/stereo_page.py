@@ -7,7 +7,7 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
-from handcal.rig_take import DEPTH_TO_COLOR, IMAGER
+from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.lens_fields import intrinsics_field, lens_field

@@ -4,9 +4,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handcal.camera.take_board import keep_images
 from handcal.errors import CancelledError, FileError
 from handcal.rig.views import ViewsError
-from handcal.rig_take import keep_images
 from handcal_gui.rig.shots import look, without
 
 

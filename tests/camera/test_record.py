@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.camera.record import Recorded, RecordSettings, record
 from handcal.camera.recordings import open_recording
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
 from handcal.io.closable import Closable
-from handcal.record import Recorded, RecordSettings, record
 from handcal.types import Frame, Intrinsics
 
 CAMERA = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)

@@ -11,6 +11,14 @@ import numpy as np
 import pytest
 
 from handcal.__main__ import main
+from handcal.camera.take_board import (
+    DEPTH_TO_COLOR,
+    IMAGER,
+    TakeSettings,
+    keep_imager,
+    keep_images,
+    take_views,
+)
 from handcal.camera.viewpoint import open_viewpoint
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import interpolate_pose, rigid
@@ -20,14 +28,6 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal.rig.formats import read_intrinsics, read_pose
 from handcal.rig.views import image_files, pair_views, read_views
-from handcal.rig_take import (
-    DEPTH_TO_COLOR,
-    IMAGER,
-    TakeSettings,
-    keep_imager,
-    keep_images,
-    take_views,
-)
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.types import Float64, Frame, Intrinsics, UInt8
 
@@ -166,7 +166,7 @@ def test_cameras_of_different_paces_stay_together(
         apart_ms.append(10 * abs(one - other))
         return None, None
 
-    monkeypatch.setattr("handcal.rig_take.see_board", look)
+    monkeypatch.setattr("handcal.camera.take_board.see_board", look)
     cameras = [PacedCamera(pace_ms) for pace_ms in paces_ms]
     folders = tmp_path / "depth", tmp_path / "headset"
     take_views(cameras, folders, BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
