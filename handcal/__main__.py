@@ -95,7 +95,7 @@ def solve(arguments: argparse.Namespace) -> None:
 
     from handcal.register.results import results_json
     from handcal.session.session import Session
-    from handcal.solve_again import solve_again, stored_solve_settings
+    from handcal.station.solve_again import solve_again, stored_solve_settings
 
     record = Session.open(arguments.session)
     if record.torn_bytes:
@@ -247,7 +247,7 @@ def _bench_window(frames: int) -> dict[str, Any]:
 
 def doctor(_arguments: argparse.Namespace) -> None:
     """Tell what is installed, which camera is there, and what to do about each problem."""
-    from handcal.doctor import Health, examine
+    from handcal.station.doctor import Health, examine
 
     findings = examine()
     for finding in findings:

@@ -15,13 +15,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from handcal.calibrate import Calibration, Observation, State
 from handcal.display import reprojection_arcmin
 from handcal.errors import HandcalError
 from handcal.register.solve import solve_alignment
 from handcal.sim.wearer import WearerSettings, draw_eyes
-from handcal.station import Station
-from handcal.station_settings import StationSettings
+from handcal.station.procedure import Calibration, Observation, State
+from handcal.station.settings import StationSettings
+from handcal.station.station import Station
 from handcal.types import EYES, Eye, Rig
 
 EyePlan = Literal["both", "each"]

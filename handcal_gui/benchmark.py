@@ -24,7 +24,6 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from handcal.bench.figure import Figure
-from handcal.calibrate import State
 from handcal.camera.camera import Camera
 from handcal.geometry import rigid
 from handcal.io.closable import Closable
@@ -36,9 +35,10 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.snapshot import Snapshot
-from handcal.station import Station
-from handcal.station_settings import StationSettings
+from handcal.station.procedure import State
+from handcal.station.settings import StationSettings
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
 from handcal.types import Float64, Frame
 from handcal_gui.app import keep_window_quick
 from handcal_gui.preferences import PreferencesFile

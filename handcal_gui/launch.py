@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
-from handcal.station_settings import StationSettings
+from handcal.station.settings import StationSettings
 from handcal_gui.demonstration.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program

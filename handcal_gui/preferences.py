@@ -14,7 +14,7 @@ from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
 from handcal.io.settings import read_settings, settings_json
 from handcal.link.pairing import read_pairing_key, write_pairing_key
-from handcal.station_settings import StationSettings
+from handcal.station.settings import StationSettings
 from handcal_gui.evaluation.entries import EvaluationEntries
 from handcal_gui.wizard.steps import EyePlan
 

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.session.session import SessionRecord
-from handcal.station import Station
-from handcal.station_settings import StationSettings
+from handcal.station.settings import StationSettings
+from handcal.station.station import Station
 from handcal_gui.app import FIRST_SIZE
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.camera import CameraPanel
 from handcal_gui.panels.cloud import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel

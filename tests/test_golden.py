@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.calibrate import CalibrationSettings
 from handcal.display import projection_matrix
 from handcal.export.export import ExportSettings, export_session
 from handcal.geometry import rigid
@@ -38,7 +37,8 @@ from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.wearer import WearerSettings
-from handcal.solve_again import solve_again
+from handcal.station.procedure import CalibrationSettings
+from handcal.station.solve_again import solve_again
 from handcal.study.wearers import align_hand, draw_wearer
 from handcal.types import EYES, METHODS, Alignment, Eye, Float64
 from tests.helpers import DATA

@@ -18,10 +18,9 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal import bench, doctor
+from handcal import bench
 from handcal.__main__ import main
 from handcal.camera.folder import record_folder
-from handcal.doctor import Finding, Health
 from handcal.geometry import rigid
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.rig.example import example_rig
@@ -29,6 +28,8 @@ from handcal.session.session import Session
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.station import doctor
+from handcal.station.doctor import Finding, Health
 from handcal.types import Alignment, Frame, Intrinsics
 
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)

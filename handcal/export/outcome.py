@@ -11,7 +11,7 @@ import numpy as np
 from handcal.display import projection_matrix
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import SessionRecord
-from handcal.solve_again import solve_again, stored_solve_settings
+from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, Eye, Float64, Projection
 
 Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]

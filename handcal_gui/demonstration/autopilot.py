@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal
 
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.running.live import Live
 from handcal_gui.wizard.steps import Action, View
 from handcal_gui.wizard.wizard import WizardPanel

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QApplication
 
 from handcal.errors import FileError
-from handcal.station_settings import StationSettings
+from handcal.station.settings import StationSettings
 from handcal_gui.demonstration.autopilot import Autopilot
 from handcal_gui.demonstration.screenshots import Screenshots
 from handcal_gui.demonstration.tour import Tour

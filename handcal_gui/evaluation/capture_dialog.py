@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLineEdit, QVBoxLayout, QW
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
-from handcal.doctor import Finding, Health
 from handcal.evaluate.cube_capture import instruction, keep_capture
 from handcal.evaluate.cube_folder import CapturePlan, PlannedCapture, missing_captures
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
+from handcal.station.doctor import Finding, Health
 from handcal_gui.camera.live_cameras import LiveCameras
 from handcal_gui.evaluation.capture_list import CaptureList
 from handcal_gui.evaluation.cube import capture_plan, read_cube_and_grid

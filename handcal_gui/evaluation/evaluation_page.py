@@ -10,8 +10,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from handcal.doctor import Finding, Health
 from handcal.errors import HandcalError
+from handcal.station.doctor import Finding, Health
 from handcal_gui.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.evaluation.results_view import ResultsView
 from handcal_gui.evaluation.work import Evaluation, Outcome, Standing

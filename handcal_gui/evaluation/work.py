@@ -10,11 +10,11 @@ from typing import Any, Protocol, TypeAlias
 import cv2
 import numpy as np
 
-from handcal.doctor import Finding, Health
 from handcal.errors import CancelledError, FileError
 from handcal.io.images import read_image
 from handcal.report.document import Report
 from handcal.report.write import write_report
+from handcal.station.doctor import Finding, Health
 from handcal.study.run import Study, run_study, share_done
 from handcal.study.store import Row, free_of_studies
 from handcal.types import UInt8

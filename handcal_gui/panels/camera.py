@@ -19,13 +19,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.calibrate import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.errors import FileError
 from handcal.hand.overlay import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.io.files import write_atomic
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import Observation
+from handcal.station.snapshot import Snapshot
 from handcal.types import Frame
 from handcal_gui.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.camera.hand_overlay import HandOverlay

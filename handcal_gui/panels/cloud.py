@@ -9,10 +9,10 @@ import numpy as np
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
-from handcal.calibrate import PlacedHand
 from handcal.geometry import invert, transform
 from handcal.register.pairs import matched_pairs
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import PlacedHand
+from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.cloud.cloud_view import CloudView
 from handcal_gui.cloud.orbit import Direction

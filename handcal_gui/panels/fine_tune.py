@@ -20,9 +20,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.calibrate import MAX_HAND_SET_SHIFT_M, State
 from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
 from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.theme import SPACING_PX, icon

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from handcal.link.rates import link_rates
 from handcal.link.server import LinkStatistics
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.link.link_history import LinkHistory
 from handcal_gui.link.link_table import RATES_S, LinkTable
 from handcal_gui.link.pairing_box import PairingBox

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.widgets.sentence import sentence
 
 

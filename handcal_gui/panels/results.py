@@ -9,7 +9,7 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
 
 from handcal.register.results import Results
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig
 from handcal_gui.results.compare_tab import CompareTab
 from handcal_gui.results.convergence_plot import ConvergencePlot

@@ -8,9 +8,9 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal.calibrate import Observation, PlacedHand, State
 from handcal.register.guard import turn_advice
-from handcal.snapshot import Procedure, Snapshot
+from handcal.station.procedure import Observation, PlacedHand, State
+from handcal.station.snapshot import Procedure, Snapshot
 from handcal.types import Float64
 from handcal_gui.rotation.dial import RotationDial
 from handcal_gui.rotation.turning_hand import TurningHand

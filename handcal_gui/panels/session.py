@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.records.notes_editor import NotesEditor
 from handcal_gui.records.record_table import RecordTable
 from handcal_gui.records.record_tabs import RecordTabs

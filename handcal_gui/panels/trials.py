@@ -15,11 +15,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.calibrate import State
 from handcal.display import TARGET_DEPTHS_M
 from handcal.session.session import SessionRecord
 from handcal.session.trial import summarise
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal_gui.records.record_table import RecordTable
 from handcal_gui.records.record_tabs import RecordTabs

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
+from handcal.station.wearer_view import EyeView, Overlay
 from handcal.types import EYES, Eye
-from handcal.wearer_view import EyeView, Overlay
 from handcal_gui.panels.missing import what_is_missing
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.wearer_view.eye_canvas import LINES, EyeCanvas

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QProgressDialog
 
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import Session, SessionRecord
-from handcal.solve_again import solve_again, stored_solve_settings
+from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review_page import ReviewPage
 from handcal_gui.running.jobs import IsCancelled, Job, Report

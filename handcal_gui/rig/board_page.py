@@ -17,12 +17,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.print_page import Paper
+from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
 from handcal_gui.rig.draft import Draft
 from handcal_gui.running.latest_job import LatestJob

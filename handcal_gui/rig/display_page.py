@@ -8,12 +8,12 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid
+from handcal.station.doctor import Finding, Health
 from handcal.types import Eye
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.images_panel import ImagesPanel

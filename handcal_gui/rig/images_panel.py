@@ -9,9 +9,9 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
-from handcal.doctor import Finding, Health
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
+from handcal.station.doctor import Finding, Health
 from handcal_gui.rig.coverage_map import CoverageMap
 from handcal_gui.rig.shot_list import ShotList
 from handcal_gui.rig.shot_view import ShotView

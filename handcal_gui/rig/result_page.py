@@ -18,11 +18,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.doctor import Finding, Health
 from handcal.errors import FileError, HandcalError
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.station.doctor import Finding, Health
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.finding_list import FindingList
 from handcal_gui.rig.rows import COLUMNS, difference_rows, rig_rows

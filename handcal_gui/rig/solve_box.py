@@ -7,8 +7,8 @@ from typing import Any
 
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from handcal.doctor import Finding, Health
 from handcal.errors import CancelledError
+from handcal.station.doctor import Finding, Health
 from handcal.types import Origin
 from handcal_gui.rig.rows import COLUMNS
 from handcal_gui.rig.solve import Solved

@@ -12,10 +12,10 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.take_board import keep_imager, keep_images, see_board
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
-from handcal.doctor import Finding, Health
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.views import View, view
+from handcal.station.doctor import Finding, Health
 from handcal_gui.camera.live_cameras import LiveCameras
 from handcal_gui.camera.live_images import Images
 from handcal_gui.running.job_bar import JobBar

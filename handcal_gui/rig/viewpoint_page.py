@@ -7,7 +7,7 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
-from handcal.doctor import Finding, Health
+from handcal.station.doctor import Finding, Health
 from handcal_gui.rig.draft import Draft
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.lens_fields import lens_field

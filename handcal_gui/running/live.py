@@ -9,12 +9,12 @@ from functools import partial
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from handcal.calibrate import Calibration, State
 from handcal.errors import FileError
 from handcal.register.results import SolveSettings
 from handcal.session.session import Session
-from handcal.snapshot import Snapshot
-from handcal.station import Station
+from handcal.station.procedure import Calibration, State
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
 from handcal_gui.review.compare import Comparison
 from handcal_gui.running.stream import Command, Stream
 from handcal_gui.window import MainWindow, Panel

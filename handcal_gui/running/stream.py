@@ -10,8 +10,8 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 
 from handcal.errors import HandcalError
-from handcal.snapshot import Snapshot
-from handcal.station import Station
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
 from handcal_gui.running.worker import Worker
 
 _LOG = logging.getLogger(__name__)

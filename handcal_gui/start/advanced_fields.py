@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QToolButton, QVBoxLayout, QWidget
 
 from handcal.camera.playback import PlaybackSettings
-from handcal.station_settings import StationSettings
+from handcal.station.settings import StationSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import beside, named, number, whole_number

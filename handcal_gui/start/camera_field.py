@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
 from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
-from handcal.station_settings import Source, StationSettings
+from handcal.station.settings import Source, StationSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
 from handcal_gui.widgets.fields import beside, button, choice, named
 from handcal_gui.widgets.path_field import PathField

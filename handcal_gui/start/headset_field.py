@@ -7,7 +7,7 @@ from dataclasses import replace
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
-from handcal.station_settings import HeadsetKind, StationSettings
+from handcal.station.settings import HeadsetKind, StationSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import beside, choice, named, whole_number
 from handcal_gui.widgets.key_field import KeyField

@@ -8,10 +8,10 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit
 
-from handcal.doctor import Finding, Health
-from handcal.preflight import Part, is_ready
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
-from handcal.station_settings import StationSettings
+from handcal.station.doctor import Finding, Health
+from handcal.station.preflight import Part, is_ready
+from handcal.station.settings import StationSettings
 from handcal_gui.preferences import Preferences
 from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.start.card import Card

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal.preflight import check_station
+from handcal.station.preflight import check_station
 from handcal_gui.preferences import Preferences
 from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.start.card import Card

@@ -10,9 +10,9 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
 
-from handcal.doctor import Finding, Health
-from handcal.preflight import PARTS, Part
-from handcal.station_settings import StationSettings
+from handcal.station.doctor import Finding, Health
+from handcal.station.preflight import PARTS, Part
+from handcal.station.settings import StationSettings
 from handcal_gui.start.advanced_fields import AdvancedFields
 from handcal_gui.start.camera_field import CameraField
 from handcal_gui.start.headset_field import HeadsetField

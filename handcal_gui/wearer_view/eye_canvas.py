@@ -7,8 +7,8 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from handcal.station.wearer_view import EyeView
 from handcal.types import Float64
-from handcal.wearer_view import EyeView
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import role_color
 

@@ -8,8 +8,8 @@ import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QWidget
 
-from handcal.calibrate import CalibrationSettings
 from handcal.hand.settings import Roi
+from handcal.station.procedure import CalibrationSettings
 from handcal.types import Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import choice, number

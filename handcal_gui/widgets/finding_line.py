@@ -7,7 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
-from handcal.doctor import Finding, Health
+from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.fields import button, named, paragraph
 from handcal_gui.widgets.sentence import sentence

@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from handcal.calibrate import State
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye
 from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.sentence import sentence

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.widgets.fields import button, main_button
 from handcal_gui.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard

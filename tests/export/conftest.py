@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from handcal.calibrate import CalibrationSettings
 from handcal.export.outcome import Outcome, conclude
 from handcal.io.settings import settings_json
 from handcal.register.results import SolveSettings, results_json, solve_session
@@ -14,6 +13,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
+from handcal.station.procedure import CalibrationSettings
 from handcal.types import EYES, Alignment, Eye
 
 RIG = example_rig()

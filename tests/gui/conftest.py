@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.calibrate import CalibrationSettings, Observation, PlacedHand, State
 from handcal.camera.feed import CameraStatus
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.display import view_of_eye
@@ -35,10 +34,11 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.snapshot import Procedure, Snapshot
-from handcal.station_settings import StationSettings
+from handcal.station.procedure import CalibrationSettings, Observation, PlacedHand, State
+from handcal.station.settings import StationSettings
+from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.wearer_view import EyeView, see
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig, UInt8
-from handcal.wearer_view import EyeView, see
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -280,7 +280,7 @@ def studio(
 ) -> Iterator[Studio]:
     """Return a station's parts; it is opened with these settings and `KEY` as pairing key."""
     camera = Camera(frames)
-    monkeypatch.setattr("handcal.station.RealSenseCamera", camera)
+    monkeypatch.setattr("handcal.station.station.RealSenseCamera", camera)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         address = probe.getsockname()

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QStandardPaths
 
-from handcal.calibrate import CalibrationSettings
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.register.guard import GuardSettings
-from handcal.station_settings import StationSettings
+from handcal.station.procedure import CalibrationSettings
+from handcal.station.settings import StationSettings
 from handcal_gui.preferences import Preferences, PreferencesFile
 
 CHANGED = Preferences(

@@ -22,10 +22,10 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import State
 from handcal.session.session import Session, SessionRecord
-from handcal.snapshot import Snapshot
-from handcal.station import Station
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
 from handcal_gui import launch
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program

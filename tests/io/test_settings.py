@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.calibrate import CalibrationSettings
 from handcal.demo import DemoSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings, settings_json
+from handcal.station.procedure import CalibrationSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.calibrate import CalibrationSettings
 from handcal.errors import CancelledError
 from handcal.io.files import write_json
 from handcal.io.settings import read_settings, settings_json
@@ -20,6 +19,7 @@ from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
+from handcal.station.procedure import CalibrationSettings
 from handcal.types import EYES, METHODS, Alignment, Eye, Method
 
 RIG = example_rig()

@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox
 from pytestqt.qtbot import QtBot
 
-from handcal.station_settings import StationSettings
+from handcal.station.settings import StationSettings
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.preferences import Preferences
 from handcal_gui.widgets.path_field import PathField

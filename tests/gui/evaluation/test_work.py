@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from handcal.doctor import Health
 from handcal.errors import CancelledError, FileError
 from handcal.report.document import Report
+from handcal.station.doctor import Health
 from handcal.study.run import run_study
 from handcal_gui.evaluation.entries import NoiseEntries, UserEntries
 from handcal_gui.evaluation.work import Checkpoint, GivenData

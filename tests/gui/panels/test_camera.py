@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 from handcal.errors import FileError
 from handcal.geometry import rigid
 from handcal.hand.settings import SegmentSettings
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.camera.depth_scale import DepthLegend
 from handcal_gui.panels.camera import CameraPanel, Mode
 from handcal_gui.widgets.image_view import ImageView

@@ -8,9 +8,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import State
 from handcal.register.results import Results
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment
 from handcal_gui.cloud.cloud_view import CloudView
 from handcal_gui.cloud.splat import rgb

@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import MAX_HAND_SET_SHIFT_M, State
 from handcal.display import effect_at
 from handcal.register.results import Results
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
 from handcal_gui.panels.fine_tune import FineTunePanel
 from handcal_gui.tuning.shift_history import Shifts, same_shifts

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.link.wire import Rejection
-from handcal.snapshot import Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal_gui.link.link_table import REJECTIONS
 from handcal_gui.panels.link import LinkPanel
 from handcal_gui.widgets.number_label import NumberLabel

@@ -12,10 +12,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTabWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import State
 from handcal.geometry import transform
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig, Verdict
 from handcal_gui.panels.results import ResultsPanel
 from handcal_gui.results.compare_tab import CompareTab

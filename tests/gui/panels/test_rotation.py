@@ -9,9 +9,9 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import State
 from handcal.register.guard import turn_advice
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.rotation import RotationPanel
 from handcal_gui.rotation.dial import RotationDial
 from handcal_gui.widgets.plots import Plot

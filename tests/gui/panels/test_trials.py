@@ -10,11 +10,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import State
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal.types import Eye, Rig
 from handcal_gui.panels.trials import TrialsPanel
 from handcal_gui.records.record_table import RecordTable

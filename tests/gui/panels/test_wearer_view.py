@@ -5,11 +5,11 @@ import pytest
 from PySide6.QtWidgets import QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import State
 from handcal.register.results import Results
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal.station.wearer_view import EyeView
 from handcal.types import EYES, Eye
-from handcal.wearer_view import EyeView
 from handcal_gui.panels.wearer_view import WearerViewPanel
 from handcal_gui.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.widgets.legend import LegendEntry

@@ -149,7 +149,7 @@ def test_opening_can_be_cancelled(
     program: Program, qtbot: QtBot, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     solver = Solver()
-    monkeypatch.setattr("handcal.solve_again.solve_session", solver)
+    monkeypatch.setattr("handcal.station.solve_again.solve_session", solver)
     program.open_session(record.path)
     qtbot.waitUntil(
         lambda: child(program, QProgressDialog, "opening").isVisible(), timeout=PATIENCE_MS

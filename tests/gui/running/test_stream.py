@@ -10,10 +10,10 @@ from typing import Any, cast
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.calibrate import ProcedureError
 from handcal.errors import FileError
 from handcal.io.closable import Closable
-from handcal.station import Station
+from handcal.station.procedure import ProcedureError
+from handcal.station.station import Station
 from handcal_gui.running.stream import Stream
 
 

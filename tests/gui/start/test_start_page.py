@@ -29,9 +29,9 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
-from handcal.doctor import Finding, Health
-from handcal.preflight import PARTS, Part
-from handcal.station_settings import StationSettings
+from handcal.station.doctor import Finding, Health
+from handcal.station.preflight import PARTS, Part
+from handcal.station.settings import StationSettings
 from handcal_gui.preferences import Preferences
 from handcal_gui.start.session_entries import Entry, Offers
 from handcal_gui.start.start_page import StartPage

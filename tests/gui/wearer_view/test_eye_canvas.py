@@ -5,8 +5,8 @@ from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
+from handcal.station.wearer_view import EyeView, see
 from handcal.types import Float64, UInt8
-from handcal.wearer_view import EyeView, see
 from handcal_gui.cloud.splat import rgb
 from handcal_gui.theme import colors
 from handcal_gui.wearer_view.eye_canvas import EyeCanvas

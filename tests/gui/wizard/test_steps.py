@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from handcal.calibrate import State
 from handcal.errors import FileError
 from handcal.session.session import SessionRecord
-from handcal.snapshot import Snapshot
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye
 from handcal_gui.wizard.steps import (
     STEPS,

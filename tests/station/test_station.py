@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import handcal.station
-from handcal.calibrate import CalibrationSettings, ProcedureError, State
+import handcal.station.station
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
 from handcal.rig.example import Z_E_S_M, example_rig
@@ -22,9 +21,10 @@ from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.wearer import WearerSettings, draw_eyes
-from handcal.snapshot import Snapshot
-from handcal.station import Station
-from handcal.station_settings import StationSettings
+from handcal.station.procedure import CalibrationSettings, ProcedureError, State
+from handcal.station.settings import StationSettings
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
 from tests.helpers import Patience
 
@@ -221,7 +221,7 @@ class Unplugged(SyntheticCamera):
 def test_a_camera_that_comes_back_finds_the_session_as_it_was(
     settings: StationSettings, begun: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(handcal.station, "SyntheticCamera", Unplugged)
+    monkeypatch.setattr(handcal.station.station, "SyntheticCamera", Unplugged)
     with Station(settings, resume=begun) as station:
         seen = step_until(station, "a frame", lambda s: s.frame is not None, PATIENCE_S)
         assert seen.camera.problem == ""

@@ -14,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal import preflight
 from handcal.camera.folder import record_folder
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.sdk_devices import Device
 from handcal.camera.settings import RealSenseSettings
-from handcal.doctor import Finding, Health
 from handcal.errors import LinkError
 from handcal.io.resources import resource_path
 from handcal.link.pairing import new_pairing_key
-from handcal.preflight import PARTS, Part, check_station, is_ready
-from handcal.station_settings import StationSettings
+from handcal.station import preflight
+from handcal.station.doctor import Finding, Health
+from handcal.station.preflight import PARTS, Part, check_station, is_ready
+from handcal.station.settings import StationSettings
 from handcal.types import Frame, Intrinsics
 
 KEY = new_pairing_key()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from handcal.calibrate import CalibrationSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
+from handcal.station.procedure import CalibrationSettings
 
 
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:

@@ -15,13 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.calibrate import (
-    Calibration,
-    CalibrationSettings,
-    Observation,
-    ProcedureError,
-    State,
-)
 from handcal.display import projection_matrix, update_matrix, view_of_eye
 from handcal.errors import FileError, HandError, LinkError, PoseError
 from handcal.geometry import invert, rigid, transform
@@ -36,6 +29,13 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.station.procedure import (
+    Calibration,
+    CalibrationSettings,
+    Observation,
+    ProcedureError,
+    State,
+)
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Intrinsics, Projection, UInt16
 
 KEY = b"a pairing key of the tests"
@@ -930,7 +930,7 @@ def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
 def test_a_full_session_says_so_before_the_wearer_aligns(
     server: HeadsetServer, client: HeadsetClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("handcal.calibrate.MAX_ALIGNMENTS", 1)
+    monkeypatch.setattr("handcal.station.procedure.MAX_ALIGNMENTS", 1)
     stage = Stage(server, client, None)
     stage.align()
     stage.calibration.redo()

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from handcal.calibrate import CalibrationSettings
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.io.resources import resource_path
+from handcal.station.procedure import CalibrationSettings
 
 Source = Literal["simulator", "recording", "realsense"]
 HeadsetKind = Literal["virtual", "network"]

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from handcal.calibrate import Observation, PlacedHand, State
 from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
+from handcal.station.procedure import Observation, PlacedHand, State
+from handcal.station.wearer_view import EyeView
 from handcal.types import Alignment, Eye, Float64, Frame
-from handcal.wearer_view import EyeView
 
 
 @dataclass(frozen=True, slots=True, eq=False)

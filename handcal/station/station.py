@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.calibrate import Calibration, PlacedHand, ProcedureError, State
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
 from handcal.camera.realsense import RealSenseCamera
@@ -32,10 +31,11 @@ from handcal.sim.camera import SyntheticCamera
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
-from handcal.snapshot import Procedure, Snapshot
-from handcal.station_settings import StationSettings
+from handcal.station.procedure import Calibration, PlacedHand, ProcedureError, State
+from handcal.station.settings import StationSettings
+from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.wearer_view import EyeView, see
 from handcal.types import Eye, Float64, Frame, Target
-from handcal.wearer_view import EyeView, see
 
 _VIEW_PERIOD_S = 0.1
 _STORE_PERIOD_S = 1.0

@@ -10,12 +10,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from handcal import doctor
 from handcal.camera.sdk_devices import Device
 from handcal.camera.usb import explain_absence
-from handcal.doctor import Finding, Health, examine
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.link.pairing import KEY_VARIABLE
+from handcal.station import doctor
+from handcal.station.doctor import Finding, Health, examine
 
 
 def fail_with(error: Exception) -> object:

@@ -4,8 +4,8 @@ import pytest
 from handcal.display import eye_projection, reprojection_error_px, target_corners_m
 from handcal.geometry import project
 from handcal.rig.example import FOCAL_PX, example_rig
+from handcal.station.wearer_view import EyeView, see
 from handcal.types import Float64
-from handcal.wearer_view import EyeView, see
 
 DISPLAY = example_rig().eyes["left"]
 OUTLINE_M = np.array([[x, y, 0.5] for x in (-0.04, 0.04) for y in (-0.03, 0.03)])

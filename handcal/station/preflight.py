@@ -13,14 +13,14 @@ from handcal.camera.folder import FolderCamera
 from handcal.camera.recording import check_recording
 from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.sdk_devices import choose_device, connected_devices, librealsense
-from handcal.doctor import Finding, Health, examine_camera, examine_disk
 from handcal.errors import HandcalError, LinkError
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 from handcal.rig.rig_file import read_rig
-from handcal.station_settings import StationSettings
+from handcal.station.doctor import Finding, Health, examine_camera, examine_disk
+from handcal.station.settings import StationSettings
 
 Part: TypeAlias = Literal["camera", "headset", "rig", "sessions"]
 PARTS: dict[Part, str] = {

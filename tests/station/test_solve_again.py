@@ -10,7 +10,7 @@ from handcal.errors import FileError
 from handcal.register.results import SolveSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
-from handcal.solve_again import solve_again, stored_solve_settings
+from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import Alignment
 
 

@@ -1,0 +1,1 @@
+"""A running station: camera, headset, procedure and session together."""
