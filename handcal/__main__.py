@@ -216,7 +216,7 @@ def headset(arguments: argparse.Namespace) -> None:
 
 def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, each beside its target and a baseline of the same run."""
-    from handcal.bench import PARTS, QUICK, BenchSettings, bench_table, run_bench
+    from handcal.lab.bench import PARTS, QUICK, BenchSettings, bench_table, run_bench
 
     if arguments.only not in ("", *PARTS):
         fail(f"there is no part {arguments.only}; there are {', '.join(PARTS)}", 2)

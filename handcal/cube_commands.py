@@ -57,8 +57,8 @@ def net(arguments: argparse.Namespace) -> None:
 def capture(arguments: argparse.Namespace) -> None:
     """Capture the real and the drawn cube with a camera, told at each step what to do."""
     from handcal.camera.viewpoint import open_viewpoint
-    from handcal.evaluate.cube_capture import take_captures
-    from handcal.evaluate.cube_folder import CapturePlan, missing_captures
+    from handcal.lab.evaluate.cube_capture import take_captures
+    from handcal.lab.evaluate.cube_folder import CapturePlan, missing_captures
 
     def ask(what: str) -> None:
         try:
@@ -98,13 +98,13 @@ def simulate(arguments: argparse.Namespace) -> None:
 
 def report(arguments: argparse.Namespace) -> None:
     """Tell from all captures how far the drawn cube is from the real one."""
-    from handcal.evaluate.cube_report import cube_report
-    from handcal.evaluate.cube_summary import cube_summary
-    from handcal.evaluate.cube_test import judge_captures
+    from handcal.lab.evaluate.cube_report import cube_report
+    from handcal.lab.evaluate.cube_summary import cube_summary
+    from handcal.lab.evaluate.cube_test import judge_captures
+    from handcal.lab.study.store import free_of_studies
     from handcal.report.cells import mean_sd
     from handcal.report.write import write_report
     from handcal.rig.formats import read_intrinsics
-    from handcal.study.store import free_of_studies
 
     output = free_of_studies(arguments.output)
     cube, grid = _cube(arguments), _grid(arguments)
@@ -134,7 +134,7 @@ def report(arguments: argparse.Namespace) -> None:
 
 def add_cube_commands(commands: Commands) -> None:
     """Add ``handcal evaluate cube net, capture, simulate, report``."""
-    from handcal.evaluate.cube_folder import CapturePlan
+    from handcal.lab.evaluate.cube_folder import CapturePlan
     from handcal.rig.cube import Cube
     from handcal.rig.print_page import PAPERS
 

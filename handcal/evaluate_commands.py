@@ -18,11 +18,11 @@ from handcal.terminal import Commands, Parser, add_command, console, progress, s
 
 def detector(arguments: argparse.Namespace) -> None:
     """Measure on annotated photographs how well hands are found."""
-    from handcal.evaluate.annotations import read_annotations
-    from handcal.evaluate.contact_sheet import write_contact_sheet
-    from handcal.evaluate.detector import EVALUATED, detect_all, evaluation
     from handcal.hand.detect import HandDetector
     from handcal.hand.shipped import load_detector
+    from handcal.lab.evaluate.annotations import read_annotations
+    from handcal.lab.evaluate.contact_sheet import write_contact_sheet
+    from handcal.lab.evaluate.detector import EVALUATED, detect_all, evaluation
 
     if arguments.sheet is not None:  # before the long work, lest its result is lost
         require_suffix(arguments.sheet, ".png")
@@ -50,11 +50,11 @@ def detector(arguments: argparse.Namespace) -> None:
 
 def users(arguments: argparse.Namespace) -> None:
     """Evaluate the user test over sessions: how far calibrations miss what the wearers see."""
-    from handcal.evaluate.user_test import evaluate_user_test, read_user_test
-    from handcal.evaluate.user_test_report import user_test_report
+    from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
+    from handcal.lab.evaluate.user_test_report import user_test_report
+    from handcal.lab.study.store import free_of_studies
     from handcal.report.cells import interval_ends, mean_sd
     from handcal.report.write import write_report
-    from handcal.study.store import free_of_studies
 
     output = free_of_studies(arguments.output)
     with progress() as report:

@@ -25,15 +25,15 @@ from handcal.terminal import (
 )
 
 if TYPE_CHECKING:
+    from handcal.lab.study.run import Study
+    from handcal.lab.study.store import Row
     from handcal.report.document import Report
-    from handcal.study.run import Study
-    from handcal.study.store import Row
 
 
 def noise(arguments: argparse.Namespace) -> None:
     """Repeat the paper's simulation, and disturb the solvers by what it left out."""
-    from handcal.study.noise import QUICK_NOISE, NoiseSettings, noise_study
-    from handcal.study.noise_report import noise_report
+    from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
+    from handcal.lab.study.noise_report import noise_report
 
     chosen = QUICK_NOISE if arguments.quick else NoiseSettings()
     settings = replace(chosen, seed=arguments.seed)
@@ -42,9 +42,9 @@ def noise(arguments: argparse.Namespace) -> None:
 
 def methods(arguments: argparse.Namespace) -> None:
     """Compare calibration methods on the same simulated wearers."""
-    from handcal.study.methods import QUICK_METHODS, MethodSettings, methods_study
-    from handcal.study.methods_report import methods_report
-    from handcal.study.wearer_noise import fit_noise
+    from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
+    from handcal.lab.study.methods_report import methods_report
+    from handcal.lab.study.wearer_noise import fit_noise
 
     settings = replace(
         QUICK_METHODS if arguments.quick else MethodSettings(),
@@ -69,7 +69,7 @@ def methods(arguments: argparse.Namespace) -> None:
 
 def recorded(arguments: argparse.Namespace) -> None:
     """Run SPAAM and INDICA on the public recordings of Itoh and Klinker."""
-    from handcal.study.recorded import evaluate_recordings, read_recordings
+    from handcal.lab.study.recorded import evaluate_recordings, read_recordings
 
     results = evaluate_recordings(read_recordings(arguments.folder))
     save(arguments.json, {name: asdict(result) for name, result in results.items()})
@@ -128,8 +128,8 @@ def _run(
     arguments: argparse.Namespace, study: Study, report_of: Callable[[Sequence[Row]], Report]
 ) -> None:
     """Run a study until it is done or Ctrl+C is pressed, and write its report."""
+    from handcal.lab.study.run import run_study
     from handcal.report.write import write_report
-    from handcal.study.run import run_study
 
     try:
         with until_interrupted() as is_cancelled, progress() as say:

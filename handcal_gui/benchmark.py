@@ -23,10 +23,10 @@ import numpy as np
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
-from handcal.bench.figure import Figure
 from handcal.camera.camera import Camera
 from handcal.geometry import rigid
 from handcal.io.closable import Closable
+from handcal.lab.bench.figure import Figure
 from handcal.link.pairing import new_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport

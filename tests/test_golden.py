@@ -27,6 +27,7 @@ from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import FLOAT_MODEL
 from handcal.io.resources import resource_path
 from handcal.io.settings import settings_json
+from handcal.lab.study.wearers import align_hand, draw_wearer
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
@@ -39,7 +40,6 @@ from handcal.sim.scene import SceneState
 from handcal.sim.wearer import WearerSettings
 from handcal.station.procedure import CalibrationSettings
 from handcal.station.solve_again import solve_again
-from handcal.study.wearers import align_hand, draw_wearer
 from handcal.types import EYES, METHODS, Alignment, Eye, Float64
 from tests.helpers import DATA
 

@@ -18,10 +18,10 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal import bench
 from handcal.__main__ import main
 from handcal.camera.folder import record_folder
 from handcal.geometry import rigid
+from handcal.lab import bench
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.rig.example import example_rig
 from handcal.session.session import Session

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from handcal.__main__ import main
-from handcal.study import noise
+from handcal.lab.study import noise
 
 TINY = replace(
     noise.QUICK_NOISE,

@@ -16,10 +16,10 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader
 
 from handcal.errors import FileError
-from handcal.evaluate.annotations import Photo
-from handcal.evaluate.detector import EVALUATED, summary
-from handcal.evaluate.precision import ImageResult
 from handcal.hand.detect import decode, letterbox, points
+from handcal.lab.evaluate.annotations import Photo
+from handcal.lab.evaluate.detector import EVALUATED, summary
+from handcal.lab.evaluate.precision import ImageResult
 from handcal.train.loss import Grid, detection_loss
 from handcal.train.model import HandNet
 from handcal.train.samples import Samples, SampleSettings, collate

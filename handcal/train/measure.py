@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from handcal.bench.speed import following_ms, simulated_frame
-from handcal.evaluate.annotations import read_annotations
-from handcal.evaluate.detector import EVALUATED, detect_all, summary
-from handcal.evaluate.precision import MATCH_OVERLAP
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
 from handcal.io.resources import resource_path
+from handcal.lab.bench.speed import following_ms, simulated_frame
+from handcal.lab.evaluate.annotations import read_annotations
+from handcal.lab.evaluate.detector import EVALUATED, detect_all, summary
+from handcal.lab.evaluate.precision import MATCH_OVERLAP
 from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
 from handcal.sim.room import make_room

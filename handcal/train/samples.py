@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from handcal.evaluate.annotations import Photo
 from handcal.io.files import read_json
 from handcal.io.images import read_image
+from handcal.lab.evaluate.annotations import Photo
 from handcal.train.augment import (
     blemish,
     box_corners,

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLineEdit, QVBoxLayout, QW
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
-from handcal.evaluate.cube_capture import instruction, keep_capture
-from handcal.evaluate.cube_folder import CapturePlan, PlannedCapture, missing_captures
+from handcal.lab.evaluate.cube_capture import instruction, keep_capture
+from handcal.lab.evaluate.cube_folder import CapturePlan, PlannedCapture, missing_captures
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.station.doctor import Finding, Health

@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
-from handcal.evaluate.cube_folder import PlannedCapture
+from handcal.lab.evaluate.cube_folder import PlannedCapture
 from handcal_gui.theme import SPACING_PX, colors, icon, quiet
 
 _IMAGE, _STATE = range(2)

@@ -6,11 +6,11 @@ import tempfile
 from pathlib import Path
 
 from handcal.errors import FileError, HandcalError
-from handcal.evaluate.cube_folder import CapturePlan
-from handcal.evaluate.cube_report import cube_report
-from handcal.evaluate.cube_summary import cube_summary
-from handcal.evaluate.cube_test import judge_captures
 from handcal.io.resources import resource_path
+from handcal.lab.evaluate.cube_folder import CapturePlan
+from handcal.lab.evaluate.cube_report import cube_report
+from handcal.lab.evaluate.cube_summary import cube_summary
+from handcal.lab.evaluate.cube_test import judge_captures
 from handcal.report.document import Report
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import read_cube

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QStandardPaths
 
-from handcal.evaluate.cube_folder import CapturePlan
+from handcal.lab.evaluate.cube_folder import CapturePlan
 from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]

@@ -8,15 +8,15 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
-from handcal.evaluate.cube_folder import find_captures
-from handcal.evaluate.user_test import evaluate_user_test, read_user_test
-from handcal.evaluate.user_test_report import user_test_report
+from handcal.lab.evaluate.cube_folder import find_captures
+from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
+from handcal.lab.evaluate.user_test_report import user_test_report
+from handcal.lab.study.methods import MethodSettings, methods_study
+from handcal.lab.study.methods_report import methods_report
+from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
+from handcal.lab.study.noise_report import noise_report
+from handcal.lab.study.run import Study
 from handcal.report.document import Report
-from handcal.study.methods import MethodSettings, methods_study
-from handcal.study.methods_report import methods_report
-from handcal.study.noise import QUICK_NOISE, NoiseSettings, noise_study
-from handcal.study.noise_report import noise_report
-from handcal.study.run import Study
 from handcal.types import EYES
 from handcal_gui.evaluation.capture_dialog import CaptureDialog
 from handcal_gui.evaluation.cube import evaluate_cube

@@ -12,11 +12,11 @@ import numpy as np
 
 from handcal.errors import CancelledError, FileError
 from handcal.io.images import read_image
+from handcal.lab.study.run import Study, run_study, share_done
+from handcal.lab.study.store import Row, free_of_studies
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.station.doctor import Finding, Health
-from handcal.study.run import Study, run_study, share_done
-from handcal.study.store import Row, free_of_studies
 from handcal.types import UInt8
 from handcal_gui.evaluation.time_left import TimeLeft
 from handcal_gui.running.jobs import IsCancelled

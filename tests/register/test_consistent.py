@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.bench.trials import mean_length_mm, trial_alignment, trial_hand
+from handcal.lab.bench.trials import mean_length_mm, trial_alignment, trial_hand
+from handcal.lab.study.trials import floor_error_m, solve_trial
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 from handcal.sim.overlay import overlay_by_eye
-from handcal.study.trials import floor_error_m, solve_trial
 from handcal.types import Float64, Method
 
 # Few hands are made: trial n has hand n % 10.

@@ -3,9 +3,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from handcal.bench.trials import trial_hand
 from handcal.display import projection_matrix, view_of_eye
 from handcal.geometry import invert, rigid, transform
+from handcal.lab.bench.trials import trial_hand
 from handcal.register.fuse import (
     FuseSettings,
     covariances_after_another,

@@ -3,9 +3,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handcal import rotation_between
-from handcal.bench.trials import trial_alignment
 from handcal.errors import HandError
 from handcal.geometry import rigid, transform
+from handcal.lab.bench.trials import trial_alignment
 from handcal.register.guard import (
     AXES,
     Axis,

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.bench.trials import trial_alignment
 from handcal.geometry import rigid, transform
+from handcal.lab.bench.trials import trial_alignment
 from handcal.register.rcicp import (
     MAX_ITERATIONS,
     PAPER_RATIO,

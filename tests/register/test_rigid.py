@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.bench.trials import trial_alignment
 from handcal.geometry import invert, rigid, transform
+from handcal.lab.bench.trials import trial_alignment
 from handcal.register.rcicp import best_rigid
 from handcal.register.rigid import RigidSettings, register_rigid
 from handcal.register.surface import Surface, describe_surface

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from handcal import solve_eye_shift
-from handcal.bench.trials import trial_alignment
 from handcal.errors import HandError
 from handcal.geometry import invert, rigid, transform
+from handcal.lab.bench.trials import trial_alignment
 from handcal.register.model import drawn
 from handcal.register.solve import MAX_POINTS, check_cloud, solve_alignment
 from handcal.rig.example import example_rig

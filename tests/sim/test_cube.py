@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from handcal.display import eye_projection
-from handcal.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.geometry import image_points, project, rigid, transform
+from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.rig.cube import Cube, corners_m, find_cube
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from handcal.errors import CancelledError, FileError
-from handcal.evaluate.cube_test import judge_captures
 from handcal.io.files import read_json
+from handcal.lab.evaluate.cube_test import judge_captures
 from handcal.rig.cube import Cube, CubeError
 from handcal.rig.cube_file import read_cube
 from handcal.rig.example import example_rig

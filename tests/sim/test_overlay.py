@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.bench.trials import trial_hand
 from handcal.display import eye_projection
 from handcal.errors import HandcalError
 from handcal.geometry import project, rigid, transform
+from handcal.lab.bench.trials import trial_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye

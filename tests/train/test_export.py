@@ -10,10 +10,10 @@ import onnxruntime
 import torch
 
 from handcal.errors import FileError
-from handcal.evaluate.annotations import Photo
 from handcal.hand.detect import points
 from handcal.hand.shipped import FLOAT_MODEL
 from handcal.io.resources import resource_path
+from handcal.lab.evaluate.annotations import Photo
 from handcal.train.export import export_integer
 from handcal.train.loop import read_average
 from handcal.train.model import HandNet

@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip("torch")
 import torch
 
-from handcal.evaluate.annotations import Photo
 from handcal.io.files import make_folder, write_json
+from handcal.lab.evaluate.annotations import Photo
 from handcal.train.loop import Pace, Training, TrainSettings, split
 from handcal.train.model import HandNet
 from handcal.train.samples import Samples, SampleSettings, collate

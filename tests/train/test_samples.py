@@ -6,8 +6,8 @@ import pytest
 
 pytest.importorskip("torch")
 
-from handcal.evaluate.annotations import Photo
 from handcal.io.files import write_json
+from handcal.lab.evaluate.annotations import Photo
 from handcal.train.samples import Samples, SampleSettings, collate
 
 HAND = (120, 80, 180, 160)

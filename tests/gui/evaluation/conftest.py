@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from PySide6.QtWidgets import QWidget
 
 from handcal.errors import HandcalError
+from handcal.lab.study.run import Case, Study
+from handcal.lab.study.store import Row
 from handcal.report.document import Column, Figure, Report, Section, Table
-from handcal.study.run import Case, Study
-from handcal.study.store import Row
 from handcal_gui.evaluation.entries import NoiseEntries
 from handcal_gui.evaluation.evaluation_page import Offer
 from handcal_gui.evaluation.work import SimulatedStudy

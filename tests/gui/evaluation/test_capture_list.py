@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.evaluate.cube_folder import CapturePlan
+from handcal.lab.evaluate.cube_folder import CapturePlan
 from handcal_gui.evaluation.capture_list import CaptureList
 
 CAPTURES = CapturePlan(positions=("a",), poses=2).captures  # of five images

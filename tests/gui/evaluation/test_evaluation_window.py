@@ -13,7 +13,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.study.run import run_study
+from handcal.lab.study.run import run_study
 from handcal_gui.evaluation.entries import EvaluationEntries, MethodEntries, NoiseEntries
 from handcal_gui.evaluation.evaluation_page import EvaluationPage
 from handcal_gui.evaluation.window import EvaluationWindow

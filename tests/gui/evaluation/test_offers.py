@@ -12,11 +12,11 @@ from pytestqt.qtbot import QtBot
 
 from handcal.display import TARGET_DEPTHS_M
 from handcal.errors import FileError
+from handcal.lab.study.noise import QUICK_NOISE
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.cube_captures import CaptureSettings
-from handcal.study.noise import QUICK_NOISE
 from handcal.types import EYES, Rig
 from handcal_gui.evaluation.cube import evaluate_cube
 from handcal_gui.evaluation.entries import (

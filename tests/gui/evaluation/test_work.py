@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from handcal.errors import CancelledError, FileError
+from handcal.lab.study.run import run_study
 from handcal.report.document import Report
 from handcal.station.doctor import Health
-from handcal.study.run import run_study
 from handcal_gui.evaluation.entries import NoiseEntries, UserEntries
 from handcal_gui.evaluation.work import Checkpoint, GivenData
 

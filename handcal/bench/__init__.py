@@ -1,6 +1,0 @@
-"""How well and how fast handcal does what it promises, measured on this machine."""
-
-from handcal.bench.run import PARTS, bench_table, run_bench
-from handcal.bench.settings import QUICK, BenchSettings
-
-__all__ = ["PARTS", "QUICK", "BenchSettings", "bench_table", "run_bench"]

@@ -1,0 +1,1 @@
+"""Evaluation on given data and on simulated wearers: studies, other methods, benchmarks."""

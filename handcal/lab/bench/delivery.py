@@ -1,0 +1,49 @@
+"""How long the headset takes to have a cursor, on a good network and on a bad one."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.settings import BenchSettings
+from handcal.lab.bench.trials import Measured, Progress
+from handcal.link.client import HeadsetClient
+from handcal.link.impair import Impairment
+from handcal.link.pairing import new_pairing_key
+from handcal.link.server import HeadsetServer
+
+_LOSSES = 0.0, 0.3
+_PATIENCE_S = 5.0
+
+
+def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure how long a cursor takes to be acknowledged over loopback."""
+    figures = []
+    worst_ms = {}
+    for done, loss in enumerate(_LOSSES, 1):
+        durations_ms = _cursor_durations_ms(loss, settings)
+        median_ms = float(np.median(durations_ms))
+        figures.append(Figure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
+        worst_ms[f"{loss:g}"] = max(durations_ms)
+        progress(done / len(_LOSSES))
+    return Measured(figures, {"worst_ms_at_loss": worst_ms})
+
+
+def _cursor_durations_ms(loss: float, settings: BenchSettings) -> list[float]:
+    """Time cursors, one after the other, lost and reordered with probability `loss`."""
+    rng = np.random.default_rng(0)
+    key = new_pairing_key().encode()
+    durations_ms = []
+    with (
+        HeadsetServer(key) as server,
+        HeadsetClient(server.address, key, impairment=Impairment(loss, reorder=loss)),
+    ):
+        server.wait_connected(_PATIENCE_S)
+        for number in range(1, settings.repeats + 1):
+            cursor_m = rng.uniform(-0.1, 0.1, (settings.points, 3))
+            start_s = perf_counter()
+            server.wait_acked(server.send_cursor(cursor_m, number), _PATIENCE_S)
+            durations_ms.append(1e3 * (perf_counter() - start_s))
+    return durations_ms

@@ -1,0 +1,88 @@
+"""Clouds as a sensor gives them: cut at different places, sampled apart, noisy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.settings import BenchSettings
+from handcal.lab.bench.trials import (
+    Errors,
+    Measured,
+    Progress,
+    collect_errors,
+    mean_length_mm,
+    run_trials,
+    trial_alignment,
+)
+from handcal.lab.study.trials import floor_error_m, solve_trial
+from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
+
+_FOREARM_M = 0.02, 0.06
+_CUT_SIGMA_M = 0.0015
+_SIGMA_M = 0.0005, 0.002
+_ANGLE_MAX_DEG = 9.0
+
+
+def measure_cuts(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure ``consistent`` on clouds that are cut differently, beside the floor."""
+
+    def solve(angle_deg: float, trial: int) -> Errors:
+        rng = np.random.default_rng([trial, 1])
+        made = _measured(rng, trial, angle_deg, _CUT_SIGMA_M, settings.points)
+        error_m = solve_trial(made, "consistent").shift_m - made.shift_m
+        return {"floor": floor_error_m(made, exact=True), "consistent": error_m}
+
+    by_angle = collect_errors(solve, settings.cut_angles_deg, settings.trials, progress)
+    rows = [
+        {"angle_deg": angle_deg, "trials": settings.trials}
+        | {f"{name}_mean_mm": mean_length_mm(errors_m) for name, errors_m in errors.items()}
+        for angle_deg, errors in by_angle.items()
+    ]
+    straight, *turned = rows
+    excess_mm = max(row["consistent_mean_mm"] - row["floor_mean_mm"] for row in turned)
+    what = "other cut, noise: mean |Δφ|"
+    return Measured(
+        [
+            Figure(f"{what} at 0°", straight["consistent_mean_mm"], "mm", at_most=1.0),
+            Figure(f"{what} above floor", excess_mm, "mm", at_most=0.5),
+        ],
+        rows,
+    )
+
+
+def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure whether the covariance says how large the errors are.
+
+    The squared error, normalised by the covariance, averages 3 where it does.
+    """
+
+    def solve(trial: int) -> float:
+        rng = np.random.default_rng([trial, 2])
+        angle_deg, sigma_m = rng.uniform(0.0, _ANGLE_MAX_DEG), rng.uniform(*_SIGMA_M)
+        made = _measured(rng, trial, angle_deg, sigma_m, settings.points)
+        solved = solve_trial(made, "consistent")
+        error_m = solved.shift_m - made.shift_m
+        return float(error_m @ np.linalg.solve(solved.covariance_m2, error_m))
+
+    squares = run_trials(solve, range(settings.covariance_trials), progress)
+    mean = float(np.mean(squares))
+    return Measured(
+        [Figure("normalised squared error, mean", mean, "", at_least=2.4, at_most=3.6)],
+        {"trials": len(squares), "mean": mean, "median": float(np.median(squares))},
+    )
+
+
+def _measured(
+    rng: np.random.Generator, trial: int, angle_deg: float, sigma_m: float, points: int
+) -> SimulatedAlignment:
+    """Make an alignment whose forearms are cut anywhere from 20 to 60 mm below the wrist."""
+    cursor_forearm_m, hand_forearm_m = rng.uniform(*_FOREARM_M, 2)
+    making = AlignmentSettings(
+        count=points,
+        resample=True,
+        depth_sigma_m=sigma_m,
+        cursor_forearm_m=cursor_forearm_m,
+        hand_forearm_m=hand_forearm_m,
+    )
+    return trial_alignment(trial, angle_deg, making)

@@ -1,0 +1,103 @@
+"""The whole benchmark: every part in turn, and its figures beside their targets."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from handcal.lab.bench.delivery import measure_delivery
+from handcal.lab.bench.measured_clouds import measure_covariance, measure_cuts
+from handcal.lab.bench.offline import measure_offline
+from handcal.lab.bench.paper_simulation import measure_paper_simulation
+from handcal.lab.bench.scale import measure_scale
+from handcal.lab.bench.settings import BenchSettings
+from handcal.lab.bench.speed import measure_speed
+from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.wearer import measure_wearer
+
+PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
+    "speed": measure_speed,
+    "delivery": measure_delivery,
+    "wearer": measure_wearer,
+    "cuts": measure_cuts,
+    "covariance": measure_covariance,
+    "offline": measure_offline,
+    "paper_simulation": measure_paper_simulation,
+    "scale": measure_scale,
+}
+_LIBRARIES = ("handcal", "numpy", "scipy", "opencv-python-headless", "open3d-cpu", "open3d")
+_MET = {True: "met", False: "missed", None: ""}
+
+
+def run_bench(
+    settings: BenchSettings,
+    report: Callable[[str, float], None] | None = None,
+    only: str = "",
+) -> dict[str, Any]:
+    """Measure everything, one part after the other, or only one of `PARTS`.
+
+    Parameters
+    ----------
+    settings : BenchSettings
+    report : callable, optional
+        Is told the name of the part being measured, and the fraction of that part that is done.
+    only : str
+        A part's name; empty measures all.
+
+    Returns
+    -------
+    dict
+        JSON-able: ``environment``, ``settings``, ``figures`` (what, value, unit, target, met or
+        None without a target), and ``details`` by part.
+    """
+    measured: dict[str, Measured] = {}
+    for name, measure in PARTS.items():
+        if only not in ("", name):
+            continue
+
+        def progress(fraction: float, name: str = name) -> None:
+            if report is not None:
+                report(name, fraction)
+
+        progress(0.0)
+        measured[name] = measure(settings, progress)
+    return {
+        "environment": _environment(),
+        "settings": asdict(settings),
+        "figures": [figure.to_json() for part in measured.values() for figure in part.figures],
+        "details": {name: part.details for name, part in measured.items()},
+    }
+
+
+def bench_table(results: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return for every figure of `run_bench`: what, value, target, and whether it is met."""
+    return [
+        (
+            figure["what"],
+            f"{figure['value']:.3g} {figure['unit']}".rstrip(),
+            figure["target"],
+            _MET[figure["met"]],
+        )
+        for figure in results["figures"]
+    ]
+
+
+def _environment() -> dict[str, Any]:
+    """Return what the figures depend on besides handcal."""
+    versions: dict[str, str | None] = {}
+    for name in _LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = None
+    return {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cores": os.cpu_count(),
+        "omp_num_threads": os.environ.get("OMP_NUM_THREADS"),
+        "versions": versions,
+    }

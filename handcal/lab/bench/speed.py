@@ -1,0 +1,169 @@
+"""How long the steps take that a person waits for, or that run at camera rate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from time import perf_counter, thread_time
+from typing import TypeVar
+
+import numpy as np
+
+from handcal.errors import HandError
+from handcal.geometry import rigid
+from handcal.hand.roi import Detector, RoiFinder
+from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.shipped import load_detector
+from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.settings import BenchSettings
+from handcal.lab.bench.trials import Measured, Progress, trial_hand
+from handcal.register.guard import RotationGuard, rotation_between
+from handcal.register.solve import solve_alignment
+from handcal.rig.example import example_rig
+from handcal.sim.camera import SyntheticCamera
+from handcal.sim.overlay import overlay_by_eye
+from handcal.sim.render import World
+from handcal.sim.room import make_room
+from handcal.sim.scene import SceneState
+from handcal.types import EYES, Alignment, Float64, Frame
+
+Input = TypeVar("Input")
+
+_SIGMA_M = 0.001
+_SHIFT_M = 0.005
+_PALM_H_M = np.array([0.0, 0.09, 0.5])
+_ICP_REACH_M = 0.05
+_SPEED_UP = 30.0
+_SOLVE_MS, _GUARD_MS, _SEGMENT_MS, _ROI_MS = 100.0, 10.0, 6.0, 2.0
+_FRAMES, _FRAME_NS = 120, 33_333_333
+
+
+def measure_speed(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure segmentation, registration and solving, one after the other in one thread."""
+    trials = range(settings.paper_repeats)
+    alignments = [_noisy_alignment(trial, settings.points) for trial in trials]
+    figures = _segmentation(settings.repeats)
+    progress(0.1)
+    figures += _registration(alignments, settings.repeats)
+    progress(0.2)
+    figures += _solving(alignments, settings.repeats)
+    progress(1.0)
+    return Measured(figures, {"points": settings.points, "alignments": len(alignments)})
+
+
+def _noisy_alignment(trial: int, points: int) -> Alignment:
+    rng = np.random.default_rng(trial)
+    true_shift_m = {eye: rng.uniform(-_SHIFT_M, _SHIFT_M, 3) for eye in EYES}
+    hand, rig = trial_hand(trial), example_rig()
+    return overlay_by_eye(rng, hand, rig, true_shift_m, points, _SIGMA_M)
+
+
+def _segmentation(repeats: int) -> list[Figure]:
+    """Time the segmentation of one simulated frame, 1280x720, and the way to its ROI."""
+    frame = simulated_frame()
+    segmenting = SegmentSettings()
+    roi_px = segment_hand(frame, segmenting).box_px
+    [with_roi_ms] = _medians_ms([frame] * repeats, lambda f: segment_hand(f, segmenting, roi_px))
+    [alone_ms] = _medians_ms([frame] * repeats, lambda f: segment_hand(f, segmenting))
+    roi_ms = following_ms(load_detector(), frame)
+    return [
+        Figure("ROI of a followed hand, mean a frame", roi_ms, "ms", at_most=_ROI_MS),
+        Figure("segmentation, 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
+        Figure("segmentation, 1280x720, no ROI", alone_ms, "ms"),
+    ]
+
+
+def simulated_frame() -> Frame:
+    """Return a frame of a hand in a room, 1280x720."""
+    T_W_D, T_W_hand = example_rig().T_H_D, rigid(translation_m=_PALM_H_M)
+    world = World(trial_hand(0), make_room(0))
+    with SyntheticCamera(world, lambda: SceneState(0, T_W_D, T_W_hand)) as camera:
+        return camera.read()
+
+
+def following_ms(detector: Detector, frame: Frame) -> float:
+    """Return the mean processor time a frame of following a hand at 30 frames a second.
+
+    The detector's looks at it are counted in, but not those that found it.
+
+    Raises
+    ------
+    HandError
+        If there is no hand in the frame, or it is lost.
+    """
+    finder = RoiFinder(detector, SegmentSettings())
+    finder.find(frame)
+    started_s = thread_time()
+    for number in range(1, _FRAMES + 1):
+        t_ns = frame.t_camera_ns + number * _FRAME_NS
+        if finder.find(replace(frame, t_camera_ns=t_ns)) is None:
+            raise HandError("the detector has lost the simulated hand")
+    return 1e3 * (thread_time() - started_s) / _FRAMES
+
+
+def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
+    """Time the guard, and a whole registration against Open3D's, where that is installed."""
+    guards = [(RotationGuard(a.cursor_m, a.cursor_is_cut), a) for a in alignments]
+    [guard_ms] = _medians_ms(
+        guards * repeats, lambda pair: pair[0].rotation(pair[1].hand_m, pair[1].hand_is_cut)
+    )
+    icp = _open3d_icp()
+    own_ms, *icp_ms = _medians_ms(
+        [(a.cursor_m, a.hand_m) for a in alignments] * repeats,
+        lambda clouds: rotation_between(*clouds),
+        *([icp] if icp else []),
+    )
+    figures = [
+        Figure("guard update", guard_ms, "ms", at_most=_GUARD_MS),
+        Figure("rotation_between", own_ms, "ms"),
+    ]
+    for baseline_ms in icp_ms:
+        figures += [
+            Figure("Open3D's ICP, same clouds", baseline_ms, "ms"),
+            Figure("rotation_between / Open3D's ICP", own_ms / baseline_ms, "", at_most=1.0),
+        ]
+    return figures
+
+
+def _open3d_icp() -> Callable[[tuple[Float64, Float64]], object] | None:
+    """Return Open3D's ICP with its defaults, from two clouds; None if it is not installed."""
+    try:
+        import open3d as o3d
+    except ImportError:
+        return None
+
+    def cloud(points_m: Float64) -> o3d.geometry.PointCloud:
+        return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.array(points_m)))
+
+    def register(clouds: tuple[Float64, Float64]) -> object:
+        cursor, hand = map(cloud, clouds)
+        return o3d.pipelines.registration.registration_icp(cursor, hand, _ICP_REACH_M)
+
+    return register
+
+
+def _solving(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
+    """Time solving both eyes, by the default and as published, on the same alignments."""
+    rig = example_rig()
+    [consistent_ms] = _medians_ms([*alignments] * repeats, lambda a: solve_alignment(a, rig))
+    [paper_ms] = _medians_ms(alignments, lambda a: solve_alignment(a, rig, "paper"))
+    speed_up = paper_ms / consistent_ms
+    return [
+        Figure("solve both eyes", consistent_ms, "ms", at_most=_SOLVE_MS),
+        Figure("solve both eyes, paper", paper_ms, "ms"),
+        Figure("solve both eyes: paper / consistent", speed_up, "", at_least=_SPEED_UP),
+    ]
+
+
+def _medians_ms(inputs: Sequence[Input], *actions: Callable[[Input], object]) -> list[float]:
+    """Return the median duration of each action over the inputs; one cold first run is no matter.
+
+    The actions take turns, so that a busy moment of the machine strikes them alike.
+    """
+    durations_s: list[list[float]] = [[] for _ in actions]
+    for value in inputs:
+        for action, durations in zip(actions, durations_s, strict=True):
+            start_s = perf_counter()
+            action(value)
+            durations.append(perf_counter() - start_s)
+    return [1e3 * float(np.median(durations)) for durations in durations_s]

@@ -1,0 +1,143 @@
+"""The cube test: what all its captures show, one row for each pair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+
+from handcal.errors import FileError
+from handcal.io.images import read_image
+from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
+from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
+from handcal.rig.board import BoardError
+from handcal.rig.cube import Cube, CubeError, find_cube
+from handcal.rig.display import fit_homography, pose_before
+from handcal.rig.grid import Grid, find_grid
+from handcal.rig.views import ViewsError
+from handcal.rig.warp import RotationWarp
+from handcal.types import Float64, Intrinsics, UInt8
+
+CubeRow: TypeAlias = dict[str, float | int | str]
+"""Errors of one pair of captures; units are in the names."""
+
+_UNUSABLE = (CubeError, BoardError, ViewsError, FileError, ValueError)
+
+
+@dataclass(frozen=True, slots=True)
+class CubeTest:
+    """What the captures show.
+
+    Attributes
+    ----------
+    rows : list of dict
+        `cube_row` of each pair, and whose it is: ``position``, ``pose``, ``drawn``.
+    left_out : mapping of str to str
+        Why, by what could not be used.
+    """
+
+    rows: list[CubeRow]
+    left_out: dict[str, str]
+
+
+def judge_captures(
+    folder: Path,
+    cube: Cube,
+    camera: Intrinsics,
+    grid: Grid,
+    report: Callable[[str, float], None] = lambda _what, _share: None,
+) -> CubeTest:
+    """Find and compare the cubes in all captures; what is missing or not seen is left out.
+
+    Captures are undistorted and, where the position has an image of the display's grid, turned to
+    the display's axes (Hu et al. 2021), as an eye is: errors are along these.
+
+    Parameters
+    ----------
+    folder : Path
+        As `handcal.lab.evaluate.cube_folder` tells.
+    cube : Cube
+    camera : Intrinsics
+        The eye-replacement camera, lens included.
+    grid : Grid
+        What the display shows in the images of it.
+    report : callable
+        Told what is being looked at, and the share done; may raise to give up.
+
+    Raises
+    ------
+    FileError
+        If there are no captures, or too many.
+    """
+    poses, left_out = find_captures(folder)
+    straight = replace(camera, distortion=())
+    rows: list[CubeRow] = []
+    for position, of_position in groupby(poses, key=lambda pose: pose.position):
+        with _noted(left_out, f"{position}/{GRID}"):
+            warp = RotationWarp(camera, _turn(folder / position, camera, grid))
+            for pose in of_position:
+                name = f"{position}/{pose.pose}"
+                report(name, poses.index(pose) / len(poses))
+                with _noted(left_out, f"{name}/{pose.real.name}"):
+                    real_px = find_cube(warp.warp(_read(pose.real)), cube)
+                    for drawn, path in pose.virtual.items():
+                        with _noted(left_out, f"{name}/{path.name}"):
+                            virtual_px = find_cube(warp.warp(_read(path)), cube)
+                            errors = cube_row(compare_cubes(real_px, virtual_px, cube, straight))
+                            whose = {"position": position, "pose": pose.pose, "drawn": drawn}
+                            rows.append(whose | errors)
+    return CubeTest(rows, left_out)
+
+
+def cube_row(found: CubeMisalignment) -> CubeRow:
+    """Return the errors as the paper defines them: magnitudes, corners averaged.
+
+    ``err_t_xy`` is the mean length of the corners' offsets in the image, ``err_R`` the angle.
+    """
+    x_mm, y_mm = 1e3 * np.abs(found.offset_m).mean(axis=0)
+    x_arcmin, y_arcmin = 60.0 * np.degrees(np.abs(found.offset_rad).mean(axis=0))
+    turn_deg = np.degrees(found.rotation_rad)
+    row = {
+        "depth_mm": 1e3 * found.depth_m,
+        "err_t_x_mm": x_mm,
+        "err_t_y_mm": y_mm,
+        "err_t_z_mm": 1e3 * abs(found.along_m),
+        "err_t_xy_mm": 1e3 * np.linalg.norm(found.offset_m, axis=1).mean(),
+        "err_t_x_arcmin": x_arcmin,
+        "err_t_y_arcmin": y_arcmin,
+        "err_t_xy_arcmin": 60.0 * np.degrees(np.linalg.norm(found.offset_rad, axis=1).mean()),
+        "err_R_x_deg": abs(turn_deg[0]),
+        "err_R_y_deg": abs(turn_deg[1]),
+        "err_R_z_deg": abs(turn_deg[2]),
+        "err_R_deg": np.linalg.norm(turn_deg),
+    }
+    return {"faces": found.faces, **{name: float(value) for name, value in row.items()}}
+
+
+@contextmanager
+def _noted(left_out: dict[str, str], name: str) -> Iterator[None]:
+    """Note why something cannot be used, and go on after it."""
+    try:
+        yield
+    except _UNUSABLE as error:
+        left_out[name] = str(error)
+
+
+def _turn(position: Path, camera: Intrinsics, grid: Grid) -> Float64:
+    """Return R_S_C; without an image of the grid, that of a camera parallel to the display."""
+    path = images_in(position).get(GRID)
+    if path is None:
+        return np.eye(3)
+    size = grid.width_px, grid.height_px
+    homography = fit_homography({GRID: find_grid(_read(path), grid)}, camera, *size)
+    return pose_before(homography, camera, *size)[0]
+
+
+def _read(path: Path) -> UInt8:
+    return read_image(path, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)

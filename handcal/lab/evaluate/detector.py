@@ -1,0 +1,107 @@
+"""How well a detector finds the hands in annotated photographs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from handcal.hand.detect import CANDIDATE_SCORE_MIN, DetectSettings, overlaps
+from handcal.hand.roi import Detector
+from handcal.lab.evaluate.annotations import Photo
+from handcal.lab.evaluate.precision import (
+    MATCH_OVERLAP,
+    ImageResult,
+    PrecisionRecall,
+    precision_recall,
+)
+
+EVALUATED = DetectSettings(score_min=CANDIDATE_SCORE_MIN)
+"""A precision/recall curve wants the doubtful detections too."""
+
+_CURVE_POINTS = 200
+
+
+def detect_all(
+    photos: Sequence[Photo], detector: Detector, report: Callable[[float], None] | None = None
+) -> list[ImageResult]:
+    """Run a detector on every photograph; `report` is told the share that is done.
+
+    Raises
+    ------
+    FileError
+        If a photograph cannot be read.
+    """
+    results = []
+    for number, photo in enumerate(photos, 1):
+        found = detector.detect(photo.read())
+        results.append(ImageResult(found.boxes_px, found.scores, photo.boxes))
+        if report is not None:
+            report(number / len(photos))
+    return results
+
+
+def summary(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, float | None]:
+    """Return the average precision over all hands and over those that matter most.
+
+    The keys are ``ap50``, ``ap50_large`` (the data set's own rule), and ``ap50_rel15`` and
+    ``ap50_rel25`` (hands whose box's share of the image is that number squared, or more). None
+    where there is no such hand. As in COCO's area ranges, of the last two a smaller box that is on
+    no hand is not false either.
+    """
+    return _averages(_curves(photos, results))
+
+
+def _curves(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, PrecisionRecall]:
+    everything = [np.ones(len(photo.boxes), bool) for photo in photos]
+    large = [photo.large for photo in photos]
+    return {
+        "ap50": precision_recall(zip(results, everything, strict=True)),
+        "ap50_large": precision_recall(zip(results, large, strict=True)),
+        "ap50_rel15": _of_size(photos, results, 0.15),
+        "ap50_rel25": _of_size(photos, results, 0.25),
+    }
+
+
+def _averages(curves: dict[str, PrecisionRecall]) -> dict[str, float | None]:
+    return {
+        name: None if math.isnan(curve.average_precision) else curve.average_precision
+        for name, curve in curves.items()
+    }
+
+
+def _of_size(
+    photos: Sequence[Photo], results: Sequence[ImageResult], size_min: float
+) -> PrecisionRecall:
+    """Return the curve over hands of a relative size, smaller boxes left out unless on a hand."""
+    judged = []
+    for photo, result in zip(photos, results, strict=True):
+        on_hand = overlaps(result.boxes, result.hands).max(1, initial=0.0) >= MATCH_OVERLAP
+        kept = on_hand | (photo.relative_sizes_of(result.boxes) >= size_min)
+        found = ImageResult(result.boxes[kept], result.scores[kept], result.hands)
+        judged.append((found, photo.relative_sizes >= size_min))
+    return precision_recall(judged)
+
+
+def evaluation(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, Any]:
+    """Return `summary` with counts and the precision/recall curve over all hands, JSON-able."""
+    curves = _curves(photos, results)
+    return {
+        **_averages(curves),
+        "images": len(photos),
+        "hands": sum(len(photo.boxes) for photo in photos),
+        "curve": _thinned(curves["ap50"]),
+    }
+
+
+def _thinned(curve: PrecisionRecall) -> dict[str, list[float]]:
+    """Return points of the curve evenly spaced in recall."""
+    last = max(0, len(curve.recall) - 1)
+    wanted = np.linspace(0.0, curve.recall[-1] if len(curve.recall) else 0.0, _CURVE_POINTS)
+    kept = np.unique(np.searchsorted(curve.recall, wanted).clip(0, last))[: len(curve.recall)]
+    return {
+        name: getattr(curve, name)[kept].round(4).tolist()
+        for name in ("scores", "precision", "recall")
+    }

@@ -1,0 +1,50 @@
+"""SPAAM: a display's whole projection from alignments of single points.
+
+Tuceryan & Navab 2000, "Single point active alignment method (SPAAM) for optical see-through HMD
+calibration for AR"; in print as Tuceryan, Genc & Navab 2002, Presence 11(3), whose abstract and
+procedure this follows. The wearer aligns crosshairs on the display with a tracked point, one after
+the other; the 11 unknowns are found linearly. Written from the published equations as the authors
+of INDICA use them (`docs/methods.md`); the normalisation is Hartley's.
+"""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from handcal.lab.methods.dlt import fit_projective
+from handcal.lab.methods.points import check_pairs
+from handcal.types import Float64
+
+FEWEST_ALIGNMENTS = 6
+"""Each gives two equations for 11 unknowns."""
+
+
+def solve_spaam(points_m: ArrayLike, pixels: ArrayLike) -> Float64:
+    """Return one eye's projection from its alignments.
+
+    Parameters
+    ----------
+    points_m : (N, 3) array_like
+        The tracked point at each alignment, in one frame of the headset; N from 6, in practice
+        20 or more.
+    pixels : (N, 2) array_like
+        The crosshairs it was aligned with.
+
+    Returns
+    -------
+    (3, 4) float64
+        Pixels from points in that frame, norm 1.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 6 alignments, wrong shapes, NaN, points that leave the projection open
+        (as on a plane), or alignments that put points behind the eye.
+    """
+    points, targets = check_pairs(
+        ("points_m", points_m, 3), ("pixels", pixels, 2), FEWEST_ALIGNMENTS
+    )
+    P = fit_projective(points, targets)
+    if not (points @ P[2, :3] + P[2, 3] > 0.0).all():
+        raise ValueError("the alignments contradict each other: some points lie behind the eye")
+    return P

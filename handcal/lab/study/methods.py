@@ -1,0 +1,373 @@
+"""Calibration methods on the same simulated wearers: how far each misses, and what it costs them.
+
+Every case is a wearer, who does all that every method asks. `docs/methods.md` says what is assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
+from handcal.geometry import invert, project, transform
+from handcal.lab.methods.fingertip import solve_eye_from_points
+from handcal.lab.methods.indica import solve_indica_recycled
+from handcal.lab.methods.mpaam import FEWEST_PAIRS, solve_mpaam
+from handcal.lab.methods.spaam import solve_spaam
+from handcal.lab.methods.stereo_spaam import solve_stereo_spaam
+from handcal.lab.study.run import Case, Study
+from handcal.lab.study.store import Row
+from handcal.lab.study.wearers import StudyWearer, align_cube, align_hand, align_points, draw_wearer
+from handcal.register.fuse import FuseSettings, fuse_alignments
+from handcal.register.solve import solve_alignment
+from handcal.sim.wearer import WearerSettings
+from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
+
+Projections: TypeAlias = Mapping[Eye, Float64]
+"""Pixels from points in H, (3, 4), for each eye."""
+
+PAPER = "rcICP (the paper's), 1"
+HANDCAL_BOTH, HANDCAL_EACH = "handcal, both eyes,", "handcal, each eye,"
+"""With the number of alignments behind."""
+
+_SPAAM_COUNTS = 6, 12, 25
+_STEREO_COUNTS = 12, 25
+_HAND_COUNTS = 1, 2, 3, 5
+_MPAAM_CUBES = 4
+_JUN_COUNT, _MOSER_COUNT = 8, 25
+# "Within a time less than 10 seconds" (Hu et al. 2021); handcal's own is below a tenth.
+_PAPER_SOLVES_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class MethodSettings:
+    """What the methods are compared on.
+
+    Attributes
+    ----------
+    wearers : int
+    eye_distance_sigmas_m : tuple of float
+        Populations: how far eye distances vary from the rig's. 0 is a headset set to its wearer.
+    noise_scale : float
+        Errors of an overlay, in those of `WearerSettings`. Set so that the paper's own method
+        errs as in the paper (`handcal.lab.study.wearer_noise`).
+    points : int
+        Of each cloud of the hand.
+    depth_sigma_m : float
+        Of each of its points.
+    hands : int
+        How many different hands there are.
+    pointing_sigma_arcmin : float
+        Of a tracked point against crosshairs, about each of two axes: what 11 recorded SPAAM
+        calibrations leave, tracker included (`handcal.lab.study.recorded`).
+    fingertip_sigma_m : float
+        Of a tracked fingertip, each axis, beyond that. An assumption.
+    corner_sigma_m : float
+        Of a tracked cube's corner, each axis. An assumption.
+    eye_tracker_sigma_m : tuple of 3 float
+        Of a tracked eye, E axes: x and y as far as those recordings differ from the eye that
+        their alignments tell, without what is common to all; z an assumption.
+    seed : int
+    """
+
+    wearers: int = 100
+    eye_distance_sigmas_m: tuple[float, ...] = (0.0, 0.002)
+    noise_scale: float = 1.0
+    points: int = 1500
+    depth_sigma_m: float = 0.001
+    hands: int = 10
+    pointing_sigma_arcmin: float = 5.9
+    fingertip_sigma_m: float = 0.003
+    corner_sigma_m: float = 0.001
+    eye_tracker_sigma_m: tuple[float, float, float] = (0.0021, 0.0008, 0.002)
+    seed: int = 1
+
+
+QUICK_METHODS = MethodSettings(wearers=3, points=300)
+"""A look whether everything runs; its figures say little."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """What a method made of one wearer.
+
+    Attributes
+    ----------
+    method : str
+    alignments : int
+        The wearer's, for both eyes together.
+    wearer_s : float
+        Of the wearer's time.
+    projections : mapping of eye to (3, 4) float64, or None
+        None if the method refused the alignments. One that puts the target behind an eye counts
+        as refused too.
+    """
+
+    method: str
+    alignments: int
+    wearer_s: float
+    projections: Projections | None
+
+
+def methods_study(settings: MethodSettings) -> Study:
+    """Return the study: each wearer in every population before the next."""
+    cases: list[Case] = [
+        {"wearer": wearer, "eye_distance_sigma_mm": 1e3 * sigma_m}
+        for wearer in range(settings.wearers)
+        for sigma_m in settings.eye_distance_sigmas_m
+    ]
+    return Study("methods", settings, cases, compare_methods)
+
+
+def compare_methods(settings: MethodSettings, case: Case) -> list[Row]:
+    """Calibrate one wearer by every method; a row for each and each distance of the target.
+
+    The errors in arcmin are of the target's four corners in each eye, as the paper's user test has
+    them. Those in mm are between a corner and where both eyes together see it drawn: mean over the
+    corners of |x|, |y|, |z| in the headset's axes.
+    """
+    wearer, placement = study_wearer(settings, case)
+    # A method's wearer errs the same whatever other methods there are.
+    seeds = np.random.SeedSequence([settings.seed, int(case["wearer"]), 1]).spawn(4)
+    generators = [np.random.default_rng(seed) for seed in seeds]
+    calibrations = [
+        Calibration("no calibration", 0, 0.0, rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))),
+        *_by_points(wearer, generators[0], settings),
+        *_by_cubes(wearer, generators[1], placement, settings),
+        *_by_both_eyes(wearer, generators[2], placement, settings),
+        *_by_each_eye(wearer, generators[3], placement, settings),
+    ]
+    return [row for found in calibrations for row in judge(wearer, found, case)]
+
+
+def study_wearer(settings: MethodSettings, case: Case) -> tuple[StudyWearer, WearerSettings]:
+    """Return a case's wearer and how far the wearer's overlays miss."""
+    number = int(case["wearer"])
+    usual = WearerSettings()
+    placement = replace(
+        usual,
+        eye_distance_sigma_m=1e-3 * float(case["eye_distance_sigma_mm"]),
+        lateral_sigma_arcmin=settings.noise_scale * usual.lateral_sigma_arcmin,
+        depth_sigma=settings.noise_scale * usual.depth_sigma,
+        rotation_sigma_rad=settings.noise_scale * usual.rotation_sigma_rad,
+    )
+    rng = np.random.default_rng([settings.seed, number, 0])
+    return draw_wearer(rng, number % settings.hands, placement), placement
+
+
+def target_errors(wearer: StudyWearer, projections: Projections, depth_m: float) -> dict[str, Any]:
+    """Return the errors at the target's corners: arcmin in each eye, and mm in space.
+
+    The target is straight ahead of the middle of the viewpoints. NaN if it is drawn behind an eye.
+    """
+    viewpoints_m = [invert(wearer.T_E_H(eye))[:3, 3] for eye in EYES]
+    corners_m = target_corners_m(depth_m) + np.mean(viewpoints_m, axis=0)
+    errors: dict[str, Any] = {}
+    rays = []
+    for eye in EYES:
+        P = wearer.sees(eye)
+        drawn_px = project(projections[eye], corners_m)
+        error_px = np.linalg.norm(drawn_px - project(P, corners_m), axis=1)
+        for corner, arcmin in enumerate(arcmin_from_px(wearer.rig.eyes[eye], error_px), 1):
+            errors[f"{eye}_{corner}_arcmin"] = float(arcmin)
+        homogeneous = np.column_stack([drawn_px, np.ones(len(drawn_px))])
+        rays.append(np.linalg.solve(P[:, :3], homogeneous.T).T)
+    seen_m = np.array(
+        [_meet([wearer.eye_m(eye) for eye in EYES], pair) for pair in zip(*rays, strict=True)]
+    )
+    for axis, error_mm in zip("xyz", 1e3 * np.abs(seen_m - corners_m).mean(axis=0), strict=True):
+        errors[f"{axis}_mm"] = float(error_mm)
+    return errors
+
+
+def judge(wearer: StudyWearer, found: Calibration, case: Case) -> list[Row]:
+    """Return a row for each distance of the target: what a calibration errs there."""
+    row: Row = {
+        **case,
+        "method": found.method,
+        "alignments": found.alignments,
+        "wearer_s": found.wearer_s,
+    }
+    if found.projections is not None:
+        errors = [target_errors(wearer, found.projections, depth_m) for depth_m in TARGET_DEPTHS_M]
+        if all(np.isfinite(list(at_depth.values())).all() for at_depth in errors):
+            return [
+                row | {"refused": False, "depth_m": depth_m} | at_depth
+                for depth_m, at_depth in zip(TARGET_DEPTHS_M, errors, strict=True)
+            ]
+    return [row | {"refused": True, "depth_m": depth_m} for depth_m in TARGET_DEPTHS_M]
+
+
+def _meet(eyes_m: Sequence[Float64], rays: Sequence[Float64]) -> Float64:
+    """Return the point nearest to two rays, each from its eye."""
+    across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
+    nearest: Float64 = np.linalg.solve(
+        np.sum(across, axis=0), sum(A @ eye_m for A, eye_m in zip(across, eyes_m, strict=True))
+    )
+    return nearest
+
+
+def rendered(wearer: StudyWearer, shift_m: Mapping[Eye, Float64]) -> Projections:
+    """Return what the rig renders with for given eye shifts φ, (3,) each."""
+    return {
+        eye: eye_projection(wearer.rig.eyes[eye], shift_m[eye]) @ wearer.T_E_H(eye) for eye in EYES
+    }
+
+
+def _seconds(alignments: int, *, by_hand: bool = False) -> float:
+    """Return the wearer's time for alignments: noticing, moving, holding still, and raising a hand.
+
+    The durations are those of the simulated wearer.
+    """
+    usual = WearerSettings()
+    raising_s = 2.0 * usual.movement_s if by_hand else 0.0
+    return alignments * (usual.reaction_s + usual.movement_s + usual.dwell_s + raising_s)
+
+
+def _by_points(
+    wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
+) -> Iterator[Calibration]:
+    """SPAAM, Stereo-SPAAM, fingertips, and INDICA."""
+    sigma_arcmin = settings.pointing_sigma_arcmin
+    for count in _SPAAM_COUNTS:
+        pairs = {eye: align_points(wearer, rng, count, [eye], sigma_arcmin, 0.0) for eye in EYES}
+        solved = _spaam(pairs)
+        yield Calibration(f"SPAAM, {count}", 2 * count, _seconds(2 * count), solved)
+    for count in _STEREO_COUNTS:
+        points_m, pixels = align_points(wearer, rng, count, EYES, sigma_arcmin, 0.0)
+        try:
+            stereo: Projections | None = solve_stereo_spaam(points_m, pixels)
+        except ValueError:
+            stereo = None
+        yield Calibration(f"Stereo-SPAAM, {count}", count, _seconds(count), stereo)
+    yield from _by_fingertips(wearer, rng, settings)
+    yield Calibration("INDICA, recycled", 0, 0.0, _indica(wearer, rng, settings))
+
+
+def _by_fingertips(
+    wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
+) -> Iterator[Calibration]:
+    """SPAAM of fingertips, and the eye alone from some of them."""
+    tips = {
+        eye: align_points(
+            wearer,
+            rng,
+            _MOSER_COUNT,
+            [eye],
+            settings.pointing_sigma_arcmin,
+            settings.fingertip_sigma_m,
+        )
+        for eye in EYES
+    }
+    count = 2 * _MOSER_COUNT
+    yield Calibration(f"fingertip SPAAM, {_MOSER_COUNT}", count, _seconds(count), _spaam(tips))
+    eyes_m = {}
+    for eye, (points_m, pixels) in tips.items():
+        # Every third: as few, over the same depths.
+        some = slice(None, None, _MOSER_COUNT // _JUN_COUNT)
+        points_E_m = transform(wearer.T_E_H(eye), points_m[some][:_JUN_COUNT])
+        found_px = pixels[eye][some][:_JUN_COUNT]
+        eyes_m[eye] = solve_eye_from_points(points_E_m, found_px, wearer.rig.eyes[eye])
+    count = 2 * _JUN_COUNT
+    found = rendered(wearer, eyes_m)
+    yield Calibration(f"fingertip, eye only, {_JUN_COUNT}", count, _seconds(count), found)
+
+
+def _spaam(pairs: Mapping[Eye, tuple[Float64, Mapping[Eye, Float64]]]) -> Projections | None:
+    """Return both eyes' SPAAM, or None if it refuses one."""
+    try:
+        return {
+            eye: solve_spaam(points_m, pixels[eye]) for eye, (points_m, pixels) in pairs.items()
+        }
+    except ValueError:
+        return None
+
+
+def _indica(wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings) -> Projections:
+    projections = {}
+    for eye in EYES:
+        T_E_H, display = wearer.T_E_H(eye), wearer.rig.eyes[eye]
+        tracked_E_m = wearer.true_shift_m[eye] + rng.normal(0.0, settings.eye_tracker_sigma_m)
+        tracked_m = transform(invert(T_E_H), tracked_E_m[None])[0]
+        offline = eye_projection(display) @ T_E_H
+        projections[eye] = solve_indica_recycled(offline, display.z_C0_S_m, tracked_m)
+    return projections
+
+
+def _by_cubes(
+    wearer: StudyWearer,
+    rng: np.random.Generator,
+    placement: WearerSettings,
+    settings: MethodSettings,
+) -> Iterator[Calibration]:
+    """MPAAM with each of its maps, of the same alignments."""
+    cubes = [
+        align_cube(wearer, rng, placement, settings.corner_sigma_m) for _ in range(_MPAAM_CUBES)
+    ]
+    tracked_m, shown_m = (np.concatenate(side) for side in zip(*cubes, strict=True))
+    offline = rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))
+    for model in FEWEST_PAIRS:
+        T = solve_mpaam(tracked_m, shown_m, model)
+        found = {eye: P @ T for eye, P in offline.items()}
+        yield Calibration(
+            f"MPAAM, {model}, {_MPAAM_CUBES} × 5", _MPAAM_CUBES, _seconds(_MPAAM_CUBES), found
+        )
+
+
+def _by_both_eyes(
+    wearer: StudyWearer,
+    rng: np.random.Generator,
+    placement: WearerSettings,
+    settings: MethodSettings,
+) -> Iterator[Calibration]:
+    """Run the paper's method, and handcal with both eyes open: the first alignment is the same."""
+    fused = _align_in_turn(wearer, rng, [EYES] * max(_HAND_COUNTS), placement, settings)
+    for count, (alignment, shift_m) in enumerate(fused, 1):
+        if count == 1:
+            solved = solve_alignment(alignment, wearer.rig, "paper")
+            found = rendered(wearer, {eye: solved[eye].shift_m for eye in EYES})
+            seconds = _seconds(1, by_hand=True) + _PAPER_SOLVES_S
+            yield Calibration(PAPER, 1, seconds, found)
+        if count in _HAND_COUNTS:
+            seconds = _seconds(count, by_hand=True)
+            found = rendered(wearer, shift_m)
+            yield Calibration(f"{HANDCAL_BOTH} {count}", count, seconds, found)
+
+
+def _by_each_eye(
+    wearer: StudyWearer,
+    rng: np.random.Generator,
+    placement: WearerSettings,
+    settings: MethodSettings,
+) -> Iterator[Calibration]:
+    """Handcal with one eye open at a time: as many alignments of each."""
+    order: list[tuple[Eye, ...]] = [("left",), ("right",)] * max(_HAND_COUNTS)
+    for done, (_, shift_m) in enumerate(_align_in_turn(wearer, rng, order, placement, settings), 1):
+        count, half = divmod(done, 2)
+        if not half and count in _HAND_COUNTS:
+            seconds = _seconds(done, by_hand=True)
+            found = rendered(wearer, shift_m)
+            yield Calibration(f"{HANDCAL_EACH} {count}", done, seconds, found)
+
+
+def _align_in_turn(
+    wearer: StudyWearer,
+    rng: np.random.Generator,
+    order: Sequence[tuple[Eye, ...]],
+    placement: WearerSettings,
+    settings: MethodSettings,
+) -> Iterator[tuple[Alignment, Mapping[Eye, Float64]]]:
+    """Yield each alignment, and φ fused of all so far, with which the next cursor is drawn."""
+    solved: list[tuple[Alignment, Mapping[Eye, EyeShift]]] = []
+    shift_m: dict[Eye, Float64] = dict.fromkeys(EYES, np.zeros(3))
+    for eyes in order:
+        alignment = align_hand(
+            wearer, rng, eyes, shift_m, placement, settings.points, settings.depth_sigma_m
+        )
+        solved.append((alignment, solve_alignment(alignment, wearer.rig)))
+        fused = fuse_alignments(solved, wearer.rig, FuseSettings())
+        shift_m = shift_m | {eye: found.shift_m for eye, found in fused.items()}
+        yield alignment, shift_m

@@ -1,0 +1,280 @@
+"""The noise study: what disturbs the solvers, and how much of it they bear.
+
+The paper's simulation (Hu et al. 2021, "Simulation test on rotation-constrained ICP"), and what it
+left out. Every section varies one thing, on the same people and with the same random numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from handcal.lab.study.run import Case, Study
+from handcal.lab.study.store import Row
+from handcal.lab.study.trials import floor_error_m, solve_trial, study_hand
+from handcal.register.solve import solve_alignment
+from handcal.rig.example import example_rig
+from handcal.sim.alignments import AlignmentSettings, simulate_alignment
+from handcal.sim.overlay import overlay_by_eye
+from handcal.sim.placement import Slip
+from handcal.sim.wearer import WearerSettings, draw_eyes, draw_slip
+from handcal.types import EYES, METHODS, Float64, Intrinsics, Method
+
+FLOOR = "known pairs"
+"""Stands for a method: least squares with the true pairs, which only a turned hand disturbs."""
+ERRORS_MM = "error_1_mm", "error_2_mm", "error_3_mm"
+"""The columns of φ's error."""
+HANDS = "hand shape"
+"""The section whose values are people."""
+
+# A D415's smaller images, which are drawn three times as fast, show enough points.
+_CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseSettings:
+    """What is simulated, and how often.
+
+    Where a section varies something else, clouds are as a sensor gives them: sampled apart, with
+    `depth_sigma_m` of noise, the hand turned by `angle_deg`, φ uniform within ± 10 mm.
+
+    Attributes
+    ----------
+    seed : int
+    trials : int
+        Alignments of each value, for ``consistent`` and ``icp``.
+    linear_trials, paper_trials : int
+        The first so many of them, but for the section of hand shapes, are solved by ``linear``,
+        and by ``paper``, which is slow.
+    hands : int
+        People, who come again; errors of one are not independent of one another.
+    points : int
+        Of each cloud.
+    depth_sigma_m, angle_deg : float
+    coarse_deg, fine_deg : tuple of float
+        Rotations of the paper's two figures.
+    kept_deg : tuple of float
+        Rotations of a hand that keeps its size, as the paper's does not quite.
+    shift_max_m : tuple of float
+        Each component of φ is uniform within ± these.
+    depth_sigmas_m : tuple of float
+        Standard deviations of each point's depth.
+    forearms_m : tuple of float
+        How much forearm the hand's cloud shows; the cursor's shows 40 mm.
+    counts : tuple of int
+        Points of each cloud.
+    shapes, shape_trials : int
+        Hands of other people, and how often each is aligned.
+    slips : tuple of float
+        How much a wearer who looks through the displays errs, as a multiple of the usual.
+    """
+
+    seed: int = 1
+    trials: int = 100
+    linear_trials: int = 20
+    paper_trials: int = 8
+    hands: int = 20
+    points: int = 1000
+    depth_sigma_m: float = 0.001
+    angle_deg: float = 3.0
+    coarse_deg: tuple[float, ...] = tuple(5.0 * i for i in range(13))
+    fine_deg: tuple[float, ...] = tuple(float(i) for i in range(21))
+    kept_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 20.0)
+    shift_max_m: tuple[float, ...] = (0.005, 0.010, 0.015, 0.020, 0.030)
+    depth_sigmas_m: tuple[float, ...] = (0.0, 0.0005, 0.001, 0.002, 0.004)
+    forearms_m: tuple[float, ...] = (0.0, 0.02, 0.04, 0.06, 0.08)
+    counts: tuple[int, ...] = (250, 500, 1000, 2000, 4000)
+    shapes: int = 24
+    shape_trials: int = 20
+    slips: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)
+
+
+QUICK_NOISE = NoiseSettings(
+    trials=2,
+    linear_trials=2,
+    paper_trials=1,
+    points=300,
+    coarse_deg=(0.0, 5.0, 30.0),
+    fine_deg=(0.0, 5.0, 9.0),
+    kept_deg=(0.0, 9.0),
+    shift_max_m=(0.005, 0.020),
+    depth_sigmas_m=(0.0, 0.002),
+    forearms_m=(0.02, 0.04),
+    counts=(250, 500),
+    shapes=2,
+    shape_trials=2,
+    slips=(0.0, 1.0),
+)
+"""A look whether everything runs; its numbers say little."""
+
+_Making: TypeAlias = "tuple[AlignmentSettings, float]"
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the study, in which one thing varies.
+
+    Attributes
+    ----------
+    name : str
+    values : callable
+        What there is of it, from the settings.
+    making : callable or None
+        From settings and value, how alignments are made, and their rotation in degrees; None for
+        those that a wearer makes.
+    label : str
+        What varies, with the unit in which it is shown.
+    scale : float
+        From a value to that unit.
+    """
+
+    name: str
+    values: Callable[[NoiseSettings], Sequence[float]]
+    making: Callable[[NoiseSettings, float], _Making] | None
+    label: str
+    scale: float = 1.0
+
+
+def _measured(settings: NoiseSettings, **changes: Any) -> _Making:
+    usual = AlignmentSettings(
+        count=settings.points, resample=True, depth_sigma_m=settings.depth_sigma_m
+    )
+    return replace(usual, **changes), settings.angle_deg
+
+
+SECTIONS: Mapping[str, Section] = {
+    section.name: section
+    for section in (
+        Section(
+            "rotation",
+            lambda settings: sorted({*settings.coarse_deg, *settings.fine_deg}),
+            lambda settings, angle: (AlignmentSettings(settings.points, exact=False), angle),
+            "rotation, °",
+        ),
+        Section(
+            "rotation, size kept",
+            lambda settings: settings.kept_deg,
+            lambda settings, angle: (AlignmentSettings(settings.points), angle),
+            "rotation, °",
+        ),
+        Section(
+            "eye box",
+            lambda settings: settings.shift_max_m,
+            lambda settings, shift: _measured(settings, shift_max_m=shift),
+            "each component of φ within ±, mm",
+            1e3,
+        ),
+        Section(
+            "depth noise",
+            lambda settings: settings.depth_sigmas_m,
+            lambda settings, sigma: _measured(settings, depth_sigma_m=sigma),
+            "σ of each point's depth, mm",
+            1e3,
+        ),
+        Section(
+            "forearm",
+            lambda settings: settings.forearms_m,
+            lambda settings, forearm: _measured(settings, hand_forearm_m=forearm),
+            "forearm of the hand's cloud, mm",
+            1e3,
+        ),
+        Section(
+            "points",
+            lambda settings: settings.counts,
+            lambda settings, count: _measured(settings, count=int(count)),
+            "points of each cloud",
+        ),
+        Section(
+            HANDS,
+            lambda settings: range(settings.shapes),
+            lambda settings, _hand: _measured(settings),
+            "hand",
+        ),
+        Section("wearer", lambda settings: settings.slips, None, "wearer's errors, × the usual"),
+    )
+}
+
+
+def noise_study(settings: NoiseSettings) -> Study:
+    """Return the study of all sections; each case is one alignment."""
+    cases: list[Case] = [
+        {"section": name, "value": value, "trial": trial}
+        for name, section in SECTIONS.items()
+        for value in section.values(settings)
+        for trial in range(settings.shape_trials if name == HANDS else settings.trials)
+    ]
+    return Study("noise", settings, cases, noise_trial)
+
+
+def noise_trial(settings: NoiseSettings, case: Case) -> list[Row]:
+    """Simulate one alignment and solve it by every method that its number is for.
+
+    Returns
+    -------
+    list of dict
+        For each method: the case, ``hand``, ``method``, the ``iterations`` that it took, and the
+        error of φ in mm, ``error_1_mm`` to ``error_3_mm``.
+    """
+    trial, section = int(case["trial"]), SECTIONS[str(case["section"])]
+    hand = int(case["value"]) if section.name == HANDS else trial % settings.hands
+    first = {"linear": settings.linear_trials, "paper": settings.paper_trials}
+    if section.name == HANDS:
+        first = dict.fromkeys(first, 0)
+    methods = [method for method in METHODS if trial < first.get(method, settings.trials)]
+    rng = np.random.default_rng([settings.seed, trial])
+    solved = (
+        _solve_wearer(settings, float(case["value"]), rng, hand, trial, methods)
+        if section.making is None
+        else _solve(*section.making(settings, float(case["value"])), rng, hand, methods)
+    )
+    rows: list[Row] = []
+    for method, iterations, error_m in solved:
+        errors_mm = dict(zip(ERRORS_MM, (1e3 * error_m).tolist(), strict=True))
+        rows.append({**case, "hand": hand, "method": method, "iterations": iterations, **errors_mm})
+    return rows
+
+
+_Solved: TypeAlias = Iterator[tuple[str, int, Float64]]
+
+
+def _solve(
+    making: AlignmentSettings,
+    angle_deg: float,
+    rng: np.random.Generator,
+    hand: int,
+    methods: Sequence[Method],
+) -> _Solved:
+    made = simulate_alignment(rng, study_hand(hand), np.radians(angle_deg), making, _CAMERA)
+    yield FLOOR, 0, floor_error_m(made, exact=making.exact)
+    for method in methods:
+        found = solve_trial(made, method)
+        yield method, found.iterations, found.shift_m - made.shift_m
+
+
+def _solve_wearer(
+    settings: NoiseSettings,
+    slip: float,
+    rng: np.random.Generator,
+    hand: int,
+    trial: int,
+    methods: Sequence[Method],
+) -> _Solved:
+    """Solve one eye's alignment by a wearer who looks through the displays."""
+    rig, usual, eye = example_rig(), WearerSettings(), EYES[trial // settings.hands % 2]
+    true_m = draw_eyes(rng, usual)[eye]
+    drawn = draw_slip(rng, usual)
+    alignment = overlay_by_eye(
+        rng,
+        study_hand(hand),
+        rig,
+        {eye: true_m},
+        settings.points,
+        settings.depth_sigma_m,
+        slip=Slip(slip * drawn.rotation_rad, slip * drawn.lateral_rad, slip * drawn.depth_ratio),
+    )
+    for method in methods:
+        found = solve_alignment(alignment, rig, method)[eye]
+        yield method, found.iterations, found.shift_m - true_m

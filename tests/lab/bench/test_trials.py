@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from handcal.lab.bench.trials import (
+    Errors,
+    collect_errors,
+    mean_length_mm,
+    run_trials,
+    trial_alignment,
+)
+from handcal.lab.study.trials import floor_error_m, solve_trial
+from handcal.sim.alignments import AlignmentSettings
+
+SMALL = AlignmentSettings(count=300)
+
+
+def test_outcomes_keep_the_order_of_their_tasks() -> None:
+    told: list[float] = []
+    assert run_trials(lambda task: task * task, range(5), told.append) == [0, 1, 4, 9, 16]
+    np.testing.assert_allclose(told, [0.2, 0.4, 0.6, 0.8, 1.0])
+
+
+def test_a_failed_trial_is_not_hidden() -> None:
+    with pytest.raises(ZeroDivisionError):
+        run_trials(lambda task: 1 / task, [1, 0], lambda _: None)
+
+
+def test_errors_are_stacked_by_case_and_method() -> None:
+    def trial(case: str, number: int) -> Errors:
+        errors = {"quick": np.full(3, len(case) + number)}
+        return errors if number else errors | {"slow": np.zeros(3)}
+
+    by_case = collect_errors(trial, ["a", "bb"], 3, lambda _: None)
+    assert list(by_case) == ["a", "bb"]
+    np.testing.assert_array_equal(by_case["bb"]["quick"][:, 0], [2, 3, 4])
+    assert by_case["bb"]["slow"].shape == (1, 3)
+
+
+def test_a_trial_differs_between_angles_only_by_the_angle() -> None:
+    straight, turned = (trial_alignment(3, angle_deg, SMALL) for angle_deg in (0.0, 9.0))
+    np.testing.assert_array_equal(straight.hand_m, turned.hand_m)
+    np.testing.assert_array_equal(straight.shift_m, turned.shift_m)
+    assert np.linalg.norm(straight.rotation_rad) == 0.0
+    assert np.linalg.norm(turned.rotation_rad) == pytest.approx(np.radians(9.0))
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_known_pairs_of_a_straight_hand_give_phi_exactly(exact: bool) -> None:
+    made = trial_alignment(4, 0.0, AlignmentSettings(count=300, exact=exact))
+    assert np.abs(floor_error_m(made, exact=exact)).max() < 1e-9
+    assert np.linalg.norm(floor_error_m(made, exact=not exact)) > 1e-4
+
+
+def test_a_straight_hand_is_solved() -> None:
+    made = trial_alignment(5, 0.0, SMALL)
+    np.testing.assert_allclose(solve_trial(made, "consistent").shift_m, made.shift_m, atol=2e-4)
+
+
+def test_the_mean_length_is_in_millimetres() -> None:
+    assert mean_length_mm(np.array([[0.003, 0.004, 0.0], [0.0, 0.0, 0.001]])) == pytest.approx(3.0)

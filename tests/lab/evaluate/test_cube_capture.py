@@ -1,0 +1,109 @@
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.camera.viewpoint import ViewpointCamera
+from handcal.errors import CancelledError
+from handcal.geometry import rigid
+from handcal.io.images import write_png
+from handcal.lab.evaluate.cube_capture import keep_capture, take_captures
+from handcal.lab.evaluate.cube_folder import (
+    CapturePlan,
+    PlannedCapture,
+    find_captures,
+    images_in,
+    missing_captures,
+)
+from handcal.rig.cube import Cube, CubeError
+from handcal.rig.grid import Grid, draw_grid
+from handcal.sim.boards import PictureSettings
+from handcal.sim.cube import CubePainter
+from handcal.types import Intrinsics, UInt8
+
+CUBE, GRID = Cube(), Grid(640, 360)
+PLAN = CapturePlan(positions=("centre",), poses=1, drawn=("a",))
+
+
+@lru_cache(maxsize=1)
+def cube_seen() -> UInt8:
+    camera = Intrinsics(640, 360, 900.0, 900.0, 320.0, 180.0)
+    pose = rigid([0, 0, 0.1], [0, 0, 0.45]) @ rigid([0.5, 0, 0]) @ rigid([0, 0.7, 0])
+    painter = CubePainter(CUBE, camera, PictureSettings(samples=2))
+    return painter.paint(pose, np.random.default_rng(1))
+
+
+class Stage(ViewpointCamera):
+    """A camera before which a person puts one thing after the other, as asked."""
+
+    def __init__(self, scenes: list[UInt8]) -> None:
+        self.name = "Stage"
+        self._scenes = iter(scenes)
+        self._scene: UInt8 = np.zeros((360, 640), np.uint8)
+        self._before: Iterator[UInt8] = iter(())
+        self.asked: list[str] = []
+
+    def ask(self, what: str) -> None:
+        self.asked.append(what)
+        self._before = iter([self._scene])  # waits in the camera
+        self._scene = next(self._scenes)
+
+    def read(self) -> tuple[UInt8, int]:
+        gray = next(self._before, self._scene)
+        return np.repeat(gray[..., None], 3, axis=2), 0
+
+    def close(self) -> None:
+        pass
+
+
+def test_it_takes_what_is_missing_and_asks_again_where_nothing_is_seen(tmp_path: Path) -> None:
+    dark = np.zeros((360, 640), np.uint8)
+    stage, said = Stage([draw_grid(GRID), dark, cube_seen(), cube_seen()]), list[str]()
+    take_captures(stage, tmp_path, PLAN, CUBE, GRID, stage.ask, said.append)
+    assert stage.asked == [
+        "centre: show the grid on the display, darken the room",
+        "centre/pose-1: switch the display off",
+        "centre/pose-1: switch the display off",
+        "centre/pose-1: show the virtual cube, cover the real one (a)",
+    ]
+    assert said[1:] == [
+        "Not taken: the image is too dark",
+        "centre/pose-1/real.png: 3 faces of the cube",
+        "centre/pose-1/virtual-a.png: 3 faces of the cube",
+    ]
+    assert said[0].startswith("centre/grid.png: ")
+    poses, incomplete = find_captures(tmp_path)
+    assert [pose.virtual.keys() for pose in poses] == [{"a"}]
+    assert not incomplete
+    assert missing_captures(tmp_path, PLAN) == []
+
+
+def test_it_goes_on_where_it_was_given_up(tmp_path: Path) -> None:
+    stage = Stage([draw_grid(GRID), cube_seen()])
+
+    def ask(what: str) -> None:
+        if len(stage.asked) == 2:
+            raise CancelledError("enough")
+        stage.ask(what)
+
+    with pytest.raises(CancelledError):
+        take_captures(stage, tmp_path, PLAN, CUBE, GRID, ask, lambda _what: None)
+    (missing,) = missing_captures(tmp_path, PLAN)
+    assert missing.file == "centre/pose-1/virtual-a.png"
+
+
+def test_an_image_replaces_an_earlier_one_only_if_the_cube_is_seen(tmp_path: Path) -> None:
+    capture = PlannedCapture("a/1", "real")
+    seen = np.repeat(cube_seen()[..., None], 3, axis=2)
+    earlier = tmp_path / "a" / "1" / "real.jpg"
+    earlier.parent.mkdir(parents=True)
+    earlier.write_bytes(b"")
+    with pytest.raises(CubeError, match="dark"):
+        keep_capture(np.zeros_like(seen), tmp_path, capture, CUBE, GRID)
+    assert images_in(earlier.parent) == {"real": earlier}
+    assert keep_capture(seen, tmp_path, capture, CUBE, GRID) == "3 faces of the cube"
+    write_png(tmp_path / "expected.png", seen)
+    kept = images_in(earlier.parent)["real"]
+    assert kept.read_bytes() == (tmp_path / "expected.png").read_bytes()
