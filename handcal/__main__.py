@@ -14,16 +14,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from handcal.camera_options import add_realsense_options, realsense_of
-from handcal.errors import FileError, HandcalError
-from handcal.evaluate_commands import add_evaluate_commands
-from handcal.export.formats import FORMATS
-from handcal.hand.settings import Roi
-from handcal.io.files import make_folder
-from handcal.rig_commands import add_rig_commands
-from handcal.rig_file_commands import add_rig_file_commands
-from handcal.study_commands import add_study_commands
-from handcal.terminal import (
+from handcal.cli.camera_options import add_realsense_options, realsense_of
+from handcal.cli.evaluate import add_evaluate_commands
+from handcal.cli.rig import add_rig_commands
+from handcal.cli.rig_files import add_rig_file_commands
+from handcal.cli.study import add_study_commands
+from handcal.cli.terminal import (
     Parser,
     add_command,
     console,
@@ -35,16 +31,20 @@ from handcal.terminal import (
     table,
     until_interrupted,
 )
+from handcal.errors import FileError, HandcalError
+from handcal.export.formats import FORMATS
+from handcal.hand.settings import Roi
+from handcal.io.files import make_folder
 from handcal.types import METHODS
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
-    from handcal.replay import ReplayStep
+    from handcal.cli.replay import ReplayStep
 
 
 def demo(arguments: argparse.Namespace) -> None:
     """Calibrate a simulated wearer from start to end, and judge the result by the truth."""
-    from handcal.demo import DemoSettings, run_demo
+    from handcal.cli.demo import DemoSettings, run_demo
 
     settings = DemoSettings(
         seed=arguments.seed,
@@ -76,9 +76,9 @@ def demo(arguments: argparse.Namespace) -> None:
 def segment(arguments: argparse.Namespace) -> None:
     """Segment the hand in one image pair: hand.ply, contour.ply, mask, overlay and hand.json."""
     from handcal.camera.images import read_frame
+    from handcal.cli.segmentation_file import write_segmentation
     from handcal.hand.settings import SegmentSettings
     from handcal.hand.shipped import make_finder
-    from handcal.segmentation_file import write_segmentation
 
     frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)
     cloud = make_finder(SegmentSettings(roi=arguments.roi)).find(frame)
@@ -147,8 +147,8 @@ def replay(arguments: argparse.Namespace) -> None:
     """Play a recording and segment the hand in every frame."""
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.recordings import open_recording
+    from handcal.cli.replay import replay as play
     from handcal.hand.settings import SegmentSettings
-    from handcal.replay import replay as play
 
     shown_table = table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
     rows: list[dict[str, Any]] = []

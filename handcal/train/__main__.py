@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from handcal.cli.terminal import Parser, errors_in_one_line, number
 from handcal.io.files import make_folder
 from handcal.lab.evaluate.annotations import read_annotations
-from handcal.terminal import Parser, errors_in_one_line, number
 from handcal.train.backbone import load_backbone
 from handcal.train.exported import load_exported
 from handcal.train.loop import Pace, Training, TrainSettings, split

@@ -23,10 +23,10 @@ from onnxruntime.quantization import (
 from onnxruntime.quantization.shape_inference import quant_pre_process
 from torch import Tensor, nn
 
+from handcal.cli.terminal import Parser, errors_in_one_line
 from handcal.hand.detect import DetectSettings, letterbox
 from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
 from handcal.lab.evaluate.annotations import Photo, read_annotations
-from handcal.terminal import Parser, errors_in_one_line
 from handcal.train.loop import read_average
 from handcal.train.model import HandNet
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from handcal.cli.terminal import Parser, errors_in_one_line, number
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
 from handcal.io.resources import resource_path
@@ -20,7 +21,6 @@ from handcal.lab.evaluate.precision import MATCH_OVERLAP
 from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
 from handcal.sim.room import make_room
-from handcal.terminal import Parser, errors_in_one_line, number
 from handcal.train.simulated import Picture, picture
 from handcal.types import UInt8
 

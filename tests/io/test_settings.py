@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.demo import DemoSettings
+from handcal.cli.demo import DemoSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings, settings_json
 from handcal.station.procedure import CalibrationSettings

@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
-from handcal.terminal import Parser, number
+from handcal.cli.terminal import Parser, number
 
 
 def add_realsense_options(command: Parser) -> None:

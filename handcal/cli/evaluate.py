@@ -11,9 +11,9 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from handcal.cube_commands import add_cube_commands
+from handcal.cli.cube import add_cube_commands
+from handcal.cli.terminal import Commands, Parser, add_command, console, progress, save, table
 from handcal.io.files import make_folder, require_suffix
-from handcal.terminal import Commands, Parser, add_command, console, progress, save, table
 
 
 def detector(arguments: argparse.Namespace) -> None:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from handcal.cli.replay import replay
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import rigid
 from handcal.hand.segment import SegmentSettings
 from handcal.io.closable import Closable
-from handcal.replay import replay
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import draw_hand
 from handcal.types import Float64, Frame, Intrinsics

@@ -7,9 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.errors import HandcalError
-from handcal.io.files import make_folder
-from handcal.rig_commands import (
+from handcal.cli.rig import (
     add_board_options,
     add_square_option,
     board_of,
@@ -17,7 +15,18 @@ from handcal.rig_commands import (
     show_verdict,
     show_views,
 )
-from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
+from handcal.cli.terminal import (
+    Commands,
+    Parser,
+    add_command,
+    console,
+    number,
+    progress,
+    save,
+    table,
+)
+from handcal.errors import HandcalError
+from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.rig.display import DisplaySettings

@@ -82,7 +82,7 @@ def test_an_interrupted_study_goes_on(
         yield ask
 
     with monkeypatch.context() as patch:
-        patch.setattr("handcal.study_commands.until_interrupted", interrupted)
+        patch.setattr("handcal.cli.study.until_interrupted", interrupted)
         assert fails(study) == 130
     assert "run it again to go on with it" in capsys.readouterr().err
     assert not (tmp_path / "study" / "rows.csv").exists()

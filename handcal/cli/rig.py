@@ -13,10 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from handcal.camera_options import add_realsense_options, realsense_of
-from handcal.errors import FileError, HandcalError
-from handcal.io.files import make_folder, write_json
-from handcal.terminal import (
+from handcal.cli.camera_options import add_realsense_options, realsense_of
+from handcal.cli.terminal import (
     Commands,
     Parser,
     add_command,
@@ -27,6 +25,8 @@ from handcal.terminal import (
     table,
     until_interrupted,
 )
+from handcal.errors import FileError, HandcalError
+from handcal.io.files import make_folder, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -11,8 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.errors import CancelledError
-from handcal.terminal import (
+from handcal.cli.terminal import (
     Commands,
     add_command,
     console,
@@ -23,6 +22,7 @@ from handcal.terminal import (
     table,
     until_interrupted,
 )
+from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
     from handcal.lab.study.run import Study

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.cli.rig_files import add_rig_file_commands
+from handcal.cli.terminal import Parser
 from handcal.display import view_of_eye
 from handcal.errors import HandcalError
 from handcal.geometry import invert, rigid
@@ -19,10 +21,8 @@ from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.tracked_file import write_tracked
 from handcal.rig.views import ViewsError
-from handcal.rig_file_commands import add_rig_file_commands
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
-from handcal.terminal import Parser
 from handcal.types import Intrinsics
 from tests.helpers import DATA
 

@@ -12,10 +12,19 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from handcal.cli.rig import add_square_option, grid_of
+from handcal.cli.terminal import (
+    Commands,
+    Parser,
+    add_command,
+    console,
+    number,
+    progress,
+    save,
+    table,
+)
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder
-from handcal.rig_commands import add_square_option, grid_of
-from handcal.terminal import Commands, Parser, add_command, console, number, progress, save, table
 
 if TYPE_CHECKING:
     from handcal.rig.cube import Cube

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.cli.segmentation_file import draw_overlay, write_segmentation
 from handcal.errors import FileError
 from handcal.geometry import rigid
-from handcal.segmentation_file import draw_overlay, write_segmentation
 from handcal.types import Frame, HandCloud, Intrinsics
 
 CAMERA = Intrinsics(40, 30, 50.0, 50.0, 20.0, 15.0)
