@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraTimeoutError, HandcalError
 from handcal.types import UInt8
-from handcal_gui.running.worker import Worker
+from handcal_gui.engine.worker import Worker
 
 _LOG = logging.getLogger(__name__)
 

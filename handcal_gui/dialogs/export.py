@@ -13,7 +13,7 @@ from handcal.export.export import ExportSettings, export_session
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
-from handcal_gui.running.jobs import Job
+from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button
 

@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from handcal.errors import HandcalError
 from handcal.station.doctor import Finding, Health
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.evaluation.results_view import ResultsView
 from handcal_gui.evaluation.work import Evaluation, Outcome, Standing
 from handcal_gui.running.job_bar import JobBar
-from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import main_button, paragraph

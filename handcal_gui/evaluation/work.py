@@ -18,9 +18,9 @@ from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
+from handcal_gui.engine.jobs import IsCancelled
+from handcal_gui.engine.jobs import Report as Tell
 from handcal_gui.evaluation.time_left import TimeLeft
-from handcal_gui.running.jobs import IsCancelled
-from handcal_gui.running.jobs import Report as Tell
 
 Checkpoint: TypeAlias = Callable[[str, float], None]
 """Told what is going on and the share done; raises CancelledError once it shall end."""

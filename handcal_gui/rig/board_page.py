@@ -24,8 +24,8 @@ from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.print_page import Paper
 from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.rig.draft import Draft
-from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (

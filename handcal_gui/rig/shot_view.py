@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from handcal.rig.board import BoardView
 from handcal.rig.views import View
 from handcal.types import UInt8
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.rig.shots import Shot, read_color
-from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.image_view import ImageView
 

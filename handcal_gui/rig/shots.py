@@ -14,7 +14,7 @@ from handcal.io.images import read_image
 from handcal.rig.board import Board
 from handcal.rig.views import View, image_files, pair_views, read_views
 from handcal.types import UInt8
-from handcal_gui.running.jobs import IsCancelled, Report
+from handcal_gui.engine.jobs import IsCancelled, Report
 
 _SMALL_PX = 96
 _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION

@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLabel, QProgressBar, QWidget
 
-from handcal_gui.running.jobs import Job, Work
+from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import beside, button, named

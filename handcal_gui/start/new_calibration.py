@@ -12,8 +12,8 @@ from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import Part, is_ready
 from handcal.station.settings import StationSettings
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.preferences import Preferences
-from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.start.card import Card
 from handcal_gui.start.station_form import StationForm
 from handcal_gui.theme import SPACING_PX

@@ -10,8 +10,8 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.station.preflight import check_station
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.preferences import Preferences
-from handcal_gui.running.latest_job import LatestJob
 from handcal_gui.start.card import Card
 from handcal_gui.start.new_calibration import Check, NewCalibration
 from handcal_gui.start.session_entries import Offers, find_offers

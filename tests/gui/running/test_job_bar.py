@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError, FileError
+from handcal_gui.engine.jobs import IsCancelled, Report
 from handcal_gui.running.job_bar import JobBar
-from handcal_gui.running.jobs import IsCancelled, Report
 
 
 @pytest.fixture

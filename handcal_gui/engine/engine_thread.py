@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from handcal.errors import HandcalError
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal_gui.running.worker import Worker
+from handcal_gui.engine.worker import Worker
 
 _LOG = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
-from handcal_gui.running.latest_job import LatestJob
+from handcal_gui.engine.latest_job import LatestJob
 
 
 def test_only_the_last_question_is_answered(qtbot: QtBot) -> None:

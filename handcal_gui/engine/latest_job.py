@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from handcal_gui.running.jobs import Job
+from handcal_gui.engine.jobs import Job
 
 
 class LatestJob(QObject):

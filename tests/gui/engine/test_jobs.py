@@ -7,7 +7,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError, FileError
-from handcal_gui.running.jobs import IsCancelled, Job, Report
+from handcal_gui.engine.jobs import IsCancelled, Job, Report
 
 
 def test_progress_and_result_reach_the_window_s_thread(qtbot: QtBot) -> None:

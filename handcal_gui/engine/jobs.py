@@ -9,7 +9,7 @@ from collections.abc import Callable
 from PySide6.QtCore import Signal
 
 from handcal.errors import CancelledError, HandcalError
-from handcal_gui.running.worker import Worker
+from handcal_gui.engine.worker import Worker
 
 _LOG = logging.getLogger(__name__)
 

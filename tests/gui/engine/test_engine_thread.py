@@ -14,7 +14,7 @@ from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.station.procedure import ProcedureError
 from handcal.station.station import Station
-from handcal_gui.running.stream import Stream
+from handcal_gui.engine.engine_thread import Stream
 
 
 class FakeStation(Closable):
