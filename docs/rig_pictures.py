@@ -24,8 +24,8 @@ from handcal_gui.rig.work import (
     ViewpointEntries,
     WorkFolder,
 )
-from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import use_theme
+from handcal_gui.widgets.job_bar import JobBar
 
 PICTURES = Path(__file__).parent / "pictures"
 STEPS = ("", "stereo", "", "left", "", "result")

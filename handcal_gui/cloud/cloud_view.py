@@ -1,6 +1,6 @@
 """Points in space, to be turned, zoomed and moved with the mouse or keys.
 
-Drawn by `handcal_gui.cloud.splat`: no OpenGL, which software rendering, remote desktops and virtual
+Drawn by `handcal_gui.widgets.splat`: no OpenGL, which software rendering, remote desktops and virtual
 machines lack or emulate slowly.
 """
 
@@ -25,8 +25,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from handcal.types import Float64, UInt8
 from handcal_gui.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.cloud.orbit import Direction, Orbit
-from handcal_gui.cloud.splat import rgb, splat
 from handcal_gui.theme import SPACING_PX, colors, number_font
+from handcal_gui.widgets.splat import rgb, splat
 
 _RAD_PER_PX = 0.01
 _ZOOM_PER_NOTCH = 1.2

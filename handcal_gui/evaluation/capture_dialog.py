@@ -16,17 +16,17 @@ from handcal.lab.evaluate.cube_folder import CapturePlan, PlannedCapture, missin
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.station.doctor import Finding, Health
-from handcal_gui.camera.live_cameras import LiveCameras
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation.capture_list import CaptureList
 from handcal_gui.evaluation.cube import capture_plan, read_cube_and_grid
 from handcal_gui.evaluation.entries import CubeEntries
 from handcal_gui.evaluation.preparation import PreparationDialog
-from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, named, paragraph, whole_number
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.sentence import sentence
 
 _FIRST_SIZE = QSize(1120, 760)

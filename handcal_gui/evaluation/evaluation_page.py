@@ -16,11 +16,11 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.evaluation.results_view import ResultsView
 from handcal_gui.evaluation.work import Evaluation, Outcome, Standing
-from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
 
 
 @dataclass(frozen=True, slots=True, eq=False)

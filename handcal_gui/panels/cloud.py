@@ -16,12 +16,12 @@ from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.cloud.cloud_view import CloudView
 from handcal_gui.cloud.orbit import Direction
-from handcal_gui.cloud.splat import rgb
-from handcal_gui.panels.missing import what_is_missing
-from handcal_gui.results.residual_scale import ResidualScale, residual_colors
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.missing import what_is_missing
 from handcal_gui.widgets.number_label import UNKNOWN
+from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
+from handcal_gui.widgets.splat import rgb
 
 _EMPTY = "The hand's cloud will appear here. Hold a hand up before the depth camera."
 _FROM_CAMERA = "mm from the depth camera"

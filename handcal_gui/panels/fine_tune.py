@@ -24,12 +24,12 @@ from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
-from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.tuning.eye_shift_editor import EyeShiftEditor
 from handcal_gui.tuning.shift_history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.tuning.shift_stream import Arrival, ShiftStream
 from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 _STEPS_MM = (0.1, 0.5, 1.0)

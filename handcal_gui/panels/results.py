@@ -14,7 +14,10 @@ from handcal.types import EYES, Alignment, Rig
 from handcal_gui.results.compare_tab import CompareTab
 from handcal_gui.results.convergence_plot import ConvergencePlot
 from handcal_gui.results.residuals_tab import ResidualsTab
-from handcal_gui.results.rows import (
+from handcal_gui.results.verdict_card import VerdictCard
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.number_table import NumberTable, rows_as_text
+from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     NOTHING,
     PHI,
@@ -23,9 +26,6 @@ from handcal_gui.results.rows import (
     result_rows,
     verdict_rows,
 )
-from handcal_gui.results.verdict_card import VerdictCard
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 
 _EMPTY = (
     "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve: then each eye's "

@@ -17,9 +17,11 @@ from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal_gui.records.notes_editor import NotesEditor
-from handcal_gui.records.record_table import RecordTable
-from handcal_gui.records.record_tabs import RecordTabs
-from handcal_gui.records.session_rows import (
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.record_tabs import RecordTabs
+from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     TRIAL_COLUMNS,
     Deletion,
@@ -28,10 +30,8 @@ from handcal_gui.records.session_rows import (
     trial_rows,
     trials_id,
 )
-from handcal_gui.records.undo_strip import UndoStrip
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.times import local_time
+from handcal_gui.widgets.undo_strip import UndoStrip
 
 
 class SessionPanel(QWidget):

@@ -21,9 +21,13 @@ from handcal.session.trial import summarise
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
-from handcal_gui.records.record_table import RecordTable
-from handcal_gui.records.record_tabs import RecordTabs
-from handcal_gui.records.session_rows import (
+from handcal_gui.records.trial_plot import TrialPlot
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.record_tabs import RecordTabs
+from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.widgets.session_rows import (
     STATISTICS_COLUMNS,
     TRIAL_COLUMNS,
     deletions,
@@ -32,11 +36,7 @@ from handcal_gui.records.session_rows import (
     trial_rows,
     trials_id,
 )
-from handcal_gui.records.trial_plot import TrialPlot
-from handcal_gui.records.undo_strip import UndoStrip
-from handcal_gui.results.rows import EYE_NAMES
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.undo_strip import UndoStrip
 
 _HOW = (
     "Fine-tune φ until the drawn target covers the real one, then record: a trial is by how much "

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QWidget
 from handcal.display import TARGET_DEPTHS_M
 from handcal.session.trial import Trial, TrialStatistics
 from handcal.types import EYES, Eye, Float64
-from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.widgets.plots import Plot
+from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _SIGNS: dict[Eye, tuple[str, float]] = {"left": ("o", -0.012), "right": ("t1", 0.012)}
 """Symbol, and metres beside the distance so that the eyes do not hide each other."""

@@ -18,9 +18,9 @@ from PySide6.QtWidgets import (
 
 from handcal.register.results import Results
 from handcal.types import METHODS, Method, Rig
-from handcal_gui.results.rows import comparison_rows
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.result_rows import comparison_rows
 
 _MEANINGS: Mapping[Method, str] = {
     "paper": "as published by Hu et al. 2021; slow.",

@@ -8,8 +8,8 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
-from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.widgets.plots import Plot
+from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _SYMBOLS = {"left": "o", "right": "s"}
 _MAX_SYMBOLS = 60

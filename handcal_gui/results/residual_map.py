@@ -8,9 +8,9 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QWidget
 
 from handcal.types import Float64
-from handcal_gui.results.residual_scale import LARGEST_MM, residual_ramp
 from handcal_gui.theme import colors
 from handcal_gui.widgets.plots import Plot
+from handcal_gui.widgets.residual_scale import LARGEST_MM, residual_ramp
 
 _SHADES = 32
 

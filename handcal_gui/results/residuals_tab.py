@@ -12,8 +12,8 @@ from handcal.geometry import transform
 from handcal.register.results import Results
 from handcal.types import Alignment, Eye, EyeShift
 from handcal_gui.results.residual_map import ResidualMap
-from handcal_gui.results.rows import EYE_NAMES
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.result_rows import EYE_NAMES
 
 
 class ResidualsTab(QWidget):

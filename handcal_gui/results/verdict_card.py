@@ -7,8 +7,8 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 
 from handcal.types import Eye, Verdict
-from handcal_gui.results.rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX, colors, scale_font
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
 _ROLES = {"accept": "good", "repeat": "warning", "implausible": "red"}

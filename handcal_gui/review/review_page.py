@@ -9,10 +9,10 @@ from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWi
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal_gui.results.rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.numbers import counted
+from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
 
 

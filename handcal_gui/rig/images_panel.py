@@ -17,10 +17,10 @@ from handcal_gui.rig.shot_list import ShotList
 from handcal_gui.rig.shot_view import ShotView
 from handcal_gui.rig.shots import Shot, look
 from handcal_gui.rig.solve import Solved
-from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
 
 
 class ImagesPanel(QWidget):

@@ -13,10 +13,10 @@ from handcal.types import Origin
 from handcal_gui.engine.jobs import IsCancelled, Report
 from handcal_gui.rig.rows import COLUMNS
 from handcal_gui.rig.solve import Solved
-from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import main_button
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.times import local_time
 

@@ -16,14 +16,14 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.views import View, view
 from handcal.station.doctor import Finding, Health
-from handcal_gui.camera.live_cameras import LiveCameras
-from handcal_gui.camera.live_images import Images
 from handcal_gui.engine.jobs import IsCancelled, Report
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.running.job_bar import JobBar
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, named
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.live_cameras import LiveCameras
+from handcal_gui.widgets.live_images import Images
 
 
 class TakeDialog(QDialog):

@@ -13,11 +13,11 @@ from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment
 from handcal_gui.cloud.cloud_view import CloudView
-from handcal_gui.cloud.splat import rgb
 from handcal_gui.panels.cloud import CloudPanel
-from handcal_gui.results.residual_scale import ResidualScale, residual_colors
 from handcal_gui.theme import colors
 from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
+from handcal_gui.widgets.splat import rgb
 
 MakeSnapshot = Callable[..., Snapshot]
 

@@ -17,7 +17,7 @@ from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import Rig
 from handcal_gui.panels.session import SessionPanel
-from handcal_gui.records.record_table import RecordTable
+from handcal_gui.widgets.record_table import RecordTable
 
 
 @pytest.fixture

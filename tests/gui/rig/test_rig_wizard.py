@@ -20,7 +20,7 @@ from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import WorkFolder
-from handcal_gui.running.job_bar import JobBar
+from handcal_gui.widgets.job_bar import JobBar
 
 BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 

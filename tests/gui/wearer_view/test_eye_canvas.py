@@ -7,9 +7,9 @@ from pytestqt.qtbot import QtBot
 from handcal.rig.example import example_rig
 from handcal.station.wearer_view import EyeView, see
 from handcal.types import Float64, UInt8
-from handcal_gui.cloud.splat import rgb
 from handcal_gui.theme import colors
 from handcal_gui.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.widgets.splat import rgb
 
 DISPLAY = example_rig().eyes["left"]
 ANGLE_RAD = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)

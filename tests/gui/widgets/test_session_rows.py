@@ -11,7 +11,7 @@ from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial, summarise
 from handcal.types import Alignment, Eye
-from handcal_gui.records.session_rows import (
+from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     STATISTICS_COLUMNS,
     TRIAL_COLUMNS,

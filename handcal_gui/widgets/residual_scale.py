@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.register.verdict import VerdictSettings
 from handcal.types import Float64, UInt8
-from handcal_gui.cloud.splat import rgb
 from handcal_gui.theme import SPACING_PX, colors, is_dark
+from handcal_gui.widgets.splat import rgb
 
 LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
 """The colours end where the verdict would refuse such an rms, so that pictures compare."""

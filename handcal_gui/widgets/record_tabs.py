@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QTabWidget, QToolButton, QWidget
 
-from handcal_gui.records.record_table import RecordTable
+from handcal_gui.widgets.record_table import RecordTable
 
 
 class RecordTabs(QTabWidget):

@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.records.record_table import Column, RecordTable
+from handcal_gui.widgets.record_table import Column, RecordTable
 
 COLUMNS = (Column("No.", "Number"), Column("What", "Anything", is_number=False))
 

@@ -13,10 +13,10 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.types import Frame
-from handcal_gui.camera.live_images import Images, LiveImages
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.live_images import Images, LiveImages
 from handcal_gui.widgets.path_field import PathField
 
 _RECORDED = "recorded"

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QImage
 
-from handcal_gui.cloud.splat import rgb, splat
+from handcal_gui.widgets.splat import rgb, splat
 
 RED, BLUE, BLACK = (255, 0, 0), (0, 0, 255), (0, 0, 0)
 

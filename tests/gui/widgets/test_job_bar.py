@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError, FileError
 from handcal_gui.engine.jobs import IsCancelled, Report
-from handcal_gui.running.job_bar import JobBar
+from handcal_gui.widgets.job_bar import JobBar
 
 
 @pytest.fixture

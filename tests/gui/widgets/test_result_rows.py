@@ -9,7 +9,8 @@ import pytest
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.register.verdict import expected_error_arcmin
 from handcal.types import EYES, Alignment, EyeShift, Rig
-from handcal_gui.results.rows import (
+from handcal_gui.widgets.number_table import Row
+from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
     alignment_rows,
@@ -18,7 +19,6 @@ from handcal_gui.results.rows import (
     result_rows,
     verdict_rows,
 )
-from handcal_gui.widgets.number_table import Row
 
 
 def cells(rows: Sequence[Row], label: str) -> tuple[str, ...]:

@@ -14,10 +14,10 @@ from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.session.trial import ErrorStatistics, TrialStatistics
 from handcal.types import EYES, Eye, EyeShift
-from handcal_gui.records.record_table import Column
-from handcal_gui.results.rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed
+from handcal_gui.widgets.record_table import Column
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
 
 Kind: TypeAlias = Literal["alignment", "trial"]
