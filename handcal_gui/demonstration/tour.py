@@ -12,7 +12,7 @@ from handcal.errors import FileError
 from handcal_gui.demonstration.screenshots import Screenshots
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
-from handcal_gui.panels.camera import Mode
+from handcal_gui.panels.camera.panel import Mode
 from handcal_gui.program import Program
 
 _LOOK_MS = 600

@@ -27,8 +27,8 @@ from handcal.io.files import write_atomic
 from handcal.station.procedure import Observation
 from handcal.station.snapshot import Snapshot
 from handcal.types import Frame
-from handcal_gui.camera.depth_scale import DepthColors, DepthLegend
-from handcal_gui.camera.hand_overlay import HandOverlay
+from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
+from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView

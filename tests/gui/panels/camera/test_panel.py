@@ -15,8 +15,8 @@ from handcal.errors import FileError
 from handcal.geometry import rigid
 from handcal.hand.settings import SegmentSettings
 from handcal.station.snapshot import Snapshot
-from handcal_gui.camera.depth_scale import DepthLegend
-from handcal_gui.panels.camera import CameraPanel, Mode
+from handcal_gui.panels.camera.depth_scale import DepthLegend
+from handcal_gui.panels.camera.panel import CameraPanel, Mode
 from handcal_gui.widgets.image_view import ImageView
 
 from ..conftest import NOW_NS, Shots

@@ -8,7 +8,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.hand.overlay import contour_px
 from handcal.types import UInt8
-from handcal_gui.camera.hand_overlay import HandOverlay, contour_runs
+from handcal_gui.panels.camera.hand_overlay import HandOverlay, contour_runs
 
 from ..conftest import Shots
 

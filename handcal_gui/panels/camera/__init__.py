@@ -1,0 +1,1 @@
+"""The camera panel: colour, depth and the segmented hand."""
