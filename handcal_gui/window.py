@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 
 from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.camera.panel import CameraPanel
-from handcal_gui.panels.cloud import CloudPanel
+from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel
 from handcal_gui.panels.link import LinkPanel
 from handcal_gui.panels.results import ResultsPanel

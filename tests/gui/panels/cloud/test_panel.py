@@ -12,8 +12,8 @@ from handcal.register.results import Results
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment
-from handcal_gui.cloud.cloud_view import CloudView
-from handcal_gui.panels.cloud import CloudPanel
+from handcal_gui.panels.cloud.cloud_view import CloudView
+from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.theme import colors
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors

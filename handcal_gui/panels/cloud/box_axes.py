@@ -11,7 +11,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
 from handcal.types import Float64
-from handcal_gui.cloud.orbit import Orbit
+from handcal_gui.panels.cloud.orbit import Orbit
 from handcal_gui.theme import SPACING_PX, colors
 
 NAMES = ("right", "down", "away")

@@ -14,8 +14,8 @@ from handcal.register.pairs import matched_pairs
 from handcal.station.procedure import PlacedHand
 from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
-from handcal_gui.cloud.cloud_view import CloudView
-from handcal_gui.cloud.orbit import Direction
+from handcal_gui.panels.cloud.cloud_view import CloudView
+from handcal_gui.panels.cloud.orbit import Direction
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.missing import what_is_missing

@@ -23,8 +23,8 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.types import Float64, UInt8
-from handcal_gui.cloud.box_axes import Box, draw_box, draw_scale
-from handcal_gui.cloud.orbit import Direction, Orbit
+from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
+from handcal_gui.panels.cloud.orbit import Direction, Orbit
 from handcal_gui.theme import SPACING_PX, colors, number_font
 from handcal_gui.widgets.splat import rgb, splat
 

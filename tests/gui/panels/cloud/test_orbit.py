@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handcal_gui.cloud.orbit import Direction, Orbit
+from handcal_gui.panels.cloud.orbit import Direction, Orbit
 
 RIGHT, DOWN, AWAY = np.eye(3)
 

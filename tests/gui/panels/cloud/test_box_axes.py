@@ -4,8 +4,8 @@ from PySide6.QtCore import QPointF
 from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.cloud.box_axes import Box, draw_box, draw_scale
-from handcal_gui.cloud.orbit import Direction, Orbit
+from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
+from handcal_gui.panels.cloud.orbit import Direction, Orbit
 
 SIZE = 400
 

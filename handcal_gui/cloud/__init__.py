@@ -1,1 +1,0 @@
-"""Parts of the hand cloud panel: points in space, drawn without OpenGL."""
