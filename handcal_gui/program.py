@@ -30,7 +30,7 @@ from handcal_gui.panels.results import ResultsPanel
 from handcal_gui.panels.rotation import RotationPanel
 from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel
-from handcal_gui.panels.wearer_view import WearerViewPanel
+from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review import Review

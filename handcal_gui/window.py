@@ -32,7 +32,7 @@ from handcal_gui.panels.results import ResultsPanel
 from handcal_gui.panels.rotation import RotationPanel
 from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel
-from handcal_gui.panels.wearer_view import WearerViewPanel
+from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.banner import Banner

@@ -10,8 +10,8 @@ from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.wearer_view import EyeView
 from handcal.types import EYES, Eye
-from handcal_gui.panels.wearer_view import WearerViewPanel
-from handcal_gui.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.widgets.legend import LegendEntry
 
 MakeSnapshot = Callable[..., Snapshot]

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidg
 from handcal.station.snapshot import Snapshot
 from handcal.station.wearer_view import EyeView, Overlay
 from handcal.types import EYES, Eye
+from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.wearer_view.eye_canvas import LINES, EyeCanvas
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.missing import what_is_missing
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel

@@ -7,8 +7,8 @@ from pytestqt.qtbot import QtBot
 from handcal.rig.example import example_rig
 from handcal.station.wearer_view import EyeView, see
 from handcal.types import Float64, UInt8
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.theme import colors
-from handcal_gui.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.widgets.splat import rgb
 
 DISPLAY = example_rig().eyes["left"]

@@ -1,1 +1,0 @@
-"""Parts of the wearer's view panel."""
