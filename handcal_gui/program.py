@@ -27,7 +27,7 @@ from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel
 from handcal_gui.panels.link import LinkPanel
 from handcal_gui.panels.results import ResultsPanel
-from handcal_gui.panels.rotation import RotationPanel
+from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel

@@ -6,7 +6,7 @@ from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 from handcal_gui import theme
-from handcal_gui.rotation.dial import RotationDial
+from handcal_gui.panels.rotation.dial import RotationDial
 
 LIMIT_RAD = float(np.radians(9.0))
 

@@ -6,7 +6,7 @@ from pytestqt.qtbot import QtBot
 from scipy.spatial.transform import Rotation
 
 from handcal.types import Float64
-from handcal_gui.rotation.turning_hand import TurningHand
+from handcal_gui.panels.rotation.turning_hand import TurningHand
 
 NEAREST = {"x": (0, 0, -1), "y": (0, 0, -1), "z": (0, -1, 0)}
 """Where the arrow's middle is: on the side of the wearer, or at the top."""

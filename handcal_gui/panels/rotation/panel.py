@@ -12,8 +12,8 @@ from handcal.register.guard import turn_advice
 from handcal.station.procedure import Observation, PlacedHand, State
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.types import Float64
-from handcal_gui.rotation.dial import RotationDial
-from handcal_gui.rotation.turning_hand import TurningHand
+from handcal_gui.panels.rotation.dial import RotationDial
+from handcal_gui.panels.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence

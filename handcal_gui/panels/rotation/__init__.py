@@ -1,0 +1,1 @@
+"""The rotation panel: how far the hand is rotated from the cursor."""
