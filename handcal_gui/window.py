@@ -28,7 +28,7 @@ from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune import FineTunePanel
 from handcal_gui.panels.link import LinkPanel
-from handcal_gui.panels.results import ResultsPanel
+from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session import SessionPanel
 from handcal_gui.panels.trials import TrialsPanel

@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject
 from handcal.register.results import SolveSettings, solve_session
 from handcal.types import Alignment, Method, Rig
 from handcal_gui.engine.jobs import IsCancelled, Job, Report
-from handcal_gui.panels.results import ResultsPanel
+from handcal_gui.panels.results.panel import ResultsPanel
 
 
 class Comparison(QObject):

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
 from handcal.geometry import transform
 from handcal.register.results import Results
 from handcal.types import Alignment, Eye, EyeShift
-from handcal_gui.results.residual_map import ResidualMap
+from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.result_rows import EYE_NAMES
 

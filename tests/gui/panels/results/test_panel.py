@@ -17,11 +17,11 @@ from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig, Verdict
-from handcal_gui.panels.results import ResultsPanel
-from handcal_gui.results.compare_tab import CompareTab
-from handcal_gui.results.convergence_plot import ConvergencePlot
-from handcal_gui.results.residual_map import ResidualMap
-from handcal_gui.results.verdict_card import VerdictCard
+from handcal_gui.panels.results.compare_tab import CompareTab
+from handcal_gui.panels.results.convergence_plot import ConvergencePlot
+from handcal_gui.panels.results.panel import ResultsPanel
+from handcal_gui.panels.results.residual_map import ResidualMap
+from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.widgets.number_table import NumberTable
 
 Make = Callable[..., Snapshot]

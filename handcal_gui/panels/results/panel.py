@@ -11,10 +11,10 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, Q
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig
-from handcal_gui.results.compare_tab import CompareTab
-from handcal_gui.results.convergence_plot import ConvergencePlot
-from handcal_gui.results.residuals_tab import ResidualsTab
-from handcal_gui.results.verdict_card import VerdictCard
+from handcal_gui.panels.results.compare_tab import CompareTab
+from handcal_gui.panels.results.convergence_plot import ConvergencePlot
+from handcal_gui.panels.results.residuals_tab import ResidualsTab
+from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (

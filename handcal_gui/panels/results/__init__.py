@@ -1,0 +1,1 @@
+"""The results panel: eye shifts, residuals and convergence."""

@@ -1,1 +1,0 @@
-"""What the results panel is made of."""
