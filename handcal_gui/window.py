@@ -26,7 +26,7 @@ from PySide6.QtWidgets import (
 from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
-from handcal_gui.panels.fine_tune import FineTunePanel
+from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.link import LinkPanel
 from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.rotation.panel import RotationPanel

@@ -25,9 +25,9 @@ from handcal.register.results import Results
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
-from handcal_gui.panels.fine_tune import FineTunePanel
-from handcal_gui.tuning.shift_history import Shifts, same_shifts
-from handcal_gui.tuning.shift_stream import PERIOD_MS, SETTLE_MS
+from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
+from handcal_gui.panels.fine_tune.panel import FineTunePanel
+from handcal_gui.panels.fine_tune.stream import PERIOD_MS, SETTLE_MS
 
 OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 Show = Callable[..., None]

@@ -24,10 +24,10 @@ from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
+from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
+from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
+from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
 from handcal_gui.theme import SPACING_PX, icon
-from handcal_gui.tuning.eye_shift_editor import EyeShiftEditor
-from handcal_gui.tuning.shift_history import ShiftHistory, Shifts, moved, same_shifts
-from handcal_gui.tuning.shift_stream import Arrival, ShiftStream
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.result_rows import EYE_NAMES
 

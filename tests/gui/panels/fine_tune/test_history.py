@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.types import EYES
-from handcal_gui.tuning.shift_history import ShiftHistory, Shifts, moved, same_shifts
+from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 
 LIMIT_M = 0.03
 SHIFTS = st.builds(

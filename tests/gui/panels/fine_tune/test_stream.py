@@ -10,8 +10,8 @@ from pytestqt.qtbot import QtBot
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES
-from handcal_gui.tuning.shift_history import Shifts, same_shifts
-from handcal_gui.tuning.shift_stream import PERIOD_MS, SETTLE_MS, Arrival, ShiftStream
+from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
+from handcal_gui.panels.fine_tune.stream import PERIOD_MS, SETTLE_MS, Arrival, ShiftStream
 
 MakeSnapshot = Callable[..., Snapshot]
 

@@ -8,7 +8,7 @@ from enum import Enum
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.station.snapshot import Snapshot
-from handcal_gui.tuning.shift_history import Shifts, same_shifts
+from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 
 PERIOD_MS = 33
 SETTLE_MS = 700

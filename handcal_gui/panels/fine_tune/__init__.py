@@ -1,0 +1,1 @@
+"""The fine-tuning panel: φ set by hand."""

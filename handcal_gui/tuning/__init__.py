@@ -1,1 +1,0 @@
-"""Parts of the fine-tune panel: φ edited, undone, streamed."""
