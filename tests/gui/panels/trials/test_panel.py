@@ -16,8 +16,8 @@ from handcal.session.trial import make_trial
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import Eye, Rig
-from handcal_gui.panels.trials import TrialsPanel
-from handcal_gui.records.trial_plot import TrialPlot
+from handcal_gui.panels.trials.panel import TrialsPanel
+from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
 

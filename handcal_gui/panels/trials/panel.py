@@ -21,7 +21,7 @@ from handcal.session.trial import summarise
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
-from handcal_gui.records.trial_plot import TrialPlot
+from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable

@@ -1,0 +1,1 @@
+"""The trials panel: user-test trials and their errors."""
