@@ -30,7 +30,7 @@ from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.link import LinkPanel
 from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.rotation.panel import RotationPanel
-from handcal_gui.panels.session import SessionPanel
+from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.start.start_page import StartPage

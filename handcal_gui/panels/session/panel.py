@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal_gui.records.notes_editor import NotesEditor
+from handcal_gui.panels.session.notes_editor import NotesEditor
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.record_table import RecordTable

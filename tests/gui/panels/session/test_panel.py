@@ -16,7 +16,7 @@ from handcal.session.trial import make_trial
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import Rig
-from handcal_gui.panels.session import SessionPanel
+from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.record_table import RecordTable
 
 

@@ -1,0 +1,1 @@
+"""The session panel: alignments, events and notes."""

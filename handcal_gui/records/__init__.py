@@ -1,1 +1,0 @@
-"""Tables of alignments and trials, for the session and trials panels."""
