@@ -25,7 +25,7 @@ from handcal_gui.evaluation.window import EvaluationWindow
 from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
-from handcal_gui.panels.link import LinkPanel
+from handcal_gui.panels.link.panel import LinkPanel
 from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel

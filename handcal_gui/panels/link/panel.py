@@ -18,9 +18,9 @@ from PySide6.QtWidgets import (
 from handcal.link.rates import link_rates
 from handcal.link.server import LinkStatistics
 from handcal.station.snapshot import Snapshot
-from handcal_gui.link.link_history import LinkHistory
-from handcal_gui.link.link_table import RATES_S, LinkTable
-from handcal_gui.link.pairing_box import PairingBox
+from handcal_gui.panels.link.link_history import LinkHistory
+from handcal_gui.panels.link.link_table import RATES_S, LinkTable
+from handcal_gui.panels.link.pairing_box import PairingBox
 from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.sentence import sentence
 

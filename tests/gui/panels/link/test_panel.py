@@ -11,8 +11,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.link.wire import Rejection
 from handcal.station.snapshot import Snapshot
-from handcal_gui.link.link_table import REJECTIONS
-from handcal_gui.panels.link import LinkPanel
+from handcal_gui.panels.link.link_table import REJECTIONS
+from handcal_gui.panels.link.panel import LinkPanel
 from handcal_gui.widgets.number_label import NumberLabel
 from handcal_gui.widgets.plots import Plot
 

@@ -1,0 +1,1 @@
+"""The link panel: the connection to the headset."""
