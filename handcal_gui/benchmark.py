@@ -41,9 +41,9 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import Float64, Frame
 from handcal_gui.app import keep_window_quick
+from handcal_gui.pages.wizard.steps import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
-from handcal_gui.wizard.steps import Action
 
 _RATE_HZ = 30.0
 _HEARTBEAT_MS = 5

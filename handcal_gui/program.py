@@ -22,6 +22,10 @@ from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.evaluation.entries import EvaluationEntries
 from handcal_gui.evaluation.offers import make_offers
 from handcal_gui.evaluation.window import EvaluationWindow
+from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.pages.start.example import copy_example
+from handcal_gui.pages.start.start_page import StartPage
+from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
@@ -34,15 +38,11 @@ from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.review.compare import Comparison
 from handcal_gui.review.review import Review
-from handcal_gui.review.review_page import ReviewPage
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import WorkFolder
 from handcal_gui.running.live import Live
-from handcal_gui.start.example import copy_example
-from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
-from handcal_gui.wizard.wizard import WizardPanel
 
 _KEYS = (
     ("Space", "What the wizard's large button says"),

@@ -24,6 +24,8 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.station.snapshot import Snapshot
+from handcal_gui.pages.start.start_page import StartPage
+from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
@@ -33,10 +35,8 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.start.start_page import StartPage
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.wizard.wizard import WizardPanel
 
 Page = Literal["start", "live", "review"]
 _LAYOUT_VERSION = 1

@@ -14,8 +14,8 @@ from handcal_gui.demonstration.autopilot import Autopilot
 from handcal_gui.demonstration.screenshots import Screenshots
 from handcal_gui.demonstration.tour import Tour
 from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.pages.wizard.steps import Step, View
 from handcal_gui.program import Program
-from handcal_gui.wizard.steps import Step, View
 
 
 class Demonstration(QObject):

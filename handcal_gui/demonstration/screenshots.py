@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder
-from handcal_gui.wizard.steps import STEPS, Action, Step, View
+from handcal_gui.pages.wizard.steps import STEPS, Action, Step, View
 
 
 class Screenshots:

@@ -16,10 +16,10 @@ from handcal.station.procedure import Calibration, State
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import Command, Stream
+from handcal_gui.pages.wizard.steps import Action, EyePlan, Step, Wizard
+from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.review.compare import Comparison
 from handcal_gui.window import MainWindow, Panel
-from handcal_gui.wizard.steps import Action, EyePlan, Step, Wizard
-from handcal_gui.wizard.wizard import WizardPanel
 
 _POLL_MS = 4
 _PANELS_OF_STEPS = {

@@ -18,7 +18,7 @@ import pytest
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.session.session import Session, SessionRecord
-from handcal_gui.start.session_entries import find_offers
+from handcal_gui.pages.start.session_entries import find_offers
 from tests.helpers import ROOT, Patience
 
 ARTEFACTS = ROOT / "artefacts"

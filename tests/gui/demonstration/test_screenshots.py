@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
 from handcal_gui.demonstration.screenshots import Screenshots
-from handcal_gui.wizard.steps import Action, Offer, Step, View
+from handcal_gui.pages.wizard.steps import Action, Offer, Step, View
 
 
 @pytest.fixture

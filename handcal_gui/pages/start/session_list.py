@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.start.session_entries import Entry
+from handcal_gui.pages.start.session_entries import Entry
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.fields import button, named, paragraph
 

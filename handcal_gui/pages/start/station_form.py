@@ -13,9 +13,9 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
-from handcal_gui.start.advanced_fields import AdvancedFields
-from handcal_gui.start.camera_field import CameraField
-from handcal_gui.start.headset_field import HeadsetField
+from handcal_gui.pages.start.advanced_fields import AdvancedFields
+from handcal_gui.pages.start.camera_field import CameraField
+from handcal_gui.pages.start.headset_field import HeadsetField
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import beside, button
 from handcal_gui.widgets.finding_line import FindingLine

@@ -9,7 +9,7 @@ from pathlib import Path
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.types import Alignment
-from handcal_gui.start.session_entries import find_offers
+from handcal_gui.pages.start.session_entries import find_offers
 
 
 def make(folder: Path, wearer: str, alignments: Sequence[Alignment], *, is_done: bool) -> Path:

@@ -10,8 +10,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal_gui.wizard.steps import Action, Step, Wizard
-from handcal_gui.wizard.wizard import WizardPanel
+from handcal_gui.pages.wizard.steps import Action, Step, Wizard
+from handcal_gui.pages.wizard.wizard import WizardPanel
 
 Maker = Callable[..., Snapshot]
 

@@ -13,9 +13,9 @@ from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import Part, is_ready
 from handcal.station.settings import StationSettings
 from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.pages.start.card import Card
+from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
-from handcal_gui.start.card import Card
-from handcal_gui.start.station_form import StationForm
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, named, paragraph
 

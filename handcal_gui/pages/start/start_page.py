@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QVBoxLayout, QWi
 
 from handcal.station.preflight import check_station
 from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.pages.start.card import Card
+from handcal_gui.pages.start.new_calibration import Check, NewCalibration
+from handcal_gui.pages.start.session_entries import Offers, find_offers
+from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import Preferences
-from handcal_gui.start.card import Card
-from handcal_gui.start.new_calibration import Check, NewCalibration
-from handcal_gui.start.session_entries import Offers, find_offers
-from handcal_gui.start.session_list import SessionList
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button
 

@@ -32,9 +32,9 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
+from handcal_gui.pages.start.session_entries import Entry, Offers
+from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
-from handcal_gui.start.session_entries import Entry, Offers
-from handcal_gui.start.start_page import StartPage
 from handcal_gui.widgets.path_field import PathField
 
 KEY = "0123456789abcdef0123456789abcdef"

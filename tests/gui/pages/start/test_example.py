@@ -9,7 +9,7 @@ import pytest
 from handcal.errors import FileError
 from handcal.session.session import Session
 from handcal.types import EYES
-from handcal_gui.start.example import copy_example
+from handcal_gui.pages.start.example import copy_example
 
 
 def test_the_example_is_copied_once_and_is_complete(tmp_path: Path) -> None:

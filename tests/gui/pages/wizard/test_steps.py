@@ -11,7 +11,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye
-from handcal_gui.wizard.steps import (
+from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
     EyePlan,
