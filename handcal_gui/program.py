@@ -17,6 +17,9 @@ from handcal.session.session import SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui.app import FIRST_SIZE
+from handcal_gui.control.compare import Comparison
+from handcal_gui.control.live import Live
+from handcal_gui.control.review import Review
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.evaluation.entries import EvaluationEntries
@@ -36,11 +39,8 @@ from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
-from handcal_gui.review.compare import Comparison
-from handcal_gui.review.review import Review
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.rig.work import WorkFolder
-from handcal_gui.running.live import Live
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
 

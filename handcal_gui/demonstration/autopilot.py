@@ -8,9 +8,9 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 
 from handcal.station.snapshot import Snapshot
+from handcal_gui.control.live import Live
 from handcal_gui.pages.wizard.steps import Action, View
 from handcal_gui.pages.wizard.wizard import WizardPanel
-from handcal_gui.running.live import Live
 
 _LOOK_S = 0.7
 _PATIENCE_S = 120.0

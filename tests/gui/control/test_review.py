@@ -189,7 +189,7 @@ def test_a_comparison_is_shown_or_cancelled(
     qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
 
     solver = Solver()
-    monkeypatch.setattr("handcal_gui.review.compare.solve_session", solver)
+    monkeypatch.setattr("handcal_gui.control.compare.solve_session", solver)
     start.click()
     assert solver.began.wait(PATIENCE_MS / 1000)
     cancel.click()
@@ -205,7 +205,7 @@ def test_it_can_be_compared_and_closed_at_once(
     program.open_session(record.path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     solver = Solver()
-    monkeypatch.setattr("handcal_gui.review.compare.solve_session", solver)
+    monkeypatch.setattr("handcal_gui.control.compare.solve_session", solver)
     program.window.panels.results.compare_requested.emit("paper")
     program.window.close()
     assert solver.was_cancelled.is_set()

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QProgressDialog
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
+from handcal_gui.control.compare import Comparison
 from handcal_gui.engine.jobs import IsCancelled, Job, Report
 from handcal_gui.pages.review_page import ReviewPage
-from handcal_gui.review.compare import Comparison
 from handcal_gui.window import MainWindow
 
 _PATIENCE_MS = 500

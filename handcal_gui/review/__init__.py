@@ -1,1 +1,0 @@
-"""A stored session: read, solved again, compared, shown."""
