@@ -22,9 +22,6 @@ from handcal_gui.control.live import Live
 from handcal_gui.control.review import Review
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
-from handcal_gui.evaluation.entries import EvaluationEntries
-from handcal_gui.evaluation.offers import make_offers
-from handcal_gui.evaluation.window import EvaluationWindow
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.pages.start.start_page import StartPage
@@ -39,10 +36,13 @@ from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
-from handcal_gui.rig.wizard import RigWizard
-from handcal_gui.rig.work import WorkFolder
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
+from handcal_gui.windows.evaluation.entries import EvaluationEntries
+from handcal_gui.windows.evaluation.offers import make_offers
+from handcal_gui.windows.evaluation.window import EvaluationWindow
+from handcal_gui.windows.rig.wizard import RigWizard
+from handcal_gui.windows.rig.work import WorkFolder
 
 _KEYS = (
     ("Space", "What the wizard's large button says"),

@@ -1,0 +1,1 @@
+"""Windows of their own: rig calibration and evaluation."""

@@ -1,0 +1,210 @@
+"""One evaluation: what to do, how far it is, and what it came to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from handcal.errors import HandcalError
+from handcal.station.doctor import Finding, Health
+from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import main_button, paragraph
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.windows.evaluation.preparation import Preparation, PreparationButton
+from handcal_gui.windows.evaluation.results_view import ResultsView
+from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Standing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offer:
+    """What can be evaluated.
+
+    Attributes
+    ----------
+    title : str
+    question : str
+        What it answers, and how long it takes.
+    evaluation : Evaluation
+    form : callable
+        Makes the fields for its entries.
+    preparation : Preparation, optional
+        Makes what is evaluated.
+    """
+
+    title: str
+    question: str
+    evaluation: Evaluation
+    form: Callable[[], EntriesForm]
+    preparation: Preparation | None = None
+
+
+class EvaluationPage(QWidget):
+    """Runs one evaluation in a job, and shows what came of it.
+
+    Parameters
+    ----------
+    offer : Offer
+    entries : object
+        Dataclass, shown first.
+
+    Attributes
+    ----------
+    busy_changed : Signal(bool)
+    form : EntriesForm
+    """
+
+    busy_changed = Signal(bool)
+
+    def __init__(self, offer: Offer, entries: Any, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._evaluation = offer.evaluation
+        self._entries = entries
+        self._standing: Standing | None = None
+        self._failure = self._waits_for = ""
+        self.form = offer.form()
+        self.form.show_entries(entries)
+        self._button = main_button("run", "Run")
+        self._prepare = PreparationButton(offer.preparation) if offer.preparation else None
+        self._bar = JobBar()
+        self._found = FindingLine("standing")
+        self._results = ResultsView()
+        self._look = LatestJob(self._stand, self)
+        self._lay_out(offer.question)
+        self.form.changed.connect(self._take_entries)
+        self._button.clicked.connect(self.run)
+        if self._prepare is not None:
+            self._prepare.closed.connect(self._look_anew)
+        self._bar.failed.connect(self._show_failure)
+        self._bar.busy_changed.connect(self._change_busy)
+        self._look.answered.connect(self._take_standing)
+        self._look.failed.connect(self._show_failure)
+
+    @property
+    def entries(self) -> Any:
+        """What is entered."""
+        return self._entries
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it runs."""
+        return self._bar.is_busy
+
+    def run(self) -> None:
+        """Begin, or go on."""
+        entries = self._entries
+        self._failure = ""
+        self._results.show_outcome(None)
+        self._bar.run(
+            "Beginning",
+            lambda tell, is_cancelled: self._evaluation.run(entries, tell, is_cancelled),
+            self._show_outcome,
+        )
+
+    def cancel(self) -> None:
+        """Give up what runs; what is done of a study is kept."""
+        self._bar.cancel()
+
+    def stop(self) -> None:
+        """Give up what runs or is prepared, and wait for its end."""
+        if self._prepare is not None:
+            self._prepare.stop()
+        self._bar.stop()
+        self._look.stop()
+
+    def wait_for(self, title: str) -> None:
+        """Do not run beside another evaluation, which is named; empty for none."""
+        self._waits_for = title
+        self._refresh()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look at the folder anew."""
+        super().showEvent(event)
+        self._ask()
+
+    def _take_entries(self) -> None:
+        self._look_anew(self.form.take(self._entries))
+
+    def _look_anew(self, entries: Any) -> None:
+        self._entries = entries
+        self._failure = ""
+        self._results.show_outcome(None)
+        self._ask()
+
+    def _ask(self) -> None:
+        """Look how it stands; until that is known, nothing can be run."""
+        self._standing = None
+        if not self.is_busy and self.isVisible():
+            self._look.ask(self._entries)
+        self._refresh()
+
+    def _stand(self, entries: Any) -> Standing:
+        try:
+            return self._evaluation.standing(entries)
+        except HandcalError as error:
+            return Standing(Finding("", Health.BROKEN, str(error)))
+
+    def _take_standing(self, entries: Any, standing: Standing) -> None:
+        if entries == self._entries and not self.is_busy:
+            self._standing = standing
+            self._refresh()
+
+    def _show_outcome(self, outcome: Outcome) -> None:
+        self._results.show_outcome(outcome)
+        self._refresh()
+
+    def _show_failure(self, why: str) -> None:
+        self._failure = why
+        self._refresh()
+
+    def _change_busy(self, is_busy: bool) -> None:
+        self.form.setEnabled(not is_busy)
+        self._ask()
+        self.busy_changed.emit(is_busy)
+
+    def _refresh(self) -> None:
+        standing = self._standing
+        if self._prepare is not None:
+            self._prepare.follow(None if self.is_busy else self._entries)
+        can_run = standing is not None and standing.can_run and not self._waits_for
+        self._button.setEnabled(can_run)
+        if standing is not None:
+            self._button.setText(standing.button)
+        if finding := self._finding():
+            self._found.show_finding(finding)
+
+    def _finding(self) -> Finding | None:
+        """Return what is to be said now; None for what is said already."""
+        if self.is_busy:
+            return Finding("", Health.GOOD, "Running")
+        if self._failure:
+            return Finding("", Health.BROKEN, self._failure)
+        if self._waits_for:
+            found = f"{self._waits_for} is running"
+            return Finding("", Health.LIMITED, found, "one runs at a time")
+        if not self._results.is_empty:
+            return Finding("", Health.GOOD, "Done")
+        return self._standing.finding if self._standing else None
+
+    def _lay_out(self, question: str) -> None:
+        row = QHBoxLayout()
+        row.setSpacing(2 * SPACING_PX)
+        row.addWidget(self._button)
+        if self._prepare is not None:
+            row.addWidget(self._prepare)
+        row.addWidget(self._bar, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(paragraph("question", question))
+        layout.addWidget(self.form)
+        layout.addLayout(row)
+        layout.addWidget(self._found)
+        layout.addWidget(self._results, 1)

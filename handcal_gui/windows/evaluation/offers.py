@@ -1,0 +1,180 @@
+"""The four evaluations that the window offers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
+
+from handcal.lab.evaluate.cube_folder import find_captures
+from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
+from handcal.lab.evaluate.user_test_report import user_test_report
+from handcal.lab.study.methods import MethodSettings, methods_study
+from handcal.lab.study.methods_report import methods_report
+from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
+from handcal.lab.study.noise_report import noise_report
+from handcal.lab.study.run import Study
+from handcal.report.document import Report
+from handcal.types import EYES
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import choice, named, whole_number
+from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
+from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
+from handcal_gui.windows.evaluation.cube import evaluate_cube
+from handcal_gui.windows.evaluation.entries import (
+    CubeEntries,
+    MethodEntries,
+    NoiseEntries,
+    UserEntries,
+)
+from handcal_gui.windows.evaluation.evaluation_page import Offer
+from handcal_gui.windows.evaluation.preparation import Preparation
+from handcal_gui.windows.evaluation.work import Checkpoint, GivenData, SimulatedStudy
+
+_MOST_WEARERS, _MOST_SEED, _MOST_PROCESSES = 10_000, 2**31 - 1, 1024
+
+
+def make_offers() -> Mapping[str, Offer]:
+    """Return them by the fields of `EvaluationEntries`."""
+    return {
+        "noise": Offer(
+            "Noise study",
+            "How much rotation and noise do the solvers bear, and when do they leave the paper's "
+            "4 mm? About ten minutes on two cores; a quick look, half a minute.",
+            SimulatedStudy(_noise, noise_report),
+            _noise_form,
+        ),
+        "methods": Offer(
+            "Method comparison",
+            "Which calibration method errs least on the same wearers, and what does it cost them? "
+            "100 wearers take about eleven minutes on two cores.",
+            SimulatedStudy(_methods, methods_report),
+            _methods_form,
+        ),
+        "cube": Offer(
+            "Cube test",
+            "How far is a drawn cube from the real one, as a camera in the eye's place sees it? "
+            "About a minute with rendered captures.",
+            GivenData(_missing_captures, evaluate_cube),
+            _cube_form,
+            Preparation(
+                "Capture…",
+                "Take the captures with a camera; enter the folder for them first.",
+                lambda entries: bool(entries.captures),
+                CaptureDialog,
+            ),
+        ),
+        "users": Offer(
+            "User test",
+            "How far do calibrations miss what their wearers see, over all trials of their "
+            "sessions? A few seconds.",
+            GivenData(_missing_sessions, _users),
+            _users_form,
+        ),
+    }
+
+
+def _noise(entries: NoiseEntries) -> Study:
+    chosen = QUICK_NOISE if entries.size == "quick" else NoiseSettings()
+    return noise_study(replace(chosen, seed=entries.seed))
+
+
+def _methods(entries: MethodEntries) -> Study:
+    return methods_study(MethodSettings(wearers=entries.wearers, seed=entries.seed))
+
+
+def _missing_captures(entries: CubeEntries) -> str:
+    if not entries.captures:
+        return ""
+    folder = Path(entries.captures).expanduser()
+    if not folder.exists():
+        return f"there is no folder {folder} yet: Capture… makes it"
+    find_captures(folder)  # which says what is wrong with it
+    return ""
+
+
+def _missing_sessions(entries: UserEntries) -> str:
+    return "" if entries.sessions else "choose a session, or a folder of sessions"
+
+
+def _users(entries: UserEntries, checkpoint: Checkpoint) -> Report:
+    folder = Path(entries.sessions).expanduser()
+    test = read_user_test([folder], lambda share: checkpoint("Reading sessions", share))
+    return user_test_report(test, evaluate_user_test(test))
+
+
+def _noise_form() -> EntriesForm:
+    size = choice(
+        "size",
+        "Size",
+        {"full": "Full", "quick": "Quick look"},
+        "A quick look's numbers say little.",
+    )
+    return EntriesForm({"size": ("Size", size), **_study_fields()})
+
+
+def _methods_form() -> EntriesForm:
+    wearers = whole_number(
+        "wearers", 2, _MOST_WEARERS, "Simulated wearers, each of whom does all methods."
+    )
+    return EntriesForm({"wearers": ("Wearers", wearers), **_study_fields()})
+
+
+def _cube_form() -> EntriesForm:
+    captures = PathField("Captures", "folder", empty="Rendered by the simulator")
+    captures.setToolTip("POSITION/POSE/real.png and virtual.png, and POSITION/grid.png.")
+    cube = PathField("Cube", "file", "Cubes (*.json)", "cube.json of the captures")
+    camera = PathField("Camera", "file", INTRINSICS_FILES, "camera.json of the captures")
+    camera.setToolTip("Intrinsics of the camera in the eye's place.")
+    rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "The example's")
+    square = whole_number("square", 20, 2000, "Side of the squares of the grid on the display.")
+    square.setSuffix(" px")
+    return EntriesForm(
+        {
+            "captures": ("Captures", captures),
+            "cube": ("Cube", cube),
+            "camera": ("Camera's intrinsics", camera),
+            **_output(),
+            "rig": ("Rig file", rig),
+            "eye": ("Display", choice("eye", "Display", {eye: eye.capitalize() for eye in EYES})),
+            "square_px": ("Grid's squares", square),
+            "seed": ("Seed of the rendering", _seed()),
+        }
+    )
+
+
+def _users_form() -> EntriesForm:
+    sessions = PathField("Sessions", "folder")
+    sessions.setToolTip("The folder of one session, or one that holds sessions.")
+    return EntriesForm({"sessions": ("Sessions", sessions), **_output()})
+
+
+def _study_fields() -> dict[str, tuple[str, QWidget]]:
+    processes: QSpinBox = whole_number(
+        "processes", 0, _MOST_PROCESSES, "On this computer; more than its cores are no quicker."
+    )
+    processes.setSpecialValueText("One a core")
+    scheduler = named(
+        QLineEdit(placeholderText="None: this computer", clearButtonEnabled=True),
+        "scheduler",
+        "Dask scheduler",
+        "Address of a Dask cluster that does the work instead, as tcp://HOST:PORT.",
+    )
+    return {
+        "seed": ("Seed", _seed()),
+        "processes": ("Processes", processes),
+        "scheduler": ("Dask scheduler", scheduler),
+        **_output(),
+    }
+
+
+def _seed() -> QSpinBox:
+    return whole_number("seed", 0, _MOST_SEED, "Of all that is random: the same, the same numbers.")
+
+
+def _output() -> dict[str, tuple[str, QWidget]]:
+    output = PathField("Results folder", "folder")
+    output.setToolTip("Report, figures and raw numbers; a study that is not done goes on there.")
+    return {"output": ("Results folder", output)}

@@ -1,0 +1,131 @@
+"""What an evaluation came to: its figures and numbers, and the way to its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QPalette
+from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
+
+from handcal.report.document import Figure, Report, Table
+from handcal.types import UInt8
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import beside, button, named, paragraph
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.sentence import sentence
+from handcal_gui.windows.evaluation.work import Outcome
+
+
+class ResultsView(QWidget):
+    """Shows the finding, the first section's tables, and each figure as it was written."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("results")
+        self._folder = Path()
+        self._pages: list[QWidget] = []
+        self._empty = named(QLabel("Figures and numbers will be shown here."), "noResults")
+        self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._empty.setEnabled(False)
+        self._lead = paragraph("lead")
+        self._lead.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._tabs = named(QTabWidget(), "figures", "Results")
+        self._tabs.setElideMode(Qt.TextElideMode.ElideNone)
+        self._path = named(ElidedLabel(), "resultsFolder")
+        self._lay_out()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is shown."""
+        return self._stack.currentIndex() == 0
+
+    def show_outcome(self, outcome: Outcome | None) -> None:
+        """Show what came of it; None if there is nothing."""
+        self._stack.setCurrentIndex(0 if outcome is None else 1)
+        self._tabs.clear()
+        for page in self._pages:
+            page.deleteLater()
+        self._pages = []
+        if outcome is None:
+            return
+        self._folder = outcome.folder
+        self._path.setText(str(outcome.folder))
+        self._lead.setText(outcome.report.lead)
+        tables = _key_tables(outcome.report)
+        for number, table in enumerate(tables, 1):
+            self._add(f"Numbers {number}" if len(tables) > 1 else "Numbers", _table_page(table))
+        for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
+            title = sentence(figure.name.replace("-", " "))
+            self._add(title, _figure_page(title, figure, picture))
+
+    def _add(self, title: str, page: QWidget) -> None:
+        self._pages.append(page)
+        self._tabs.addTab(page, title)
+
+    def _open(self, name: str) -> None:
+        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder / name)))
+
+    def _lay_out(self) -> None:
+        foot, buttons = QWidget(), []
+        for name, text, file, help_text in (
+            ("openPdf", "Open report", "report.pdf", "The PDF, to read and to file"),
+            (
+                "openHtml",
+                "Open in browser",
+                "report.html",
+                "The same, with each figure's numbers",
+            ),
+            ("openFolder", "Open folder", "", "Report, figures, and the raw numbers as CSV"),
+        ):
+            buttons.append(button(name, text, help_text=help_text))
+            buttons[-1].clicked.connect(lambda _checked=False, file=file: self._open(file))
+        beside(foot, self._path, *buttons, grows=self._path)
+        shown = QWidget()
+        layout = QVBoxLayout(shown)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._lead)
+        layout.addWidget(self._tabs, 1)
+        layout.addWidget(foot)
+        self._stack = QStackedLayout(self)
+        self._stack.addWidget(self._empty)
+        self._stack.addWidget(shown)
+
+
+def _key_tables(report: Report) -> list[Table]:
+    """Return the tables with a head, of the first section that has any."""
+    for section in report.sections:
+        tables = [item for item in section.items if isinstance(item, Table)]
+        if shown := [table for table in tables if any(one.title for one in table.columns)]:
+            return shown
+    return []
+
+
+def _table_page(table: Table) -> QWidget:
+    view = NumberTable("Numbers")
+    titles = [column.title for column in table.columns[1:]]
+    view.show_rows(titles, [Row(cells[0], tuple(cells[1:])) for cells in table.rows])
+    return _page(view, table.caption)
+
+
+def _figure_page(title: str, figure: Figure, picture: UInt8) -> QWidget:
+    view = ImageView(f"Figure {title}")
+    view.setAccessibleDescription(figure.caption)
+    paper = view.palette()
+    paper.setColor(QPalette.ColorRole.Window, Qt.GlobalColor.white)
+    view.setPalette(paper)
+    view.show_image(picture)
+    return _page(view, figure.caption)
+
+
+def _page(view: QWidget, caption: str) -> QWidget:
+    page = QWidget()
+    layout = QVBoxLayout(page)
+    layout.setSpacing(SPACING_PX)
+    layout.addWidget(view, 1)
+    if caption:
+        layout.addWidget(paragraph("caption", caption))
+    return page

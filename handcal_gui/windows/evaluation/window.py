@@ -1,0 +1,138 @@
+"""The window of evaluations, beside the main one, which can be used meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.widgets.fields import named
+from handcal_gui.windows.evaluation.entries import EvaluationEntries
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, Offer
+
+_FIRST_SIZE = QSize(1240, 860)
+_RAIL_PX = 24 * SPACING_PX
+
+
+class EvaluationWindow(QDialog):
+    """Offers evaluations, one of which runs at a time; closing cancels it.
+
+    Parameters
+    ----------
+    offers : mapping of str to Offer
+        By the field of the entries.
+    entries : EvaluationEntries
+        Shown first.
+
+    Attributes
+    ----------
+    remembered : Signal(EvaluationEntries)
+        What was entered, to be proposed next time.
+    """
+
+    remembered = Signal(object)
+
+    def __init__(
+        self,
+        offers: Mapping[str, Offer],
+        entries: EvaluationEntries,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("evaluationWindow")
+        self.setWindowTitle("Evaluate")
+        # A window of its own, with all the buttons of one.
+        self.setWindowFlags(Qt.WindowType.Window)
+        self._entries = entries
+        self._offers = offers
+        self._is_closing = False
+        self._rail = named(QListWidget(), "evaluationRail", "Evaluations")
+        self._title = QLabel()
+        self._stack = QStackedWidget()
+        self._pages: dict[str, EvaluationPage] = {}
+        for name, offer in offers.items():
+            page = EvaluationPage(offer, getattr(entries, name))
+            page.busy_changed.connect(partial(self._change_busy, name))
+            self._stack.addWidget(page)
+            item = QListWidgetItem(offer.title)
+            item.setSizeHint(QSize(0, 4 * SPACING_PX))
+            self._rail.addItem(item)
+            self._pages[name] = page
+        self._lay_out()
+        self._rail.currentRowChanged.connect(self._go_to)
+        self._rail.setCurrentRow(0)
+        self.resize(QGuiApplication.primaryScreen().availableSize().boundedTo(_FIRST_SIZE))
+
+    @property
+    def entries(self) -> EvaluationEntries:
+        """What is entered."""
+        return replace(self._entries, **{name: one.entries for name, one in self._pages.items()})
+
+    @property
+    def page(self) -> EvaluationPage:
+        """The page shown."""
+        return list(self._pages.values())[self._rail.currentRow()]
+
+    def show_page(self, name: str) -> None:
+        """Show an evaluation."""
+        self._rail.setCurrentRow(list(self._pages).index(name))
+
+    def reject(self) -> None:
+        """Close; what runs is cancelled first."""
+        busy = [page for page in self._pages.values() if page.is_busy]
+        self._is_closing = bool(busy)
+        for page in busy:
+            page.cancel()
+        if not busy:
+            self.stop()
+
+    def stop(self) -> None:
+        """Give up what runs, wait for its end, and close; before the program ends."""
+        for page in self._pages.values():
+            page.stop()
+        self.remembered.emit(self.entries)
+        super().reject()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Let Enter press only the button that has the focus."""
+        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            super().keyPressEvent(event)
+
+    def _go_to(self, row: int) -> None:
+        self._title.setText(list(self._offers.values())[row].title)
+        self._stack.setCurrentIndex(row)
+
+    def _change_busy(self, name: str, is_busy: bool) -> None:
+        for other, page in self._pages.items():
+            page.wait_for(self._offers[name].title if is_busy and other != name else "")
+        if is_busy:
+            self.remembered.emit(self.entries)
+        elif self._is_closing:
+            self.stop()
+
+    def _lay_out(self) -> None:
+        scale_font(self._title, 1.6, is_bold=True)
+        self._rail.setFixedWidth(_RAIL_PX)
+        right = QVBoxLayout()
+        right.setSpacing(SPACING_PX)
+        right.addWidget(self._title)
+        right.addWidget(self._stack, 1)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(2 * SPACING_PX)
+        layout.addWidget(self._rail)
+        layout.addLayout(right, 1)

@@ -1,0 +1,226 @@
+"""The first step: the board, to be printed, and the rig to begin from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import get_args
+
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QMessageBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.errors import FileError, HandcalError
+from handcal.io.images import write_png
+from handcal.rig.board import DICTIONARIES, Board, BoardKind
+from handcal.rig.board_print import draw_board, write_board_pdf
+from handcal.rig.print_page import Paper
+from handcal.station.doctor import Finding, Health
+from handcal.types import UInt8
+from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import (
+    beside,
+    button,
+    choice,
+    named,
+    number,
+    paragraph,
+    whole_number,
+)
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.windows.rig.draft import Draft
+
+_KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": "Checkerboard"}
+_PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square
+
+
+class BoardPage(QWidget):
+    """Describes the board, shows and saves it."""
+
+    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("boardPage")
+        self._draft = draft
+        squares_help = "Squares, not inner corners."
+        self._kind = choice("kind", "Kind of board", _KINDS)
+        self._columns = whole_number("columns", 3, 40, squares_help)
+        self._rows = whole_number("rows", 3, 40, squares_help)
+        self._square = number(
+            "square", 1.0, 1000.0, 0.05, " mm", "Side of a square: measure it on the print."
+        )
+        self._marker = number("marker", 0.3, 950.0, 0.05, " mm", "Side of a marker, as measured.")
+        self._dictionary = choice(
+            "dictionary", "Dictionary", {name: name for name in DICTIONARIES}, "Of the markers."
+        )
+        self._legacy = named(
+            QCheckBox("Printed by OpenCV before 4.6"),
+            "legacy",
+            help_text="It began with a white square if the rows are even.",
+        )
+        self._paper = choice(
+            "paper", "Paper", {paper: paper.capitalize() for paper in get_args(Paper)}
+        )
+        self._pdf = button("savePdf", "Save as PDF…", help_text="To scale, with a ruler to check")
+        self._picture = button("savePicture", "Save picture…", help_text="PNG, to show on a screen")
+        self._begin = button("begin", "Begin from another rig…")
+        self._rig = ElidedLabel()
+        self._found = FindingLine("board")
+        self._preview = ImageView("Preview of the board")
+        self._draw = LatestJob(_draw, self)
+        self._draw.answered.connect(lambda _board, image: self._preview.show_image(image))
+        self._show_board(draft.work.board)
+        self._paper.setCurrentIndex(self._paper.findData(draft.work.paper))
+        self._lay_out()
+        for options in (self._kind, self._dictionary, self._paper):
+            options.currentIndexChanged.connect(self._take)
+        for spin in (self._columns, self._rows, self._square, self._marker):
+            spin.valueChanged.connect(self._take)
+        self._legacy.toggled.connect(self._take)
+        self._pdf.clicked.connect(self._save_pdf)
+        self._picture.clicked.connect(self._save_picture)
+        self._begin.clicked.connect(self._ask_for_rig)
+        draft.rig_changed.connect(self._show_rig)
+        self._show_rig()
+        self._take()
+
+    def stop(self) -> None:
+        """Wait for the end of what runs in the background."""
+        self._draw.stop()
+
+    def enter(self) -> None:
+        """Nothing to look for."""
+
+    def _show_board(self, board: Board) -> None:
+        self._kind.setCurrentIndex(self._kind.findData(board.kind))
+        self._columns.setValue(board.squares[0])
+        self._rows.setValue(board.squares[1])
+        self._square.setValue(1e3 * board.square_m)
+        self._marker.setValue(1e3 * board.marker_m)
+        self._dictionary.setCurrentIndex(self._dictionary.findData(board.dictionary))
+        self._legacy.setChecked(board.legacy)
+
+    def _take(self) -> None:
+        is_charuco = self._kind.currentData() == "charuco"
+        for field in (self._marker, self._dictionary, self._legacy):
+            field.setEnabled(is_charuco)
+        try:
+            board = Board(
+                kind=self._kind.currentData(),
+                squares=(self._columns.value(), self._rows.value()),
+                square_m=round(self._square.value() / 1e3, 6),
+                marker_m=round(self._marker.value() / 1e3, 6),
+                dictionary=self._dictionary.currentData(),
+                legacy=self._legacy.isChecked(),
+            )
+        except ValueError as error:
+            self._preview.show_text(message="There is no such board")
+            self._found.show_finding(Finding("", Health.BROKEN, str(error)))
+            return
+        self._preview.show_text()
+        inner = " × ".join(map(str, board.inner))
+        self._found.show_finding(Finding("", Health.GOOD, f"{inner} inner corners to be found"))
+        self._draft.enter(board=board, paper=self._paper.currentData())
+        self._draw.ask(board)
+
+    def _save_pdf(self) -> None:
+        path, _ = QFileDialog.getSaveFileName(self, "Save the board", "board.pdf", "PDF (*.pdf)")
+        if path:
+            self._save(lambda: write_board_pdf(Path(path), *self._printed()), path)
+
+    def _save_picture(self) -> None:
+        path, _ = QFileDialog.getSaveFileName(self, "Save the board", "board.png", "PNG (*.png)")
+        if path:
+            self._save(lambda: _write_picture(Path(path), self._draft.work.board), path)
+
+    def _printed(self) -> tuple[Board, Paper]:
+        return self._draft.work.board, self._draft.work.paper
+
+    def _save(self, write: Callable[[], None], path: str) -> None:
+        try:
+            write()
+        except (ValueError, FileError) as error:
+            self._found.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
+            return
+        advice = "print it at 100 %, and measure ruler and squares"
+        self._found.show_finding(Finding("", Health.GOOD, f"saved as {path}", advice))
+
+    def _ask_for_rig(self) -> None:
+        path, _ = QFileDialog.getOpenFileName(
+            self, "Begin from a rig", "", "Rig files (*.yaml *.yml)"
+        )
+        if not path or not self._may_give_up():
+            return
+        try:
+            self._draft.begin_from(Path(path))
+        except HandcalError as error:
+            self._found.show_finding(Finding("", Health.BROKEN, str(error)))
+
+    def _may_give_up(self) -> bool:
+        """Ask before calibrated parts are given up."""
+        if not self._draft.rig.origins:
+            return True
+        answer = QMessageBox.question(
+            self,
+            "Begin from another rig",
+            "What has been calibrated here is given up, unless it is saved. Go on?",
+        )
+        return answer == QMessageBox.StandardButton.Yes
+
+    def _show_rig(self) -> None:
+        parts = ", ".join(self._draft.rig.origins) or "nothing"
+        self._rig.setText(f"{self._draft.rig.name} (calibrated: {parts})")
+
+    def _lay_out(self) -> None:
+        squares, paper, rig = QWidget(), QWidget(), QWidget()
+        beside(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
+        beside(paper, self._paper, self._pdf, self._picture, grows=self._picture)
+        beside(rig, self._rig, self._begin, grows=self._rig)
+        form = QFormLayout()
+        form.setHorizontalSpacing(2 * SPACING_PX)
+        form.setVerticalSpacing(SPACING_PX)
+        for label, field in (
+            ("Board", self._kind),
+            ("Squares", squares),
+            ("Square", self._square),
+            ("Marker", self._marker),
+            ("Dictionary", self._dictionary),
+            ("", self._legacy),
+            ("Paper", paper),
+        ):
+            form.addRow(label, field)
+        left = QVBoxLayout()
+        left.setSpacing(SPACING_PX)
+        left.addLayout(form)
+        left.addWidget(self._found)
+        left.addSpacing(2 * SPACING_PX)
+        left.addWidget(
+            paragraph(
+                text="The rig to begin from tells what the headset itself knows: the size of its "
+                "displays, and where its rendering cameras are."
+            )
+        )
+        left.addWidget(rig)
+        left.addStretch(1)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(3 * SPACING_PX)
+        layout.addLayout(left, 1)
+        layout.addWidget(self._preview, 1)
+
+
+def _draw(board: Board) -> UInt8:
+    return draw_board(board, _PREVIEW_PX)
+
+
+def _write_picture(path: Path, board: Board) -> None:
+    write_png(path, draw_board(board, _PICTURE_PX))

@@ -1,0 +1,207 @@
+"""The fourth and fifth step: one eye's display, seen by the viewpoint camera behind it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from handcal.errors import FileError, HandcalError
+from handcal.io.images import write_png
+from handcal.rig.assemble import screen_of
+from handcal.rig.choose import ALIKE
+from handcal.rig.grid import Grid, draw_grid
+from handcal.station.doctor import Finding, Health
+from handcal.types import Eye
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import button, choice, number, whole_number
+from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.solve import Solved, grid_of, solve_display
+from handcal_gui.windows.rig.step_page import StepPage
+from handcal_gui.windows.rig.work import DisplayEntries, Distance
+
+_DISTANCES: dict[Distance, str] = {
+    "measured": "as measured",
+    "solved": "solved from the squares' angle",
+}
+_GRID_HINT = (
+    "Save the grid, show it on this display unscaled, put the viewpoint camera where the eye will "
+    "be, focused on the display, darken the room, and take 3 or more images."
+)
+_BOARD_HINT = (
+    "Leave the viewpoint camera where it is, switch the display off, and take 8 or more images of "
+    "the board through it while the headset tracks the board; the poses go into one JSON file."
+)
+
+
+class DisplayPage(StepPage):
+    """Images of the grid and of the tracked board, and the display solved from them.
+
+    Parameters
+    ----------
+    draft : Draft
+    eye : {"left", "right"}
+    """
+
+    def __init__(self, draft: Draft, eye: Eye, parent: QWidget | None = None) -> None:
+        distance = choice(
+            "distance",
+            "Distance of the virtual screen",
+            _DISTANCES,
+            "z(C0→S): measured, such as by the camera's focus, or solved from what a square "
+            "subtends at the nominal distance.",
+        )
+        distance_m = number("distanceM", 0.1, 100.0, 0.01, " m", "z(C0→S) as measured.")
+        arcmin = number("arcmin", 1.0, 10_000.0, 0.1, "′", "What a square of the grid subtends.")
+        nominal = number(
+            "nominal", 0.1, 100.0, 0.01, " m", "Distance at which it does: the manufacturer's."
+        )
+        square = whole_number("gridSquare", 20, 2000, "Side of the grid's squares, pixels.")
+        square.setSuffix(" px")
+        tracked = PathField("Tracked poses", "file", "Tracked poses (*.json)")
+        tracked.setToolTip(
+            "Where the headset tracked the board in each image: "
+            '{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}, metres.'
+        )
+        stereo = PathField(
+            "Stereo calibration", "file", "Stereo calibrations (*.json)", "Not needed"
+        )
+        stereo.setToolTip(
+            "Instead of images and poses of the board: what 'handcal rig stereo' made of the "
+            "viewpoint camera, as its depth camera, and the headset's."
+        )
+        files = "Matrices (*.txt *.json *.yaml *.yml)"
+        view = PathField("Rendering camera", "file", files, "As in the rig")
+        view.setToolTip(
+            "T_V_H, from the headset rig to this eye's rendering camera, as the headset reports "
+            "it: 4 rows of 4 numbers; metres; x right, y down, z forward. Otherwise it is that of "
+            "the rig to begin from."
+        )
+        form = EntriesForm(
+            {
+                "grid_images": ("Images of the grid", PathField("Grid images", "folder")),
+                "square_px": ("Grid's squares", square),
+                "board_images": ("Images of the board", PathField("Board images", "folder")),
+                "tracked": ("Board's poses", tracked),
+                "stereo": ("or a stereo calibration", stereo),
+                "view": ("Rendering camera T_V_H", view),
+                "distance": ("Distance z(C0→S)", distance),
+                "distance_m": ("measured", distance_m),
+                "square_arcmin": ("Square's angle", arcmin),
+                "nominal_m": ("at nominal distance", nominal),
+            }
+        )
+        form.show_entries(draft.work.left if eye == "left" else draft.work.right)
+        grid = ImagesPanel(("Viewpoint camera",), _GRID_HINT)
+        board = ImagesPanel(("Viewpoint camera",), _BOARD_HINT)
+        panels = {"Grid on the display": grid, "Place of the camera": board}
+        super().__init__(f"{eye}DisplayPage", draft, form, panels, parent)
+        self._eye: Eye = eye
+        self._grid, self._board = grid, board
+        self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
+        self._save = button("saveGrid", "Save grid…", help_text="PNG, for the display to show")
+        grid.add_button(self._save)
+        self._save.clicked.connect(self._save_grid)
+        self._grid.take_requested.connect(self._take_grid)
+        self._board.take_requested.connect(self._take_board)
+        self.show_known()
+
+    @property
+    def _entries(self) -> DisplayEntries:
+        work = self.draft.work
+        return work.left if self._eye == "left" else work.right
+
+    def enter(self) -> None:
+        """Look for grid and board in the folders, unless that was done."""
+        entries = self._entries
+        for distance, fields in self._by_distance.items():
+            for field in fields:
+                field.setEnabled(distance == entries.distance)
+        self._board.look((entries.board_images,), self.draft.work.board, entries.dropped_board)
+        if (grid := self._shown()) is not None:
+            self._grid.look((entries.grid_images,), grid.board, entries.dropped_grid)
+
+    def keep(self) -> None:
+        """Keep what is entered, and look for grid and board where they are new."""
+        entries = self.form.take(self._entries)
+        entries = replace(
+            entries,
+            dropped_grid=self._grid.dropped_of(entries.dropped_grid),
+            dropped_board=self._board.dropped_of(entries.dropped_board),
+        )
+        self.draft.enter(**{self._eye: entries})
+        self.enter()
+
+    def solve(self) -> None:
+        """Solve from the images that are not left out."""
+        work = partial(
+            solve_display,
+            self._grid.shots,
+            self._board.shots,
+            self._entries,
+            self._eye,
+            screen_of(self.draft.rig, self._eye),
+            self.draft.camera_file,
+        )
+        self.box.run(work, self._show_solved)
+
+    def show_known(self) -> None:
+        """Show what the rig has of this display."""
+        self.box.show_origin(self.draft.rig.origins.get(self._eye))
+
+    def _show_solved(self, solved: tuple[Solved, Solved]) -> None:
+        display, place = solved
+        self.box.show_solved(display, self.draft.take_part(display))
+        self._grid.show_solved(display)
+        self._board.show_solved(place)
+
+    def _shown(self) -> Grid | None:
+        """Return the grid that the display shows; None, and why, if it has no room for it."""
+        screen = screen_of(self.draft.rig, self._eye)
+        try:
+            return grid_of(self._entries, screen.width_px, screen.height_px)
+        except HandcalError as error:
+            self._grid.look(("",), self.draft.work.board, ())
+            self._grid.show_trouble(str(error))
+            return None
+
+    def _save_grid(self) -> None:
+        if (grid := self._shown()) is None:
+            return
+        name = f"grid-{self._eye}.png"
+        path, _ = QFileDialog.getSaveFileName(self, "Save the grid", name, "PNG (*.png)")
+        if not path:
+            return
+        try:
+            write_png(Path(path), draw_grid(grid))
+        except FileError as error:
+            self._grid.show_trouble(str(error))
+            return
+        columns, rows = grid.squares
+        saved = f"{columns}×{rows} squares saved as {path}"
+        self.box.show_finding(Finding("", Health.GOOD, saved, "show it unscaled"))
+
+    def _take_grid(self) -> None:
+        if (grid := self._shown()) is None:
+            return
+        folder = self.draft.folder.path / f"grid-{self._eye}"
+        self.take_images(
+            {"Viewpoint camera": folder},
+            grid.board,
+            self._grid,
+            lambda: self.form.enter(grid_images=str(folder)),
+            ALIKE,
+        )
+
+    def _take_board(self) -> None:
+        folder = self.draft.folder.path / f"board-{self._eye}"
+        self.take_images(
+            {"Viewpoint camera": folder},
+            self.draft.work.board,
+            self._board,
+            lambda: self.form.enter(board_images=str(folder)),
+        )

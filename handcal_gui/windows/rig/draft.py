@@ -1,0 +1,122 @@
+"""The rig that the wizard's pages work on, kept in the work folder as it changes."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from handcal.camera.settings import RealSenseSettings
+from handcal.errors import FileError, HandcalError
+from handcal.io.files import read_json
+from handcal.rig.rig_file import read_rig
+from handcal.types import Rig
+from handcal_gui.windows.rig.solve import Solved
+from handcal_gui.windows.rig.work import WorkFolder
+
+_SETTLE_MS = 500
+
+
+class Draft(QObject):
+    """Entries and rig, which the pages change.
+
+    Parameters
+    ----------
+    folder : WorkFolder
+    realsense : RealSenseSettings
+
+    Attributes
+    ----------
+    folder : WorkFolder
+    realsense : RealSenseSettings
+        How one is run that images are taken with.
+    work : RigWork
+    rig : Rig
+        As far as it is calibrated.
+    complaint : str
+        What could not be read; empty if nothing.
+    rig_changed : Signal()
+        Another rig, or other intrinsics of the viewpoint camera.
+    failed : Signal(str)
+        It could not be kept.
+    """
+
+    rig_changed = Signal()
+    failed = Signal(str)
+
+    def __init__(
+        self, folder: WorkFolder, realsense: RealSenseSettings, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.folder = folder
+        self.realsense = realsense
+        self.work, of_entries = folder.load()
+        self.rig, of_rig = folder.load_rig()
+        self.complaint = " ".join(filter(None, (of_entries, of_rig)))
+        self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
+        self._settle.timeout.connect(self.save)
+
+    @property
+    def camera_file(self) -> Path:
+        """Where the viewpoint camera's intrinsics are, once they are known."""
+        given = self.work.viewpoint.intrinsics
+        return Path(given).expanduser() if given else self.folder.viewpoint
+
+    @property
+    def camera_verdict(self) -> str:
+        """How the viewpoint camera's calibration ended; empty if there is none.
+
+        A file that tells no verdict is taken to be good.
+        """
+        file = self.camera_file
+        if not file.exists():
+            return ""
+        with suppress(FileError):
+            verdict = read_json(file).get("verdict")
+            return str(verdict.get("name")) if isinstance(verdict, dict) else "good"
+        return "good"  # OpenCV's or ROS's
+
+    def enter(self, **changes: Any) -> None:
+        """Take fields of `RigWork`."""
+        work = replace(self.work, **changes)
+        if work != self.work:
+            self.work = work
+            self._settle.start()
+
+    def begin_from(self, path: Path) -> None:
+        """Begin from a rig file, or raise HandcalError; what was calibrated before is given up."""
+        self.take_rig(read_rig(path))
+
+    def take_part(self, solved: Solved) -> str:
+        """Put a calibrated part into the rig; return what became of it, for a person to read."""
+        if solved.put is None:
+            return "it was not put into the rig"
+        try:
+            self.take_rig(solved.put(self.rig))
+        except HandcalError as error:
+            return f"it was not put into the rig: {error}"
+        return "it is in the rig now"
+
+    def camera_solved(self) -> None:
+        """Say that the viewpoint camera's intrinsics may be others now."""
+        self.rig_changed.emit()
+
+    def take_rig(self, rig: Rig) -> None:
+        """Take another rig, or raise HandcalError if it is implausible or cannot be kept."""
+        try:
+            self.folder.save_rig(rig)
+        except ValueError as error:
+            raise HandcalError(f"this is no plausible rig: {error}") from error
+        self.rig = rig
+        self.rig_changed.emit()
+
+    def save(self) -> None:
+        """Keep the entries."""
+        self._settle.stop()
+        try:
+            self.folder.save(self.work)
+        except FileError as error:
+            self.failed.emit(f"What was entered cannot be kept: {error}")

@@ -1,0 +1,169 @@
+"""The images of a step: a list, the chosen one, and how well all of them cover the view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
+
+from handcal.rig.board import Board
+from handcal.rig.views import coverage
+from handcal.station.doctor import Finding, Health
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import button, paragraph
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.windows.rig.coverage_map import CoverageMap
+from handcal_gui.windows.rig.shot_list import ShotList
+from handcal_gui.windows.rig.shot_view import ShotView
+from handcal_gui.windows.rig.shots import Shot, look
+from handcal_gui.windows.rig.solve import Solved
+
+
+class ImagesPanel(QWidget):
+    """Looks for a board in folders of images, and lets images be left out.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Whose images they are: of one camera, or of the two of pairs.
+    hint : str
+        Shown while there are none.
+
+    Attributes
+    ----------
+    shots : tuple of Shot
+    dropped_changed : Signal()
+        Other images are left out, or other images are there.
+    again_requested, take_requested : Signal()
+        The images are to be looked through again; others are to be taken.
+    """
+
+    dropped_changed = Signal()
+    again_requested = Signal()
+    take_requested = Signal()
+
+    def __init__(self, titles: tuple[str, ...], hint: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.shots: tuple[Shot, ...] = ()
+        self._question: tuple[tuple[Path, ...], Board] | None = None
+        self._list = ShotList("Images")
+        self._view = ShotView(titles)
+        self._maps = tuple(CoverageMap(title) for title in titles)
+        self._count = QLabel()
+        self._count.setObjectName("count")
+        self._hint = paragraph("hint", hint)
+        self._trouble = FindingLine("images")
+        self._trouble.hide()
+        self._again = button("again", "Look again", help_text="Read the folders anew")
+        self._take = button("take", "Take images…", help_text="With cameras of this computer")
+        self._again.clicked.connect(self._look_again)
+        self._take.clicked.connect(self.take_requested)
+        self.bar = JobBar()
+        self.bar.failed.connect(self.show_trouble)
+        self._list.chosen.connect(self._show_chosen)
+        self._list.dropped_changed.connect(self._refresh)
+        self._list.dropped_changed.connect(self.dropped_changed)
+        self._lay_out()
+        self._refresh()
+
+    def dropped_of(self, before: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the images left out; as before while none are shown."""
+        return self._list.dropped if self.shots else before
+
+    def add_button(self, added: QPushButton) -> None:
+        """Put another button before the panel's own."""
+        self._buttons.insertWidget(0, added)
+
+    def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
+        """Look for the board in folders, unless that was just done; nothing without all folders."""
+        paths = tuple(Path(folder).expanduser() for folder in folders if folder)
+        question = (paths, board)
+        if question == self._question:
+            return
+        before = self._question[0] if self._question else ()
+        if before and before != paths:
+            dropped = ()  # those were other images
+        self._question = question
+        self._show((), ())
+        if len(paths) == len(folders):
+            work: Callable[..., object] = partial(look, paths, board)
+            self.bar.run("Looking for the board", work, lambda shots: self._show(shots, dropped))
+        else:
+            self.bar.stop()
+
+    def forget(self) -> None:
+        """Have the next `look` read the folders anew."""
+        self._question = None
+
+    def show_solved(self, solved: Solved) -> None:
+        """Show how far off each image is."""
+        worst = (solved.worst.name, solved.worst.why) if solved.worst else ("", "")
+        self._list.show_results(solved.residuals_px, solved.tilts_rad, worst)
+
+    def show_trouble(self, why: str) -> None:
+        """Show why there are no images."""
+        self._trouble.show_finding(Finding("", Health.BROKEN, why))
+        self._trouble.show()
+
+    def stop(self) -> None:
+        """End what runs in the background."""
+        self.bar.stop()
+        self._view.stop()
+
+    def _show(self, shots: tuple[Shot, ...], dropped: Sequence[str]) -> None:
+        self.shots = shots
+        self._trouble.hide()
+        self._view.show_shot(None)
+        self._list.show_shots(shots, dropped)
+        self._refresh()
+        self.dropped_changed.emit()
+
+    def _look_again(self) -> None:
+        self.forget()
+        self.again_requested.emit()
+
+    def _show_chosen(self, place: int) -> None:
+        self._view.show_shot(self.shots[place] if place >= 0 else None)
+
+    def _refresh(self) -> None:
+        out = frozenset(self._list.dropped)
+        kept = [shot for shot in self.shots if shot.name not in out]
+        for number, shown in enumerate(self._maps):
+            found = [one for shot in kept if (one := shot.views[number].found) is not None]
+            shown.show_coverage(coverage(found) if found else None)
+        good = sum(not shot.problem for shot in kept)
+        self._count.setText(f"{good} of {len(self.shots)} used" if self.shots else "No images yet")
+        self._hint.setVisible(not self.shots)
+
+    def _lay_out(self) -> None:
+        side = QVBoxLayout()
+        side.setSpacing(SPACING_PX)
+        side.addWidget(self._count)
+        for shown in self._maps:
+            side.addWidget(shown)
+        side.addStretch(1)
+        split = QSplitter(Qt.Orientation.Horizontal)
+        split.setChildrenCollapsible(False)
+        split.addWidget(self._list)
+        split.addWidget(self._view)
+        split.setStretchFactor(1, 1)
+        row = QHBoxLayout()
+        row.setSpacing(2 * SPACING_PX)
+        row.addWidget(split, 1)
+        row.addLayout(side)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._hint)
+        layout.addWidget(self._trouble)
+        layout.addLayout(row, 1)
+        self._buttons = QHBoxLayout()
+        self._buttons.setSpacing(SPACING_PX)
+        for one in (self._take, self._again):
+            self._buttons.addWidget(one)
+        self._buttons.addWidget(self.bar, 1)
+        layout.addLayout(self._buttons)

@@ -1,0 +1,173 @@
+"""The last step: the rig as a whole, checked, compared and saved."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QHideEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.errors import FileError, HandcalError
+from handcal.rig.check import MAX_TEXT
+from handcal.rig.report import report_rig
+from handcal.rig.rig_file import read_rig, write_rig
+from handcal.station.doctor import Finding, Health
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import button, main_button, named
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.finding_list import FindingList
+from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
+
+_RIG_FILES = "Rig files (*.yaml *.yml)"
+
+
+class ResultPage(QWidget):
+    """Shows what there is to say of the rig, and saves it.
+
+    Attributes
+    ----------
+    rig_saved : Signal(Path)
+        A rig file to be used for the next calibration.
+    """
+
+    rig_saved = Signal(object)
+
+    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("resultPage")
+        self._draft = draft
+        self._saved: Path | None = None
+        self._name = named(QLineEdit(maxLength=MAX_TEXT), "rigName", "Name of the rig")
+        self._findings = FindingList("Check of the rig")
+        self._numbers = NumberTable("Numbers of the rig")
+        self._other = PathField("Rig file to compare with", "file", _RIG_FILES)
+        self._differences = NumberTable("Differences")
+        self._compared = FindingLine("compared")
+        self._end = FindingLine("savedRig")
+        self._save = main_button("saveRig", "Save rig file…")
+        self._use = button("useRig", "Use for the next calibration")
+        self._lay_out()
+        self.enter()
+        self._other.changed.connect(self._compare)
+        self._name.editingFinished.connect(self._take_name)
+        self._save.clicked.connect(self.save)
+        self._use.clicked.connect(self._ask_to_use)
+        draft.rig_changed.connect(self.enter)
+
+    def enter(self) -> None:
+        """Show the rig as it is now."""
+        rig = self._draft.rig
+        self._name.setText(rig.name)
+        findings = report_rig(rig)
+        self._findings.show_findings(findings)
+        self._numbers.show_rows(COLUMNS, rig_rows(rig))
+        doubtful = sum(not one.is_fine for one in findings)
+        text = f"{doubtful} of {len(findings)} findings are doubtful: see the check"
+        health = Health.LIMITED if doubtful else Health.GOOD
+        self._end.show_finding(Finding("", health, text if doubtful else "nothing is doubtful"))
+        self._saved = None
+        self._use.setEnabled(False)
+        self._compare()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Take the name that is being typed: a button may be clicked without taking the focus."""
+        self._take_name()
+        super().hideEvent(event)
+
+    def save(self) -> None:
+        """Ask where to, and save the rig file."""
+        plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
+        proposed = f"{plain or 'rig'}.yaml"
+        path, _ = QFileDialog.getSaveFileName(self, "Save the rig file", proposed, _RIG_FILES)
+        if path:
+            self.save_as(Path(path))
+
+    def save_as(self, path: Path) -> None:
+        """Save the rig file."""
+        self._take_name()
+        try:
+            write_rig(path, self._draft.rig)
+        except FileError as error:
+            self._end.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
+            return
+        self._saved = path.absolute()
+        self._use.setEnabled(True)
+        self._end.show_finding(Finding("", Health.GOOD, f"saved as {path}"))
+
+    def stop(self) -> None:
+        """Nothing runs in the background."""
+
+    def _take_name(self) -> None:
+        name = self._name.text().strip()
+        if name == self._draft.rig.name:
+            return
+        try:
+            self._draft.take_rig(replace(self._draft.rig, name=name))
+        except HandcalError as error:
+            self._name.setText(self._draft.rig.name)
+            self._end.show_finding(Finding("", Health.BROKEN, str(error)))
+
+    def _ask_to_use(self) -> None:
+        if self._saved is not None:
+            self.rig_saved.emit(self._saved)
+            text = "the next calibration uses this rig"
+            self._end.show_finding(Finding("", Health.GOOD, text))
+
+    def _compare(self) -> None:
+        self._differences.hide()
+        if not self._other.path:
+            self._compared.show_finding(
+                Finding("", Health.LIMITED, "choose a rig file, such as the rig's last calibration")
+            )
+            return
+        try:
+            other = read_rig(Path(self._other.path).expanduser())
+        except FileError as error:
+            self._compared.show_finding(Finding("", Health.BROKEN, str(error)))
+            return
+        self._compared.show_finding(
+            Finding("", Health.GOOD, f"how this rig differs from {other.name}")
+        )
+        self._differences.show_rows(("Differs by",), difference_rows(other, self._draft.rig))
+        self._differences.show()
+
+    def _lay_out(self) -> None:
+        compare = QWidget()
+        inside = QVBoxLayout(compare)
+        inside.setSpacing(SPACING_PX)
+        inside.addWidget(self._other)
+        inside.addWidget(self._compared)
+        inside.addWidget(self._differences, 1)
+        inside.addStretch(0)
+        tabs = QTabWidget(documentMode=True)
+        tabs.addTab(self._findings, "Check")
+        tabs.addTab(self._numbers, "Numbers")
+        tabs.addTab(compare, "Compare")
+        form = QFormLayout()
+        form.setHorizontalSpacing(2 * SPACING_PX)
+        form.addRow("Name", self._name)
+        foot = QHBoxLayout()
+        foot.setSpacing(2 * SPACING_PX)
+        foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
+        foot.addWidget(self._use)
+        foot.addWidget(self._save)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addLayout(form)
+        layout.addWidget(tabs, 1)
+        layout.addLayout(foot)

@@ -1,0 +1,161 @@
+"""The images of a step in a list: what was found, how far off it is, and whether it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QIcon, QImage, QPixmap
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
+
+from handcal.types import UInt8
+from handcal_gui.theme import SPACING_PX, icon, number_font, quiet
+from handcal_gui.widgets.number_label import UNKNOWN
+from handcal_gui.widgets.sentence import sentence
+from handcal_gui.windows.rig.shots import Shot
+
+_COLUMNS = {
+    "Image": "Unticked images are left out; tick them again to take them in.",
+    "Corners": "Corners of the board that were found, in each camera's image.",
+    "Off, px": "Root mean square distance of the corners seen and expected, after solving.",
+    "Tilt": "Angle between the board's normal and the line of sight, after solving.",
+}
+_IMAGE, _CORNERS, _OFF, _TILT = range(4)
+_NAME, _PROBLEM = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
+_SMALL = QSize(6 * SPACING_PX, 4 * SPACING_PX)
+
+
+class ShotList(QTreeWidget):
+    """Lists shots; the tick beside each says whether it is used.
+
+    Attributes
+    ----------
+    chosen : Signal(int)
+        Another shot is the current one, by its place in the list.
+    dropped_changed : Signal()
+    """
+
+    chosen = Signal(int)
+    dropped_changed = Signal()
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("shots")
+        self.setAccessibleName(name)
+        self.setRootIsDecorated(False)
+        self.setAlternatingRowColors(True)
+        self.setUniformRowHeights(True)
+        self.setIconSize(_SMALL)
+        self.setColumnCount(len(_COLUMNS))
+        self.setHeaderLabels(list(_COLUMNS))
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        for column, tooltip in enumerate(_COLUMNS.values()):
+            self.headerItem().setToolTip(column, tooltip)
+            if column != _IMAGE:
+                self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+        quiet(self.header())
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
+        self.header().setStretchLastSection(False)
+        self.setMinimumSize(50 * SPACING_PX, 12 * SPACING_PX)
+        self.currentItemChanged.connect(self._choose)
+        self.itemChanged.connect(self._take_change)
+
+    @property
+    def dropped(self) -> tuple[str, ...]:
+        """The shots that are not ticked."""
+        return tuple(
+            _name(item)
+            for item in self._items()
+            if item.checkState(_IMAGE) is Qt.CheckState.Unchecked
+        )
+
+    def show_shots(self, shots: Sequence[Shot], dropped: Iterable[str]) -> None:
+        """Replace what is listed."""
+        out = frozenset(dropped)
+        self.blockSignals(True)
+        self.clear()
+        for shot in shots:
+            self.addTopLevelItem(_item(shot, shot.name in out))
+        self.blockSignals(False)
+        if shots:
+            self.setCurrentItem(self._items()[0])
+
+    def show_results(
+        self,
+        residuals_px: Mapping[str, float],
+        tilts_rad: Mapping[str, float],
+        worst: tuple[str, str] = ("", ""),
+    ) -> None:
+        """Show how far off each is, its tilt, and which is worst and why."""
+        self.blockSignals(True)
+        for item in self._items():
+            name = _name(item)
+            off, tilt = residuals_px.get(name), tilts_rad.get(name)
+            item.setText(_OFF, UNKNOWN if off is None else f"{off:.2f}")
+            item.setText(_TILT, UNKNOWN if tilt is None else f"{np.degrees(tilt):.0f}°")
+            # Of a pair, the worst is called as the one image: "headset camera's of NAME".
+            note = f"worst: {worst[1]}" if worst[0].endswith(name) else ""
+            _note(item, item.data(_IMAGE, _PROBLEM) or note)
+        self.blockSignals(False)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw the signs when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            for item in self._items():
+                _mark(item)
+
+    def _choose(self, item: QTreeWidgetItem | None) -> None:
+        self.chosen.emit(-1 if item is None else self.indexOfTopLevelItem(item))
+
+    def _take_change(self, _item: QTreeWidgetItem, column: int) -> None:
+        if column == _IMAGE:
+            self.dropped_changed.emit()
+
+    def _items(self) -> list[QTreeWidgetItem]:
+        items = (self.topLevelItem(row) for row in range(self.topLevelItemCount()))
+        return [item for item in items if item is not None]
+
+
+def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:
+    item = QTreeWidgetItem()
+    item.setData(_IMAGE, _NAME, shot.name)
+    item.setData(_IMAGE, _PROBLEM, shot.problem)
+    checked = Qt.CheckState.Unchecked if is_dropped else Qt.CheckState.Checked
+    item.setCheckState(_IMAGE, checked)
+    if shot.small is not None:
+        item.setIcon(_IMAGE, _picture(shot.small))
+    counts = (str(len(view.found.ids)) if view.found else UNKNOWN for view in shot.views)
+    item.setText(_CORNERS, " · ".join(counts))
+    item.setText(_OFF, UNKNOWN)
+    item.setText(_TILT, UNKNOWN)
+    for column in (_CORNERS, _OFF, _TILT):
+        item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        item.setFont(column, number_font())
+    _mark(item)
+    _note(item, shot.problem)
+    return item
+
+
+def _mark(item: QTreeWidgetItem) -> None:
+    if item.data(_IMAGE, _PROBLEM):
+        item.setIcon(_CORNERS, icon("warning"))
+
+
+def _name(item: QTreeWidgetItem) -> str:
+    return str(item.data(_IMAGE, _NAME))
+
+
+def _note(item: QTreeWidgetItem, note: str) -> None:
+    """Show the image's name, and below it what there is to say about it."""
+    text = "\n".join(filter(None, (_name(item), sentence(note))))
+    item.setText(_IMAGE, text)
+    item.setToolTip(_IMAGE, text)
+
+
+def _picture(image: UInt8) -> QIcon:
+    height, width = image.shape[:2]
+    shown = QImage(image.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+    return QIcon(QPixmap.fromImage(shown.copy()))

@@ -1,0 +1,101 @@
+"""A shot as large as it fits, with the corners found drawn over it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from handcal.rig.board import BoardView
+from handcal.rig.views import View
+from handcal.types import UInt8
+from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.windows.rig.shots import Shot, read_color
+
+_ARM = 0.006  # of a corner's cross, relative to the image's width
+
+
+class ShotView(QWidget):
+    """Shows one image, or the two of a pair above each other.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Whose image each is.
+    """
+
+    def __init__(self, titles: tuple[str, ...], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._titles = titles
+        self._shot: Shot | None = None
+        self._images = tuple(ImageView(title) for title in titles)
+        self._read = LatestJob(_read, self)
+        self._read.answered.connect(self._show_images)
+        self._read.failed.connect(self._show_failure)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        for image in self._images:
+            layout.addWidget(image)
+        self.show_shot(None)
+
+    def show_shot(self, shot: Shot | None) -> None:
+        """Show a shot, once it is read; None for none."""
+        self._shot = shot
+        if shot is None:
+            for image in self._images:
+                image.show_image(None)
+                image.show_overlay(None)
+                image.show_text(message="The chosen image will be shown here")
+        else:
+            self._read.ask(shot.files)
+
+    def stop(self) -> None:
+        """Wait for the end of what runs in the background."""
+        self._read.stop()
+
+    def _show_images(self, files: tuple[Path, ...], images: tuple[UInt8, ...]) -> None:
+        if self._shot is None or files != self._shot.files:
+            return
+        parts = zip(self._images, self._titles, self._shot.views, images, strict=True)
+        for shown, title, view, image in parts:
+            shown.show_image(image)
+            found = view.found
+            shown.show_overlay(None if found is None else partial(_draw_corners, found))
+            shown.show_text(caption=f"{title}: {_what(view)}")
+
+    def _show_failure(self, why: str) -> None:
+        for shown in self._images:
+            shown.show_image(None)
+            shown.show_overlay(None)
+            shown.show_text(message=why)
+
+
+def _read(files: tuple[Path, ...]) -> tuple[UInt8, ...]:
+    return tuple(read_color(file) for file in files)
+
+
+def _what(view: View) -> str:
+    if view.found is None:
+        return view.problem
+    blur_px = view.found.blur_px
+    return f"{len(view.found.ids)} corners; edges {blur_px:.1f} px wide"
+
+
+def _draw_corners(found: BoardView, painter: QPainter) -> None:
+    """Draw a cross at every corner, and a circle around the board's first."""
+    arm_px = _ARM * found.size[0]
+    for width, color in ((4.0, "#ffffff"), (2.0, colors().red)):
+        pen = QPen(QColor(color), width)
+        pen.setCosmetic(True)
+        painter.setPen(pen)
+        for x, y in found.pixels.tolist():
+            painter.drawLine(QPointF(x - arm_px, y), QPointF(x + arm_px, y))
+            painter.drawLine(QPointF(x, y - arm_px), QPointF(x, y + arm_px))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(QPointF(*found.pixels[0].tolist()), 2.5 * arm_px, 2.5 * arm_px)

@@ -1,0 +1,106 @@
+"""The foot of a step: solve, and what that came to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from handcal.errors import CancelledError
+from handcal.station.doctor import Finding, Health
+from handcal.types import Origin
+from handcal_gui.engine.jobs import IsCancelled, Report
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import main_button
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.times import local_time
+from handcal_gui.windows.rig.rows import COLUMNS
+from handcal_gui.windows.rig.solve import Solved
+
+HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
+
+
+class SolveBox(QWidget):
+    """Solves in a job; shows verdict, reason, the worst image and the numbers.
+
+    Attributes
+    ----------
+    button : MainButton
+        "Solve"; the page connects it, and enables it.
+    bar : JobBar
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("solveBox")
+        self.button = main_button("solve", "Solve")
+        self.bar = JobBar()
+        self.bar.failed.connect(self._show_failure)
+        self._verdict = FindingLine("verdict")
+        self._worst = FindingLine("worst")
+        self._table = NumberTable("Numbers")
+        self._table.setMinimumWidth(40 * SPACING_PX)
+        self._lay_out()
+        self.show_origin(None)
+
+    def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
+        """Solve in a job; `then` takes what it comes to."""
+
+        def solve(_report: Report, is_cancelled: IsCancelled) -> object:
+            solved = work()
+            if is_cancelled():
+                raise CancelledError("given up")
+            return solved
+
+        self.bar.run("Solving", solve, then)
+
+    def show_origin(self, origin: Origin | None) -> None:
+        """Show what is known of an earlier result; None if there is none."""
+        self._worst.hide()
+        self._table.hide()
+        if origin is None:
+            self.show_finding(Finding("", Health.LIMITED, "Not solved yet"))
+            return
+        text = f"Solved {local_time(origin.made)}: {origin.verdict}; {origin.reason}"
+        self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
+
+    def show_finding(self, finding: Finding) -> None:
+        """Show how it stands with the result."""
+        self._verdict.show_finding(finding)
+
+    def show_solved(self, solved: Solved, kept: str) -> None:
+        """Show a result; `kept` says what became of it."""
+        verdict = solved.verdict
+        text = f"{verdict.name}: {verdict.reason}"
+        self.show_finding(Finding("", HEALTHS[verdict.name], text, kept))
+        self._worst.setVisible(solved.worst is not None)
+        if solved.worst is not None:
+            worst = f"Worst: {solved.worst.name}, {solved.worst.rms_px:.2f} px: {solved.worst.why}"
+            self._worst.show_finding(Finding("", Health.LIMITED, worst))
+        self._table.show_rows(COLUMNS, solved.rows)
+        self._table.show()
+
+    def _show_failure(self, why: str) -> None:
+        self._worst.hide()
+        self._table.hide()
+        self.show_finding(Finding("", Health.BROKEN, why))
+
+    def _lay_out(self) -> None:
+        left = QVBoxLayout()
+        left.setSpacing(SPACING_PX)
+        row = QHBoxLayout()
+        row.setSpacing(2 * SPACING_PX)
+        row.addWidget(self.button)
+        row.addWidget(self.bar, 1)
+        left.addLayout(row)
+        left.addWidget(self._verdict)
+        left.addWidget(self._worst)
+        left.addStretch(1)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * SPACING_PX)
+        layout.addLayout(left, 1)
+        layout.addWidget(self._table)

@@ -1,0 +1,123 @@
+"""What the steps that solve something from images have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
+
+from handcal.rig.board import Board
+from handcal.rig.choose import ChooseSettings
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.solve_box import SolveBox
+from handcal_gui.windows.rig.take_dialog import TakeDialog
+
+
+class StepPage(QWidget):
+    """Fields on top, images in the middle, the result at the foot.
+
+    Parameters
+    ----------
+    name : str
+        Object name.
+    draft : Draft
+    form : EntriesForm
+    panels : mapping of str to ImagesPanel
+        By title.
+
+    Attributes
+    ----------
+    form : EntriesForm
+    panels : tuple of ImagesPanel
+    box : SolveBox
+    """
+
+    def __init__(
+        self,
+        name: str,
+        draft: Draft,
+        form: EntriesForm,
+        panels: Mapping[str, ImagesPanel],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName(name)
+        self.draft = draft
+        self.form = form
+        self.panels = tuple(panels.values())
+        self.box = SolveBox()
+        self._lay_out(panels)
+        form.changed.connect(self.keep)
+        self.box.button.clicked.connect(self.solve)
+        for panel in self.panels:
+            panel.dropped_changed.connect(self.keep)
+            panel.bar.busy_changed.connect(self._refresh)
+            panel.again_requested.connect(self.enter)
+        self.box.bar.busy_changed.connect(self._refresh)
+        draft.rig_changed.connect(self.show_known)
+
+    def enter(self) -> None:
+        """Look for what the entries name, unless that was done."""
+        raise NotImplementedError
+
+    def keep(self) -> None:
+        """Keep what is entered, and look for the board where it is new."""
+        raise NotImplementedError
+
+    def solve(self) -> None:
+        """Solve from the images that are not left out."""
+        raise NotImplementedError
+
+    def show_known(self) -> None:
+        """Show what the rig has of this step."""
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        """End what runs in the background."""
+        for panel in self.panels:
+            panel.stop()
+        self.box.bar.stop()
+
+    def take_images(
+        self,
+        folders: Mapping[str, Path],
+        board: Board,
+        panel: ImagesPanel,
+        then: Callable[[], object],
+        choose: ChooseSettings | None = None,
+    ) -> None:
+        """Take images with cameras, into a folder each, and then look for the board in them."""
+
+        def end() -> None:
+            panel.forget()
+            then()
+            self.enter()
+
+        dialog = TakeDialog(folders, board, choose or ChooseSettings(), self.draft.realsense, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.finished.connect(end)
+        dialog.open()
+
+    def _lay_out(self, panels: Mapping[str, ImagesPanel]) -> None:
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self.form)
+        if len(panels) == 1:
+            layout.addWidget(self.panels[0], 1)
+        else:
+            tabs = QTabWidget(documentMode=True)
+            for title, panel in panels.items():
+                panel.setContentsMargins(*4 * (SPACING_PX,))
+                tabs.addTab(panel, title)
+            layout.addWidget(tabs, 1)
+        layout.addWidget(self.box)
+
+    def _refresh(self) -> None:
+        is_looking = any(panel.bar.is_busy for panel in self.panels)
+        self.box.button.setEnabled(not is_looking and not self.box.bar.is_busy)

@@ -1,0 +1,95 @@
+"""The second step: where the depth camera is on the headset."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from PySide6.QtWidgets import QWidget
+
+from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
+from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.lens_fields import intrinsics_field, lens_field
+from handcal_gui.windows.rig.solve import Solved, solve_stereo
+from handcal_gui.windows.rig.step_page import StepPage
+
+_HINT = (
+    "Take 20 or more pairs of images of the board, both at the same moment: near and far, all over "
+    "both views, tilted by 20° to 45° to every side. The two images of a pair end in the same "
+    "number, as depth07.png and headset07.png."
+)
+
+
+class StereoPage(StepPage):
+    """Pairs of images of the board, and the pose solved from them."""
+
+    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+        imager = PathField("Depth imager's intrinsics", "file", INTRINSICS_FILES, "Not needed")
+        imager.setToolTip(
+            "Only if the images are those of a colour imager beside the depth imager, and the "
+            "depth is not aligned to it; a RealSense from which images are taken here tells them."
+        )
+        pose = PathField(
+            "Pose from depth to colour", "file", "Poses (*.yaml *.yml *.json)", "Not needed"
+        )
+        pose.setToolTip(imager.toolTip())
+        form = EntriesForm(
+            {
+                "depth_images": ("Depth camera's images", PathField("Depth images", "folder")),
+                "depth_intrinsics": ("its intrinsics", intrinsics_field("Depth intrinsics")),
+                "imager_intrinsics": ("Depth imager's own", imager),
+                "lens": ("Lens", lens_field()),
+                "headset_images": (
+                    "Headset camera's images",
+                    PathField("Headset images", "folder"),
+                ),
+                "headset_intrinsics": ("its intrinsics", intrinsics_field("Headset intrinsics")),
+                "depth_to_color": ("Pose from depth to colour", pose),
+            }
+        )
+        form.show_entries(draft.work.stereo)
+        panel = ImagesPanel(("Depth camera", "Headset camera"), _HINT)
+        super().__init__("stereoPage", draft, form, {"Pairs": panel}, parent)
+        self.panel = panel
+        self.panel.take_requested.connect(self._take)
+        self.show_known()
+
+    def enter(self) -> None:
+        """Look for the board in the folders, unless that was done."""
+        entries = self.draft.work.stereo
+        folders = entries.depth_images, entries.headset_images
+        self.panel.look(folders, self.draft.work.board, entries.dropped)
+
+    def keep(self) -> None:
+        """Keep what is entered, and look for the board where it is new."""
+        entries = self.form.take(self.draft.work.stereo)
+        self.draft.enter(stereo=replace(entries, dropped=self.panel.dropped_of(entries.dropped)))
+        self.enter()
+
+    def solve(self) -> None:
+        """Solve from the pairs that are not left out."""
+        work = partial(solve_stereo, self.panel.shots, self.draft.work.stereo)
+        self.box.run(work, self._show_solved)
+
+    def show_known(self) -> None:
+        """Show what the rig has of this step."""
+        self.box.show_origin(self.draft.rig.origins.get("T_H_D"))
+
+    def _show_solved(self, solved: Solved) -> None:
+        self.box.show_solved(solved, self.draft.take_part(solved))
+        self.panel.show_solved(solved)
+
+    def _take(self) -> None:
+        path = self.draft.folder.path
+        folders = {"Depth camera": path / "depth", "Headset camera": path / "headset"}
+
+        def then() -> None:
+            self.form.enter(**{f"{path.name}_images": str(path) for path in folders.values()})
+            files = {"imager_intrinsics": IMAGER, "depth_to_color": DEPTH_TO_COLOR}
+            told = {name: path / "depth" / file for name, file in files.items()}
+            self.form.enter(**{name: str(file) for name, file in told.items() if file.exists()})
+
+        self.take_images(folders, self.draft.work.board, self.panel, then)

@@ -1,0 +1,214 @@
+"""The rig wizard: the offline calibration, step by step, in a window of its own."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QIcon, QKeyEvent
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from handcal.camera.settings import RealSenseSettings
+from handcal.types import RIG_PARTS, RigPart
+from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
+from handcal_gui.widgets.banner import Banner
+from handcal_gui.widgets.fields import button, named
+from handcal_gui.windows.rig.board_page import BoardPage
+from handcal_gui.windows.rig.display_page import DisplayPage
+from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.result_page import ResultPage
+from handcal_gui.windows.rig.stereo_page import StereoPage
+from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
+from handcal_gui.windows.rig.work import WorkFolder
+
+_FIRST_SIZE = QSize(1240, 760)
+_RAIL_PX = 29 * SPACING_PX
+_SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
+_STEPS: dict[str, tuple[str, RigPart | None]] = {
+    "Board": ("The board to take images of, and the rig to begin from.", None),
+    "Depth and headset camera": ("Where the depth camera is on the headset: T_H_D.", "T_H_D"),
+    "Viewpoint camera": ("The camera put where the wearer's eye will be.", None),
+    "Left display": ("Projection and place of the left eye's display.", "left"),
+    "Right display": ("Projection and place of the right eye's display.", "right"),
+    "Result": ("The rig as a whole: check, compare and save it.", None),
+}
+"""By title: what the step is for, and the part of the rig that comes of it."""
+
+
+class Page(Protocol):
+    """What the wizard asks of a page."""
+
+    def enter(self) -> None:
+        """Come into sight."""
+
+    def stop(self) -> None:
+        """End what runs in the background."""
+
+
+class RigWizard(QDialog):
+    """Leads through the offline calibration; everything entered is kept in a folder.
+
+    Parameters
+    ----------
+    folder : WorkFolder
+        A later wizard goes on from there.
+    realsense : RealSenseSettings, optional
+        How one is run that images are taken with.
+
+    Attributes
+    ----------
+    rig_saved : Signal(Path)
+        A rig file to be used for the next calibration.
+    draft : Draft
+    """
+
+    rig_saved = Signal(object)
+
+    def __init__(
+        self,
+        folder: WorkFolder,
+        parent: QWidget | None = None,
+        realsense: RealSenseSettings | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("rigWizard")
+        self.setWindowTitle("Calibrate a rig")
+        self.draft = Draft(folder, realsense or RealSenseSettings(), self)
+        self._banner = Banner()
+        self._rail = named(QListWidget(), "rigRail", "Steps")
+        self._title, self._purpose = QLabel(), QLabel()
+        self._stack = QStackedWidget()
+        result = ResultPage(self.draft)
+        self._pages: list[Page] = []
+        for page in (
+            BoardPage(self.draft),
+            StereoPage(self.draft),
+            ViewpointPage(self.draft),
+            DisplayPage(self.draft, "left"),
+            DisplayPage(self.draft, "right"),
+            result,
+        ):
+            self._stack.addWidget(page)
+            self._pages.append(page)
+        self._back = button("rigBack", "Back")
+        self._next = button("rigNext", "Next")
+        self._close = button("rigClose", "Close", help_text="Everything entered is kept")
+        for title in _STEPS:
+            self._rail.addItem(QListWidgetItem(title))
+        self._lay_out()
+        self._rail.currentRowChanged.connect(self._go_to)
+        self._back.clicked.connect(lambda: self.show_step(self.step - 1))
+        self._next.clicked.connect(lambda: self.show_step(self.step + 1))
+        self._close.clicked.connect(self.accept)
+        self.draft.rig_changed.connect(self._refresh)
+        self.draft.failed.connect(self._banner.show_message)
+        result.rig_saved.connect(self.rig_saved)
+        self._banner.show_message(self.draft.complaint)
+        screen = QGuiApplication.primaryScreen().availableSize()
+        self.resize(screen.boundedTo(_FIRST_SIZE))
+        self._refresh()
+        self.show_step(0)
+
+    @property
+    def step(self) -> int:
+        """The step shown, from 0."""
+        return self._rail.currentRow()
+
+    @property
+    def page(self) -> Page:
+        """The page shown."""
+        return self._pages[self.step]
+
+    def show_step(self, step: int) -> None:
+        """Show a step."""
+        self._rail.setCurrentRow(step)
+
+    def done(self, result: int) -> None:
+        """Keep everything, end what runs, and close."""
+        for page in self._pages:
+            page.stop()
+        self.draft.save()
+        super().done(result)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Let Enter press only the button that has the focus."""
+        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            super().keyPressEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw the signs when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._refresh()
+
+    def _go_to(self, step: int) -> None:
+        title = list(_STEPS)[step]
+        self._title.setText(title)
+        self._purpose.setText(_STEPS[title][0])
+        self._stack.setCurrentIndex(step)
+        self._back.setEnabled(step > 0)
+        self._next.setEnabled(step < len(_STEPS) - 1)
+        self._pages[step].enter()
+
+    def _refresh(self) -> None:
+        """Mark the steps by what has come of them."""
+        for row, title in enumerate(_STEPS):
+            verdict = self._verdict(title)
+            name, role = _SIGNS.get(verdict, ("wait", "muted"))
+            sign = icon(name, getattr(colors(), role))
+            chosen = icon(name, self.palette().highlightedText().color().name())
+            sign.addPixmap(chosen.pixmap(2 * SPACING_PX), QIcon.Mode.Selected)
+            self._rail.item(row).setIcon(sign)
+            self._rail.item(row).setToolTip(verdict or "not done yet")
+
+    def _verdict(self, title: str) -> str:
+        """Return how a step ended; empty if it has not."""
+        origins = self.draft.rig.origins
+        part = _STEPS[title][1]
+        if part is not None:
+            return origins[part].verdict if part in origins else ""
+        if title == "Board":
+            return "good"
+        if title == "Viewpoint camera":
+            return self.draft.camera_verdict
+        verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
+        return "good" if verdicts == {"good"} else ""
+
+    def _lay_out(self) -> None:
+        scale_font(self._title, 1.6, is_bold=True)
+        self._rail.setFixedWidth(_RAIL_PX)
+        self._rail.setSpacing(SPACING_PX // 2)
+        self._rail.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
+        self._rail.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        head = QHBoxLayout()
+        head.setSpacing(2 * SPACING_PX)
+        head.addWidget(self._title)
+        head.addWidget(self._purpose, 1, Qt.AlignmentFlag.AlignBottom)
+        foot = QHBoxLayout()
+        foot.setSpacing(SPACING_PX)
+        foot.addStretch(1)
+        for one in (self._back, self._next, self._close):
+            foot.addWidget(one)
+        right = QVBoxLayout()
+        right.setSpacing(SPACING_PX)
+        right.addLayout(head)
+        right.addWidget(self._stack, 1)
+        right.addLayout(foot)
+        row = QHBoxLayout()
+        row.setSpacing(2 * SPACING_PX)
+        row.addWidget(self._rail)
+        row.addLayout(right, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
+        layout.setSpacing(SPACING_PX)
+        layout.addWidget(self._banner)
+        layout.addLayout(row, 1)

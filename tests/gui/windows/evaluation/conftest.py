@@ -1,0 +1,94 @@
+"""A study of a few numbers, whose pace a test sets."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.axes import Axes
+from PySide6.QtWidgets import QWidget
+
+from handcal.errors import HandcalError
+from handcal.lab.study.run import Case, Study
+from handcal.lab.study.store import Row
+from handcal.report.document import Column, Figure, Report, Section, Table
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import whole_number
+from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.evaluation.entries import NoiseEntries
+from handcal_gui.windows.evaluation.evaluation_page import Offer
+from handcal_gui.windows.evaluation.work import SimulatedStudy
+
+CASES = 10
+
+
+@dataclass(frozen=True)
+class Settings:
+    seed: int
+
+
+@dataclass
+class Numbers:
+    """A study that squares numbers; it pauses at a case while `may_go_on` is cleared."""
+
+    pauses_at: int = CASES
+    fails: bool = False
+    squared: list[int] = field(default_factory=list)
+    may_go_on: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def work(self) -> SimulatedStudy:
+        return SimulatedStudy(self._study, self._describe)
+
+    @property
+    def offer(self) -> Offer:
+        return Offer("Numbers", "What are their squares?", self.work, make_form)
+
+    def _study(self, entries: NoiseEntries) -> Study:
+        cases: list[Case] = [{"number": number} for number in range(CASES)]
+        return Study("numbers", Settings(entries.seed), cases, self._square)
+
+    def _square(self, _settings: Any, case: Case) -> list[Row]:
+        number = int(case["number"])
+        if self.fails:
+            raise HandcalError("numbers are out of stock")
+        if number == self.pauses_at:
+            assert self.may_go_on.wait(20)
+        self.squared.append(number)
+        return [{**case, "square": number**2}]
+
+    def _describe(self, settings: Settings, rows: Sequence[Row]) -> Report:
+        cells = [(str(row["number"]), str(row["square"])) for row in rows]
+        table = Table([Column("number"), Column("square")], cells, "All of them.")
+        squares = [int(str(row["square"])) for row in rows]
+
+        def draw(axes: Sequence[Axes]) -> None:
+            axes[0].plot(squares)
+
+        figure = Figure("some-squares", "Grows.", draw, rows)
+        sections = [Section("", ["Text.", table, figure])]
+        return Report("Numbers", f"seed {settings.seed}", "Squares grow.", sections)
+
+
+def make_form() -> EntriesForm:
+    fields: dict[str, tuple[str, QWidget]] = {
+        "seed": ("Seed", whole_number("seed", 0, 9, "")),
+        "output": ("Results folder", PathField("Results folder", "folder")),
+    }
+    return EntriesForm(fields)
+
+
+@pytest.fixture
+def numbers() -> Iterator[Numbers]:
+    numbers = Numbers()
+    yield numbers
+    numbers.may_go_on.set()
+
+
+@pytest.fixture
+def entries(tmp_path: Path) -> NoiseEntries:
+    return NoiseEntries(processes=1, output=str(tmp_path / "numbers"))

@@ -1,0 +1,31 @@
+"""The way into the window of evaluations, and what is remembered of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.windows.evaluation.window import EvaluationWindow
+
+
+def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "config").mkdir()
+    file = PreferencesFile(tmp_path / "config" / "preferences.json")
+    program = Program(file)
+    qtbot.addWidget(program.window)
+    program.window.show()
+    button = program.start.findChild(QPushButton, "evaluate")
+    assert isinstance(button, QPushButton)
+    button.click()
+    (window,) = program.window.findChildren(EvaluationWindow)
+    assert window.isVisible()
+    assert program.evaluate() is window
+    assert window.entries.users.sessions == program.preferences.station.sessions
+    window.page.form.enter(seed=11)
+    program.window.close()
+    assert not window.isVisible()
+    assert file.load()[0].evaluation.noise.seed == 11

@@ -1,0 +1,170 @@
+"""The window of evaluations, with studies whose pace the test sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QTabWidget, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.lab.study.run import run_study
+from handcal_gui.windows.evaluation.entries import EvaluationEntries, MethodEntries, NoiseEntries
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
+from handcal_gui.windows.evaluation.window import EvaluationWindow
+
+Kind = TypeVar("Kind", bound=QWidget)
+PATIENCE_MS = 20_000
+
+
+class Student:
+    """Uses the window."""
+
+    def __init__(self, qtbot: QtBot, window: EvaluationWindow) -> None:
+        self._qtbot = qtbot
+        self.window = window
+        self.remembered: list[EvaluationEntries] = []
+        window.remembered.connect(self.remembered.append)
+
+    @property
+    def page(self) -> EvaluationPage:
+        return self.window.page
+
+    def child(self, kind: type[Kind], name: str) -> Kind:
+        found = self.page.findChild(kind, name)
+        assert isinstance(found, kind)
+        return found
+
+    @property
+    def found(self) -> str:
+        return self.child(QLabel, "standingFound").text()
+
+    @property
+    def button(self) -> QPushButton:
+        return self.child(QPushButton, "run")
+
+    def wait(self, condition: Callable[[], bool]) -> None:
+        self._qtbot.waitUntil(condition, timeout=PATIENCE_MS)
+
+    def wait_for_button(self, text: str) -> None:
+        self.wait(lambda: self.button.isEnabled() and self.button.text() == text)
+
+    def wait_for_text(self, part: str) -> None:
+        self.wait(lambda: part in self.found)
+
+    def press(self, text: str) -> None:
+        self.wait_for_button(text)
+        self.button.click()
+
+    def enter(self, **values: object) -> None:
+        self.page.form.enter(**values)
+
+
+@pytest.fixture
+def student(qtbot: QtBot, numbers: Any, entries: NoiseEntries) -> Iterator[Student]:
+    """Show two evaluations of the same study."""
+    others = MethodEntries(processes=1, output=f"{entries.output}-others")
+    offers = {"noise": numbers.offer, "methods": replace(numbers.offer, title="Others")}
+    window = EvaluationWindow(offers, EvaluationEntries(noise=entries, methods=others))
+    qtbot.addWidget(window)
+    window.show()
+    yield Student(qtbot, window)
+    numbers.may_go_on.set()
+    window.stop()
+
+
+def test_a_study_runs_to_its_end(
+    student: Student, entries: NoiseEntries, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    student.press("Run")
+    student.wait_for_text("Done")
+    assert student.child(QLabel, "lead").text() == "Squares grow."
+    tabs = student.child(QTabWidget, "figures")
+    assert [tabs.tabText(place) for place in range(tabs.count())] == ["Numbers", "Some squares"]
+    item = student.child(QTableWidget, "numbers").item(9, 0)
+    assert item is not None
+    assert item.text() == "81"
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    for name in ("openPdf", "openHtml", "openFolder"):
+        student.child(QPushButton, name).click()
+    folder = Path(entries.output)
+    paths = [Path(url.toLocalFile()) for url in opened]
+    assert paths == [folder / "report.pdf", folder / "report.html", folder]
+    assert all(path.exists() for path in paths)
+    student.wait_for_button("Show results")
+
+
+def test_a_study_is_cancelled_and_goes_on(numbers: Any, student: Student) -> None:
+    numbers.pauses_at = 4
+    student.press("Run")
+    progress = student.child(QProgressBar, "progress")
+    student.wait(lambda: progress.value() == round(0.95 * 0.4 * progress.maximum()))
+    assert student.child(QLabel, "doing").text().startswith("4 of 10 cases, ")
+    assert student.remembered[-1] == student.window.entries
+    student.child(QPushButton, "cancel").click()
+    numbers.may_go_on.set()
+    student.wait_for_text("of this study. What is done is not done again.")
+    assert not student.child(QPushButton, "openPdf").isVisible()
+    student.press("Go on")
+    student.wait_for_text("Done")
+    assert numbers.squared.count(0) == 1
+    assert set(numbers.squared) == set(range(10))
+
+
+def test_a_folder_of_another_study_is_told(
+    numbers: Any, student: Student, entries: NoiseEntries
+) -> None:
+    run_study(numbers.work.study(entries), Path(entries.output), workers=1)
+    student.enter(seed=5)
+    student.wait_for_text("holds another study (seed 1 there, 5 here)")
+    assert not student.button.isEnabled()
+    student.enter(output="")
+    student.wait_for_text("Choose a folder for the results")
+    student.enter(seed=1, output=student.window.entries.methods.output)
+    student.wait_for_button("Run")
+
+
+def test_a_failing_study_is_told(numbers: Any, student: Student) -> None:
+    numbers.fails = True
+    student.press("Run")
+    student.wait_for_text("Numbers are out of stock")
+    student.wait_for_button("Run")
+    student.enter(seed=2)
+    student.wait_for_text("holds another study")  # begun, though nothing is done
+
+
+def test_one_runs_at_a_time(numbers: Any, student: Student) -> None:
+    numbers.pauses_at = 0
+    student.press("Run")
+    student.window.show_page("methods")
+    student.wait_for_text("Numbers is running. One runs at a time.")
+    assert not student.button.isEnabled()
+    student.window.show_page("noise")
+    student.page.cancel()
+    numbers.may_go_on.set()
+    student.window.show_page("methods")
+    student.wait_for_button("Run")
+    student.wait_for_text("Ready")
+
+
+def test_closing_cancels_and_remembers(
+    numbers: Any, student: Student, entries: NoiseEntries
+) -> None:
+    numbers.pauses_at = 3
+    chunks = Path(entries.output, "chunks")
+    student.press("Run")
+    student.wait(lambda: len(list(chunks.glob("*.json"))) == 3)
+    student.window.close()
+    assert student.window.isVisible()  # until the case being done has ended
+    student.enter(seed=7)
+    numbers.may_go_on.set()
+    student.wait(lambda: not student.window.isVisible())
+    assert not student.page.is_busy
+    assert student.remembered[-1].noise.seed == 7
+    assert 3 <= len(list(chunks.glob("*.json"))) < 10

@@ -1,0 +1,83 @@
+"""A page whose evaluation can be prepared in a dialog."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.windows.evaluation.entries import EvaluationEntries, NoiseEntries
+from handcal_gui.windows.evaluation.preparation import Preparation, PreparationDialog
+from handcal_gui.windows.evaluation.window import EvaluationWindow
+
+
+class ScenarioDialog(PreparationDialog):
+    def __init__(self, entries: NoiseEntries, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.entries = entries
+
+
+@pytest.fixture
+def window(qtbot: QtBot, numbers: Any, entries: NoiseEntries) -> Iterator[EvaluationWindow]:
+    """Show an evaluation that can be prepared with a seed other than 0."""
+    preparation = Preparation("Prepare…", "Do.", lambda one: one.seed != 0, ScenarioDialog)
+    offers = {"noise": replace(numbers.offer, preparation=preparation)}
+    window = EvaluationWindow(offers, EvaluationEntries(noise=entries))
+    qtbot.addWidget(window)
+    window.show()
+    yield window
+    window.stop()
+
+
+def button(window: EvaluationWindow) -> QPushButton:
+    found = window.findChild(QPushButton, "prepare")
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def open_dialog(window: EvaluationWindow) -> ScenarioDialog:
+    button(window).click()
+    dialog = window.findChild(ScenarioDialog)
+    assert isinstance(dialog, ScenarioDialog)
+    assert dialog.isVisible()
+    return dialog
+
+
+def test_it_is_offered_where_the_entries_suffice(window: EvaluationWindow) -> None:
+    assert (button(window).text(), button(window).toolTip()) == ("Prepare…", "Do.")
+    window.page.form.enter(seed=0)
+    assert not button(window).isEnabled()
+    window.page.form.enter(seed=2)
+    assert button(window).isEnabled()
+
+
+def test_what_was_prepared_is_looked_at_anew(
+    qtbot: QtBot, window: EvaluationWindow, entries: NoiseEntries, tmp_path: Path
+) -> None:
+    run = window.findChild(QPushButton, "run")
+    assert isinstance(run, QPushButton)
+    qtbot.waitUntil(run.isEnabled)
+    dialog = open_dialog(window)
+    assert dialog.entries == entries
+    dialog.entries = replace(entries, output=str(tmp_path / "prepared"))
+    dialog.accept()
+    assert not run.isEnabled()
+    qtbot.waitUntil(run.isEnabled)
+    assert window.entries.noise == dialog.entries
+
+
+def test_it_closes_with_the_window_which_remembers_it(
+    window: EvaluationWindow, entries: NoiseEntries
+) -> None:
+    remembered: list[EvaluationEntries] = []
+    window.remembered.connect(remembered.append)
+    dialog = open_dialog(window)
+    dialog.entries = replace(entries, processes=5)
+    window.close()
+    assert not dialog.isVisible()
+    assert remembered[-1].noise.processes == 5

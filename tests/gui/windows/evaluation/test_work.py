@@ -1,0 +1,72 @@
+"""What evaluations do, without a window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from handcal.errors import CancelledError, FileError
+from handcal.lab.study.run import run_study
+from handcal.report.document import Report
+from handcal.station.doctor import Health
+from handcal_gui.windows.evaluation.entries import NoiseEntries, UserEntries
+from handcal_gui.windows.evaluation.work import Checkpoint, GivenData
+
+
+def never() -> bool:
+    return False
+
+
+def test_a_study_is_done_and_told(numbers: Any, entries: NoiseEntries) -> None:
+    told: list[tuple[str, float]] = []
+    assert numbers.work.standing(entries).button == "Run"
+    assert not Path(entries.output).exists()
+    outcome = numbers.work.run(entries, lambda *one: told.append(one), never)
+    assert outcome.report.lead == "Squares grow."
+    assert (outcome.folder / "report.pdf").exists()
+    (picture,) = outcome.pictures
+    assert picture.shape[2] == 3
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert told[0] == ("0 of 10 cases", 0.0)
+    assert told[10][0] == "10 of 10 cases, less than a minute left"
+    assert told[-1] == ("Writing the report", 1.0)
+    assert numbers.work.standing(entries).button == "Show results"
+
+
+def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseEntries) -> None:
+    shares: list[float] = []
+    with pytest.raises(CancelledError):
+        numbers.work.run(
+            entries, lambda _doing, share: shares.append(share), lambda: len(shares) > 4
+        )
+    standing = numbers.work.standing(entries)
+    assert standing.button == "Go on"
+    assert standing.finding.found.endswith("holds 40 % of this study")
+    with pytest.raises(FileError, match="holds another study"):
+        numbers.work.standing(replace(entries, seed=2))
+    with pytest.raises(FileError, match="choose a folder"):
+        numbers.work.standing(replace(entries, output=""))
+
+
+def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseEntries) -> None:
+    def describe(_entries: Any, checkpoint: Checkpoint) -> Report:
+        checkpoint("Reading", 1.0)
+        return Report("Data", "given", "Read.", [])
+
+    data = GivenData(lambda given: "" if given.sessions else "no sessions", describe)
+    given = UserEntries(sessions="here", output=f"{entries.output}-data")
+    assert data.standing(replace(given, sessions="")).finding.health is Health.BROKEN
+    assert data.standing(given).can_run
+    told: list[tuple[str, float]] = []
+    assert data.run(given, lambda *one: told.append(one), never).report.title == "Data"
+    assert told[0] == ("Reading", 0.7)
+    assert "will be replaced" in data.standing(given).finding.found
+    with pytest.raises(CancelledError):
+        data.run(given, lambda *_: None, lambda: True)
+    run_study(numbers.work.study(entries), Path(entries.output), workers=1)
+    with pytest.raises(FileError, match="holds a study"):
+        data.run(replace(given, output=entries.output), lambda *_: None, never)

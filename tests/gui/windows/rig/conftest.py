@@ -1,0 +1,64 @@
+"""Photographs of a whole offline calibration, rendered once; and dialogs answered by tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QFileDialog
+
+from handcal.rig.example import example_rig
+from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
+from handcal.types import Intrinsics, UInt8
+from handcal_gui.windows.rig.shots import read_color
+from handcal_gui.windows.rig.work import DisplayEntries, RigWork, StereoEntries, ViewpointEntries
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """Where they are, as a technician would enter them, and the camera behind the display."""
+
+    folder: Path
+    work: RigWork
+    viewpoint: Intrinsics
+
+    def image(self, folder: str) -> UInt8:
+        """Return the first of a folder, RGB."""
+        return read_color(self.folder / folder / f"{folder}-001.png")
+
+
+@pytest.fixture(scope="session")
+def photographs(tmp_path_factory: pytest.TempPathFactory) -> Photographs:
+    """Eight views for each camera, a pair without a board, and the left display's."""
+    out = tmp_path_factory.mktemp("photographs")
+    write_photographs(out, example_rig(), 8, np.random.default_rng(0))
+    for folder in ("depth", "headset"):
+        assert cv2.imwrite(
+            str(out / folder / f"{folder}-099.png"), np.full((360, 640), 100, np.uint8)
+        )
+    work = RigWork(
+        board=BOARD,
+        stereo=StereoEntries(str(out / "depth"), str(out / "headset")),
+        viewpoint=ViewpointEntries(str(out / "viewpoint")),
+        left=DisplayEntries(
+            grid_images=str(out / "grid-left"),
+            board_images=str(out / "board-left"),
+            tracked=str(out / "tracked-left.json"),
+        ),
+    )
+    return Photographs(out, work, VIEWPOINT_CAMERA)
+
+
+@pytest.fixture
+def choose(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
+    """Answer the system's dialogs with a path."""
+
+    def answer(path: Path) -> None:
+        for ask in ("getSaveFileName", "getOpenFileName"):
+            monkeypatch.setattr(QFileDialog, ask, lambda *_: (str(path), ""))
+
+    return answer

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QMessageBox, QPushButton, QSpinBox
+from pytestqt.qtbot import QtBot
+
+from handcal.camera.settings import RealSenseSettings
+from handcal.rig.board import Board
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import write_rig
+from handcal.types import Origin
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.windows.rig.board_page import BoardPage
+from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.work import WorkFolder
+
+ORIGIN = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
+
+
+@pytest.fixture
+def draft(tmp_path: Path) -> Draft:
+    return Draft(WorkFolder(tmp_path / "work"), RealSenseSettings())
+
+
+@pytest.fixture
+def page(qtbot: QtBot, draft: Draft) -> Iterator[BoardPage]:
+    page = BoardPage(draft)
+    qtbot.addWidget(page)
+    page.show()
+    yield page
+    page.stop()
+    draft.save()
+
+
+def found(page: BoardPage) -> str:
+    label = page.findChild(QLabel, "boardFound")
+    assert isinstance(label, QLabel)
+    return label.text()
+
+
+def press(page: BoardPage, name: str) -> None:
+    button = page.findChild(QPushButton, name)
+    assert isinstance(button, QPushButton)
+    button.click()
+
+
+def test_the_board_shown_is_the_one_entered(qtbot: QtBot, page: BoardPage, draft: Draft) -> None:
+    kind, columns = page.findChild(QComboBox, "kind"), page.findChild(QSpinBox, "columns")
+    square = page.findChild(QDoubleSpinBox, "square")
+    assert isinstance(kind, QComboBox)
+    assert isinstance(columns, QSpinBox)
+    assert isinstance(square, QDoubleSpinBox)
+    kind.setCurrentIndex(kind.findData("checkerboard"))
+    columns.setValue(12)
+    square.setValue(24.9)
+    expected = Board("checkerboard", (12, 7), 0.0249)
+    assert draft.work.board == expected
+    assert "11 × 6" in found(page)
+    preview = page.findChild(ImageView)
+    assert isinstance(preview, ImageView)
+    qtbot.waitUntil(lambda: preview.has_image)
+
+
+def test_an_impossible_board_is_told_and_not_taken(page: BoardPage, draft: Draft) -> None:
+    marker = page.findChild(QDoubleSpinBox, "marker")
+    assert isinstance(marker, QDoubleSpinBox)
+    marker.setValue(25.0)
+    assert "0.3 to 0.95" in found(page)
+    assert draft.work.board == Board()
+
+
+def test_the_board_is_saved(
+    page: BoardPage, choose: Callable[[Path], None], tmp_path: Path
+) -> None:
+    choose(tmp_path / "board.pdf")
+    press(page, "savePdf")
+    assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
+    assert "100 %" in found(page)
+    choose(tmp_path / "board.png")
+    press(page, "savePicture")
+    assert (tmp_path / "board.png").read_bytes().startswith(b"\x89PNG")
+    choose(tmp_path / "missing" / "board.pdf")
+    press(page, "savePdf")
+    assert "Not saved" in found(page)
+
+
+def test_another_rig_is_begun_from(
+    page: BoardPage,
+    draft: Draft,
+    choose: Callable[[Path], None],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    calibrated = replace(example_rig(), name="ours", origins={"left": ORIGIN})
+    write_rig(tmp_path / "ours.yaml", calibrated)
+    choose(tmp_path / "ours.yaml")
+    press(page, "begin")
+    assert draft.rig.name == "ours"
+    # What is calibrated is not given up unasked.
+    write_rig(tmp_path / "theirs.yaml", replace(example_rig(), name="theirs"))
+    choose(tmp_path / "theirs.yaml")
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
+    press(page, "begin")
+    assert draft.rig.name == "ours"
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
+    press(page, "begin")
+    assert draft.rig.name == "theirs"
+    choose(tmp_path / "none.yaml")
+    press(page, "begin")
+    assert "none.yaml" in found(page)

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QTreeWidget, QTreeWidgetItem
+from pytestqt.qtbot import QtBot
+
+from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.worst import WorstView
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.windows.rig.coverage_map import CoverageMap
+from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.solve import Solved
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> Iterator[ImagesPanel]:
+    panel = ImagesPanel(("Depth camera", "Headset camera"), "Take some.")
+    qtbot.addWidget(panel)
+    panel.resize(1000, 420)
+    panel.show()
+    yield panel
+    panel.stop()
+
+
+@pytest.fixture
+def full(qtbot: QtBot, panel: ImagesPanel, photographs: Any) -> ImagesPanel:
+    look(panel, photographs)
+    qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
+    return panel
+
+
+def look(panel: ImagesPanel, photographs: Any, dropped: tuple[str, ...] = ()) -> None:
+    stereo = photographs.work.stereo
+    folders = stereo.depth_images, stereo.headset_images
+    panel.look(folders, photographs.work.board, dropped)
+
+
+def item(panel: ImagesPanel, row: int) -> QTreeWidgetItem:
+    shots = panel.findChild(QTreeWidget, "shots")
+    assert isinstance(shots, QTreeWidget)
+    found = shots.topLevelItem(row)
+    assert found is not None
+    return found
+
+
+def text(panel: ImagesPanel, name: str) -> str:
+    label = panel.findChild(QLabel, name)
+    assert isinstance(label, QLabel)
+    return label.text()
+
+
+def test_what_was_found_is_listed(qtbot: QtBot, full: ImagesPanel) -> None:
+    assert text(full, "count") == "8 of 9 used"
+    assert item(full, 0).text(0) == "depth-001.png"
+    assert all(int(count) > 8 for count in item(full, 0).text(1).split(" · "))
+    name, problem = item(full, 8).text(0).split("\n")
+    assert name == "depth-099.png"
+    assert problem == f"{full.shots[8].problem[0].upper()}{full.shots[8].problem[1:]}"
+    images = full.findChildren(ImageView)
+    qtbot.waitUntil(lambda: all(image.has_image for image in images))
+    assert images[0].caption.startswith("Depth camera: ")
+    assert "corners" in images[1].caption
+
+
+def test_a_dropped_pair_no_longer_counts(qtbot: QtBot, full: ImagesPanel) -> None:
+    maps = full.findChildren(CoverageMap)
+    before = [shown.caption for shown in maps]
+    with qtbot.waitSignal(full.dropped_changed):
+        for row in range(1, 8):
+            item(full, row).setCheckState(0, Qt.CheckState.Unchecked)
+    assert full.dropped_of(()) == tuple(f"depth-{n:03}.png" for n in range(2, 9))
+    assert text(full, "count") == "1 of 9 used"
+    assert [shown.caption for shown in maps] != before
+    for row in range(1, 8):
+        item(full, row).setCheckState(0, Qt.CheckState.Checked)
+    assert [shown.caption for shown in maps] == before
+
+
+def test_results_stand_beside_the_images(full: ImagesPanel) -> None:
+    worst = WorstView("headset camera's of depth-002.png", 0.7, "it is blurred")
+    verdict = CalibrationVerdict("good", "as told")
+    residuals = {"depth-001.png": 0.25, "depth-002.png": 0.7}
+    full.show_solved(Solved(verdict, (), residuals, {"depth-001.png": 0.5}, worst))
+    assert [item(full, 0).text(column) for column in (2, 3)] == ["0.25", "29°"]
+    assert item(full, 1).text(0) == "depth-002.png\nWorst: it is blurred"
+    assert item(full, 2).text(2) == "–"
+    assert item(full, 8).text(0) != "depth-099.png"
+
+
+def test_folders_are_looked_through_once(qtbot: QtBot, full: ImagesPanel, photographs: Any) -> None:
+    shots = full.shots
+    look(full, photographs)
+    assert not full.bar.is_busy
+    assert full.shots is shots
+    full.forget()
+    look(full, photographs, ("depth-004.png",))
+    assert full.bar.is_busy
+    qtbot.waitUntil(lambda: not full.bar.is_busy, timeout=20_000)
+    assert full.dropped_of(()) == ("depth-004.png",)
+
+
+def test_without_images_what_was_left_out_stays(panel: ImagesPanel) -> None:
+    assert panel.dropped_of(("a.png",)) == ("a.png",)
+    assert text(panel, "count") == "No images yet"
+
+
+def test_why_there_are_none_is_told(
+    qtbot: QtBot, panel: ImagesPanel, photographs: Any, tmp_path: Path
+) -> None:
+    panel.look((str(tmp_path), str(tmp_path)), photographs.work.board, ())
+    qtbot.waitUntil(lambda: not panel.bar.is_busy)
+    assert "No PNG or JPEG" in text(panel, "imagesFound")
+    panel.look((str(tmp_path), ""), photographs.work.board, ())
+    assert not panel.bar.is_busy
+
+
+def test_what_was_left_out_of_other_images_is_forgotten(
+    qtbot: QtBot, full: ImagesPanel, photographs: Any
+) -> None:
+    item(full, 0).setCheckState(0, Qt.CheckState.Unchecked)
+    before = full.dropped_of(())
+    assert before
+    folders = photographs.work.stereo.headset_images, photographs.work.stereo.depth_images
+    with qtbot.waitSignal(full.dropped_changed):
+        full.look(folders, photographs.work.board, before)
+    qtbot.waitUntil(lambda: not full.bar.is_busy, timeout=20_000)
+    assert full.dropped_of(before) == ()

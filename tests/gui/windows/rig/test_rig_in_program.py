@@ -1,0 +1,50 @@
+"""The way into the rig wizard, and out of it with a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import write_rig
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.windows.rig.wizard import RigWizard
+
+
+@pytest.fixture
+def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
+    file = PreferencesFile(tmp_path / "config" / "preferences.json")
+    (tmp_path / "config").mkdir()
+    program = Program(file)
+    qtbot.addWidget(program.window)
+    program.window.show()
+    yield program
+    program.window.close()
+
+
+def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: Path) -> None:
+    button = program.start.findChild(QPushButton, "calibrateRig")
+    assert isinstance(button, QPushButton)
+    button.click()
+    (wizard,) = program.window.findChildren(RigWizard)
+    assert wizard.isVisible()
+    assert (tmp_path / "config" / "rig").is_dir()
+    path = tmp_path / "ours.yaml"
+    write_rig(path, example_rig())
+    wizard.rig_saved.emit(path)
+    assert program.start.new.settings.rig == str(path)
+    assert program.preferences.station.rig == str(path)
+    program.window.close()
+    assert not wizard.isVisible()
+    assert (tmp_path / "config" / "rig" / "work.json").exists()
+
+
+def test_without_a_folder_it_is_told_why(program: Program, tmp_path: Path) -> None:
+    (tmp_path / "config" / "rig").touch()
+    assert program.calibrate_rig() is None
+    assert "cannot create the folder" in program.window.banner.text

@@ -1,0 +1,203 @@
+"""The wizard from the first image to a rig file in use, with rendered photographs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QLineEdit, QListWidget, QPushButton, QSpinBox, QTreeWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.rig.board import Board
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import read_rig
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.windows.rig.step_page import StepPage
+from handcal_gui.windows.rig.take_dialog import TakeDialog
+from handcal_gui.windows.rig.wizard import RigWizard
+from handcal_gui.windows.rig.work import WorkFolder
+
+BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
+
+
+@pytest.fixture
+def folder(photographs: Any, tmp_path: Path) -> Path:
+    """A work folder with everything entered, but nothing solved."""
+    WorkFolder(tmp_path / "rig").save(photographs.work)
+    return tmp_path / "rig"
+
+
+@pytest.fixture
+def wizard(qtbot: QtBot, folder: Path) -> Iterator[RigWizard]:
+    wizard = RigWizard(WorkFolder(folder))
+    qtbot.addWidget(wizard)
+    wizard.show()
+    yield wizard
+    wizard.accept()
+
+
+def child(wizard: RigWizard, kind: Any, name: str) -> Any:
+    """Return the child of a name that can be seen."""
+    (found,) = (one for one in wizard.findChildren(kind, name) if one.isVisible())
+    return found
+
+
+def solve(qtbot: QtBot, wizard: RigWizard, step: int) -> str:
+    """Solve a step once its images have been looked through; return the verdict's text."""
+    wizard.show_step(step)
+    wait(qtbot, wizard)
+    child(wizard, QPushButton, "solve").click()
+    wait(qtbot, wizard)
+    return str(child(wizard, QLabel, "verdictFound").text())
+
+
+def wait(qtbot: QtBot, wizard: RigWizard) -> None:
+    bars = wizard.findChildren(JobBar)
+    qtbot.waitUntil(lambda: not any(bar.is_busy for bar in bars), timeout=30_000)
+
+
+def marks(wizard: RigWizard) -> list[str]:
+    rail = wizard.findChild(QListWidget, "rigRail")
+    assert isinstance(rail, QListWidget)
+    return [rail.item(row).toolTip() for row in range(rail.count())]
+
+
+def test_a_rig_is_calibrated_saved_and_used(
+    qtbot: QtBot, wizard: RigWizard, choose: Callable[[Path], None], folder: Path, tmp_path: Path
+) -> None:
+    undone = "not done yet"
+    assert marks(wizard) == ["good", *[undone] * 5]
+    assert "in the rig now" in solve(qtbot, wizard, STEREO)
+    assert "displays are calibrated with it" in solve(qtbot, wizard, VIEWPOINT)
+    assert "in the rig now" in solve(qtbot, wizard, LEFT)
+    assert undone not in marks(wizard)[:RIGHT]
+    assert marks(wizard)[VIEWPOINT] == "needs more views"  # eight of them
+    assert marks(wizard)[RIGHT:] == [undone, undone]
+    wizard.show_step(RESULT)
+    child(wizard, QLineEdit, "rigName").setText("Our headset")
+    use = child(wizard, QPushButton, "useRig")
+    assert not use.isEnabled()
+    choose(tmp_path / "ours.yaml")
+    child(wizard, QPushButton, "saveRig").click()
+    with qtbot.waitSignal(wizard.rig_saved) as saved:
+        use.click()
+    assert saved.args == [tmp_path / "ours.yaml"]
+    rig, truth = read_rig(tmp_path / "ours.yaml"), example_rig()
+    assert rig.name == "Our headset"
+    assert set(rig.origins) == {"T_H_D", "left"}
+    assert np.linalg.norm(rig.T_H_D[:3, 3] - truth.T_H_D[:3, 3]) < 0.0005
+    assert np.linalg.norm(rig.eyes["left"].t_C0_V_m - truth.eyes["left"].t_C0_V_m) < 0.005
+    np.testing.assert_array_equal(rig.eyes["right"].K, truth.eyes["right"].K)
+    # Nothing of it is lost by closing.
+    wizard.accept()
+    again = RigWizard(WorkFolder(folder))
+    qtbot.addWidget(again)
+    assert marks(again) == marks(wizard)
+    assert again.draft.rig.name == "Our headset"
+    assert again.draft.work == wizard.draft.work
+
+
+def test_an_image_is_dropped_and_taken_in_again(
+    qtbot: QtBot, wizard: RigWizard, folder: Path
+) -> None:
+    assert "8 pairs" in solve(qtbot, wizard, STEREO)
+    item = child(wizard, QTreeWidget, "shots").topLevelItem(1)
+    item.setCheckState(0, Qt.CheckState.Unchecked)
+    assert "7 pairs" in solve(qtbot, wizard, STEREO)
+    assert wizard.draft.rig.origins["T_H_D"].views == 7
+    wizard.accept()
+    assert WorkFolder(folder).load()[0].stereo.dropped == ("depth-002.png",)
+    wizard.show()
+    item.setCheckState(0, Qt.CheckState.Checked)
+    assert "8 pairs" in solve(qtbot, wizard, STEREO)
+
+
+def test_what_cannot_be_solved_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
+    assert "intrinsics are missing" in solve(qtbot, wizard, LEFT)
+    assert "intrinsics are missing" in solve(qtbot, wizard, RIGHT)
+    assert not wizard.draft.rig.origins
+
+
+def test_what_is_wrong_with_images_is_named(
+    qtbot: QtBot, wizard: RigWizard, photographs: Any, folder: Path
+) -> None:
+    depth = str(photographs.folder / "depth")
+    solve(qtbot, wizard, VIEWPOINT)
+    for step, fields, said in (
+        (STEREO, {"depth_images": depth, "headset_images": depth}, "images are the same"),
+        (RIGHT, asdict(photographs.work.left), "left and right exchanged"),
+    ):
+        wizard.show_step(step)
+        page = wizard.page
+        assert isinstance(page, StepPage)
+        page.form.enter(**{name: value for name, value in fields.items() if "dropped" not in name})
+        assert said in solve(qtbot, wizard, step)
+    assert not wizard.draft.rig.origins
+
+
+def test_another_board_is_looked_for_anew(qtbot: QtBot, wizard: RigWizard) -> None:
+    wizard.show_step(VIEWPOINT)
+    wait(qtbot, wizard)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    assert all(not shot.problem for shot in page.panels[0].shots)
+    wizard.draft.enter(board=Board(squares=(5, 4), square_m=0.03))
+    wizard.show_step(BOARDS)
+    wizard.show_step(VIEWPOINT)
+    wait(qtbot, wizard)
+    assert all(shot.problem for shot in page.panels[0].shots)
+
+
+def test_the_grid_is_saved(
+    wizard: RigWizard, choose: Callable[[Path], None], tmp_path: Path
+) -> None:
+    wizard.show_step(LEFT)
+    choose(tmp_path / "grid.png")
+    child(wizard, QPushButton, "saveGrid").click()
+    data = (tmp_path / "grid.png").read_bytes()
+    assert (int.from_bytes(data[16:20]), int.from_bytes(data[20:24])) == (1268, 720)
+    assert "show it unscaled" in child(wizard, QLabel, "verdictFound").text().lower()
+
+
+def test_closing_ends_what_runs(wizard: RigWizard) -> None:
+    wizard.show_step(STEREO)
+    wizard.accept()
+    assert not any(bar.is_busy for bar in wizard.findChildren(JobBar))
+
+
+def test_back_and_next_lead_through_the_steps(wizard: RigWizard) -> None:
+    back, forth = (child(wizard, QPushButton, name) for name in ("rigBack", "rigNext"))
+    assert not back.isEnabled()
+    for step in range(1, 6):
+        forth.click()
+        assert wizard.step == step
+    assert not forth.isEnabled()
+    back.click()
+    assert wizard.step == RIGHT
+
+
+def test_a_name_being_typed_is_kept_when_another_step_is_shown(wizard: RigWizard) -> None:
+    wizard.show_step(RESULT)
+    child(wizard, QLineEdit, "rigName").setText("Our headset")
+    wizard.show_step(BOARDS)
+    wizard.show_step(RESULT)
+    assert child(wizard, QLineEdit, "rigName").text() == "Our headset"
+    assert wizard.draft.rig.name == "Our headset"
+
+
+def test_a_grid_that_has_no_room_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
+    wizard.show_step(LEFT)
+    square = child(wizard, QSpinBox, "gridSquare")
+    square.setValue(700)
+    assert "no room" in child(wizard, QLabel, "imagesFound").text()
+    for name in ("saveGrid", "take"):
+        child(wizard, QPushButton, name).click()
+    assert wizard.findChild(TakeDialog) is None
+    square.setValue(80)
+    wait(qtbot, wizard)
+    assert "2 of 2 used" in child(wizard, QLabel, "count").text()

@@ -1,0 +1,44 @@
+from dataclasses import replace
+
+import numpy as np
+
+from handcal.geometry import rigid
+from handcal.rig.assemble import STEREO_PARAMETERS
+from handcal.rig.example import example_rig
+from handcal.types import Origin
+from handcal_gui.windows.rig.rows import difference_rows, rig_rows
+
+SIGMAS = np.array([1e-3, 2e-3, 3e-3, 1e-4, 2e-4, 3e-4])
+ORIGIN = Origin(
+    method="as told",
+    made="2026-11-21T16:00:00+00:00",
+    views=10,
+    rms_px=0.5,
+    verdict="good",
+    reason="as told",
+    parameters=STEREO_PARAMETERS,
+    covariance=np.diag(SIGMAS**2),
+)
+
+
+def test_a_rig_in_a_persons_units() -> None:
+    rig = replace(
+        example_rig(),
+        T_H_D=rigid([np.radians(-15.0), 0.0, 0.0], [-0.0175, -0.03, 0.015]),
+        origins={"T_H_D": ORIGIN},
+    )
+    cells = {row.label: row.cells for row in rig_rows(rig)}
+    assert cells["Left: t(C0→V) x"] == ("-0.50 mm", "–")
+    assert cells["Right: z(C0→S)"] == ("2.000 m", "–")
+    assert cells["T_H_D turn x"] == ("-15.000°", "0.057°")
+    assert cells["T_H_D y"] == ("-30.00 mm", "0.20 mm")
+    assert cells["Depth camera: fx"][0] == "1005.00 px"
+
+
+def test_the_same_rig_does_not_differ() -> None:
+    ours = example_rig()
+    theirs = replace(ours, T_H_D=ours.T_H_D @ rigid(None, [0.001, 0.0, 0.0]))
+    moved = {row.label: row.cells[0] for row in difference_rows(ours, theirs)}
+    assert moved["T_H_D: moved"] == "1.000 mm"
+    assert moved["T_H_D: turned"] == "0.000°"
+    assert moved["left: target is drawn elsewhere"].endswith("′")

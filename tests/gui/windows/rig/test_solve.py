@@ -1,0 +1,152 @@
+"""What the jobs do, against the truth of the rendered photographs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.display import view_of_eye
+from handcal.errors import HandcalError
+from handcal.geometry import invert, rigid
+from handcal.io.files import write_json
+from handcal.rig.assemble import screen_of
+from handcal.rig.example import example_rig
+from handcal.rig.formats import read_intrinsics, stereo_json, write_intrinsics
+from handcal.rig.stereo import StereoCalibration
+from handcal.rig.tracked_file import read_tracked, write_tracked
+from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.views import ViewsError
+from handcal.rig.worst import WorstView
+from handcal_gui.windows.rig.shots import Shot, look
+from handcal_gui.windows.rig.solve import (
+    Solved,
+    grid_of,
+    solve_display,
+    solve_stereo,
+    solve_viewpoint,
+)
+from handcal_gui.windows.rig.work import DisplayEntries
+
+RIG = example_rig()
+
+
+def shots_of(photographs: Any, *folders: str, board: Any = None) -> tuple[Shot, ...]:
+    paths = [photographs.folder / folder for folder in folders]
+    board = board or photographs.work.board
+    return look(paths, board, lambda _what, _share: None, lambda: False)
+
+
+@pytest.fixture(scope="module")
+def display_shots(photographs: Any) -> tuple[tuple[Shot, ...], tuple[Shot, ...]]:
+    screen = screen_of(RIG, "left")
+    grid = grid_of(photographs.work.left, screen.width_px, screen.height_px)
+    return shots_of(photographs, "grid-left", board=grid.board), shots_of(photographs, "board-left")
+
+
+def test_the_depth_camera_is_where_it_was(photographs: Any) -> None:
+    shots = shots_of(photographs, "depth", "headset")
+    solved = solve_stereo(shots, replace(photographs.work.stereo, dropped=("depth-003.png",)))
+    assert solved.verdict.name != "bad"
+    assert solved.put is not None
+    rig = solved.put(RIG)
+    assert np.linalg.norm(rig.T_H_D[:3, 3] - RIG.T_H_D[:3, 3]) < 0.0005
+    assert rig.origins["T_H_D"].views == 7
+    assert set(solved.residuals_px) == {f"depth-{n:03}.png" for n in range(1, 9) if n != 3}
+    assert len(solved.tilts_rad) == 8
+    assert all(0 < tilt < 0.8 for tilt in solved.tilts_rad.values())
+
+
+def test_the_viewpoint_camera_is_kept_in_a_file(photographs: Any, tmp_path: Path) -> None:
+    output = tmp_path / "viewpoint.json"
+    entries = photographs.work.viewpoint
+    solved = solve_viewpoint(shots_of(photographs, "viewpoint"), entries, output)
+    assert solved.verdict.name != "bad"
+    assert solved.put is None
+    assert read_intrinsics(output).fx == pytest.approx(photographs.viewpoint.fx, rel=0.003)
+    assert solved.rows[1].label == "fx"
+
+
+def test_too_few_images_are_told(photographs: Any, tmp_path: Path) -> None:
+    shots = shots_of(photographs, "viewpoint")[:2]
+    with pytest.raises(HandcalError, match="at least 3"):
+        solve_viewpoint(shots, photographs.work.viewpoint, tmp_path / "v.json")
+    assert not (tmp_path / "v.json").exists()
+
+
+def solve_left(
+    photographs: Any, shots: Any, folder: Path, entries: DisplayEntries | None = None
+) -> tuple[Solved, Solved]:
+    camera = folder / "viewpoint.json"
+    write_intrinsics(camera, photographs.viewpoint, "json")
+    entries = entries or photographs.work.left
+    grids, boards = shots
+    return solve_display(grids, boards, entries, "left", screen_of(RIG, "left"), camera)
+
+
+def test_the_display_is_where_it_was(photographs: Any, display_shots: Any, tmp_path: Path) -> None:
+    display, place = solve_left(photographs, display_shots, tmp_path)
+    assert (display.verdict.name, place.verdict.name) == ("good", "good")
+    assert display.put is not None
+    found, truth = display.put(RIG).eyes["left"], RIG.eyes["left"]
+    assert np.linalg.norm(found.t_C0_V_m - truth.t_C0_V_m) < 0.001
+    np.testing.assert_allclose(found.K[0, 0], truth.K[0, 0], rtol=0.003)
+    assert set(display.residuals_px) == {"grid-left-001.png", "grid-left-002.png"}
+    assert len(place.tilts_rad) == 4
+
+
+def test_the_distance_can_be_solved(photographs: Any, display_shots: Any, tmp_path: Path) -> None:
+    truth = RIG.eyes["left"]
+    arcmin = 60 * np.degrees(2 * np.arctan(40 / truth.K[0, 0]))
+    entries = replace(photographs.work.left, distance="solved", square_arcmin=float(arcmin))
+    display, _ = solve_left(photographs, display_shots, tmp_path, entries)
+    assert display.put is not None
+    assert display.put(RIG).eyes["left"].z_C0_S_m == pytest.approx(truth.z_C0_S_m, rel=0.01)
+
+
+def test_what_is_missing_is_named(photographs: Any, display_shots: Any, tmp_path: Path) -> None:
+    (grids, boards), entries = display_shots, photographs.work.left
+    screen = screen_of(RIG, "left")
+    with pytest.raises(HandcalError, match="intrinsics are missing"):
+        solve_display(grids, boards, entries, "left", screen, tmp_path / "none.json")
+    with pytest.raises(HandcalError, match="poses is missing"):
+        solve_left(photographs, display_shots, tmp_path, replace(entries, tracked=""))
+    poses = read_tracked(Path(entries.tracked))
+    del poses["board-left-002.png"]
+    write_tracked(tmp_path / "some.json", poses)
+    some = replace(entries, tracked=str(tmp_path / "some.json"))
+    with pytest.raises(ViewsError, match=r"no tracked pose for board-left-002\.png"):
+        solve_left(photographs, display_shots, tmp_path, some)
+
+
+def test_a_stereo_calibration_tells_the_place_instead(
+    photographs: Any, display_shots: Any, tmp_path: Path
+) -> None:
+    file, left = tmp_path / "stereo.json", RIG.eyes["left"]
+    stereo = StereoCalibration(
+        T_H_D=invert(view_of_eye(left, np.eye(4))) @ rigid([0.02, -0.01, 0.03]),
+        covariance=1e-9 * np.eye(6),
+        depth=photographs.viewpoint,
+        headset=photographs.viewpoint,
+        rms_px=0.1,
+        residuals_px={"a.png": 0.1},
+        spread_rad=0.0,
+        spread_m=0.0,
+        dropped=(),
+        worst=WorstView("a.png", 0.1, "as told"),
+        verdict=CalibrationVerdict("good", "as told"),
+    )
+    write_json(file, stereo_json(stereo))
+    entries = replace(photographs.work.left, stereo=str(file), tracked="")
+    display, place = solve_left(photographs, (display_shots[0], ()), tmp_path, entries)
+    assert display.put is not None
+    np.testing.assert_allclose(display.put(RIG).eyes["left"].t_C0_V_m, left.t_C0_V_m, atol=1e-9)
+    assert place.residuals_px == {"a.png": 0.1}
+
+
+def test_a_grid_without_room_is_told() -> None:
+    with pytest.raises(HandcalError, match="no room"):
+        grid_of(DisplayEntries(square_px=700), 1268, 720)

@@ -1,0 +1,128 @@
+"""Taking images with cameras that the tests hold in their hands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal.camera.playback import PlaybackSettings
+from handcal.camera.settings import RealSenseSettings
+from handcal.camera.viewpoint import ViewpointCamera
+from handcal.errors import CameraError
+from handcal.rig.choose import ChooseSettings
+from handcal_gui.windows.rig.shots import read_color
+from handcal_gui.windows.rig.take_dialog import TakeDialog
+
+REALSENSE_SETTINGS = RealSenseSettings(serial="42")
+
+
+@pytest.fixture
+def cameras(photographs: Any, still_camera: Any) -> dict[str, Any]:
+    names = {"0": "depth", "1": "headset"}
+    return {source: still_camera(photographs.image(name)) for source, name in names.items()}
+
+
+@pytest.fixture
+def dialog(
+    qtbot: QtBot, photographs: Any, cameras: dict[str, Any], tmp_path: Path
+) -> Iterator[TakeDialog]:
+    def open_still(source: str, *how: object) -> ViewpointCamera:
+        assert how[:2] == (REALSENSE_SETTINGS, PlaybackSettings(real_time=True, loop=True))
+        camera: ViewpointCamera = cameras[source]
+        return camera
+
+    folders = {"Depth camera": tmp_path / "depth", "Headset camera": tmp_path / "headset"}
+    dialog = TakeDialog(
+        folders,
+        photographs.work.board,
+        ChooseSettings(most=2, apart_share=0.0),
+        REALSENSE_SETTINGS,
+        open_source=open_still,
+        list_cameras=lambda: [0, 1],
+    )
+    qtbot.addWidget(dialog)
+    dialog.show()
+    sources = dialog.findChildren(QComboBox, "source")
+    qtbot.waitUntil(lambda: [one.currentText() for one in sources] == ["Camera 0", "Camera 1"])
+    yield dialog
+    dialog.reject()
+
+
+def button(dialog: TakeDialog, name: str) -> QPushButton:
+    found = dialog.findChild(QPushButton, name)
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def said(dialog: TakeDialog) -> str:
+    found = dialog.findChild(QLabel, "takenFound")
+    assert isinstance(found, QLabel)
+    return found.text()
+
+
+def start(qtbot: QtBot, dialog: TakeDialog) -> None:
+    button(dialog, "startCameras").click()
+    qtbot.waitUntil(button(dialog, "takeImage").isEnabled)
+
+
+def test_both_cameras_images_are_taken(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
+) -> None:
+    assert not button(dialog, "takeImage").isEnabled()
+    start(qtbot, dialog)
+    QTest.keyClick(dialog, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: "corners" in said(dialog))
+    assert said(dialog).startswith("Depth-001.png: ")
+    cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
+    qtbot.waitUntil(lambda: dialog.shown_images is not None and dialog.shown_images[1].max() == 90)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: "headset-002.png" in said(dialog).lower())
+    assert "Take another" in said(dialog)
+    depth = read_color(tmp_path / "depth" / "depth-002.png")
+    np.testing.assert_array_equal(depth, cameras["0"].image)
+    dialog.accept()
+    assert not any(camera.is_open for camera in cameras.values())
+
+
+def test_a_camera_that_fails_is_told_and_can_be_shown_again(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any]
+) -> None:
+    start(qtbot, dialog)
+    cameras["1"].failure = CameraError("it was unplugged")
+    qtbot.waitUntil(lambda: said(dialog) == "It was unplugged.")
+    assert not button(dialog, "takeImage").isEnabled()
+    start(qtbot, dialog)
+
+
+def test_images_are_taken_by_themselves_until_they_are_enough(
+    qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
+) -> None:
+    by_itself = dialog.findChild(QCheckBox, "byItself")
+    assert isinstance(by_itself, QCheckBox)
+    start(qtbot, dialog)
+    by_itself.click()
+    qtbot.waitUntil(lambda: said(dialog) == "2 taken: that is enough.")
+    assert not by_itself.isChecked()
+    for folder in ("depth", "headset"):
+        names = [path.name for path in sorted((tmp_path / folder).iterdir())]
+        assert names == [f"{folder}-00{number}.png" for number in (1, 2)]
+
+
+def test_what_is_not_taken_by_itself_is_explained(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
+) -> None:
+    cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
+    start(qtbot, dialog)
+    by_itself = dialog.findChild(QCheckBox, "byItself")
+    assert isinstance(by_itself, QCheckBox)
+    by_itself.click()
+    qtbot.waitUntil(lambda: said(dialog) == "0 taken; the board is not seen.")
+    assert not (tmp_path / "depth").exists()
