@@ -20,7 +20,7 @@ from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 from handcal.station.settings import StationSettings
-from handcal_gui.demonstration.demonstration import Demonstration
+from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 

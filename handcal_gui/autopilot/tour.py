@@ -9,7 +9,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QTabWidget, QWidget
 
 from handcal.errors import FileError
-from handcal_gui.demonstration.screenshots import Screenshots
+from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.panels.camera.panel import Mode

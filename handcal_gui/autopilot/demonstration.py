@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QApplication
 
 from handcal.errors import FileError
 from handcal.station.settings import StationSettings
-from handcal_gui.demonstration.autopilot import Autopilot
-from handcal_gui.demonstration.screenshots import Screenshots
-from handcal_gui.demonstration.tour import Tour
+from handcal_gui.autopilot.autopilot import Autopilot
+from handcal_gui.autopilot.screenshots import Screenshots
+from handcal_gui.autopilot.tour import Tour
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.pages.wizard.steps import Step, View
 from handcal_gui.program import Program

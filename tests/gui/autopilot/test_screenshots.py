@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
-from handcal_gui.demonstration.screenshots import Screenshots
+from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.pages.wizard.steps import Action, Offer, Step, View
 
 

@@ -1,0 +1,1 @@
+"""The program operating itself, for demonstrations and screenshots."""

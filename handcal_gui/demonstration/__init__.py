@@ -1,1 +1,0 @@
-"""The program operating itself, for demonstrations and pictures."""
