@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
 from handcal.camera.take_board import (
     DEPTH_TO_COLOR,
     IMAGER,
@@ -20,6 +19,7 @@ from handcal.camera.take_board import (
     take_views,
 )
 from handcal.camera.viewpoint import open_viewpoint
+from handcal.cli.main import main
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import interpolate_pose, rigid
 from handcal.io.closable import Closable

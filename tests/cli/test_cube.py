@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.geometry import rigid
 from handcal.io.images import write_png
 from handcal.rig.cube import Cube

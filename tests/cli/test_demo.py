@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.display import reprojection_arcmin
 from handcal.geometry import rigid
 from handcal.rig.example import Z_E_S_M, example_rig

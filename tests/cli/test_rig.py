@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.geometry import rigid
 from handcal.io.images import read_image
 from handcal.rig.board import Board, find_board

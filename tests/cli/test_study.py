@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.lab.study import noise
 
 TINY = replace(

@@ -1,7 +1,7 @@
 """Points in space, to be turned, zoomed and moved with the mouse or keys.
 
-Drawn by `handcal_gui.widgets.splat`: no OpenGL, which software rendering, remote desktops and virtual
-machines lack or emulate slowly.
+Drawn by `handcal_gui.widgets.splat`: no OpenGL, which software rendering, remote desktops and
+virtual machines lack or emulate slowly.
 """
 
 from __future__ import annotations

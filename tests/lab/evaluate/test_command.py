@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.hand.detect import Detections
 from handcal.types import UInt8
 

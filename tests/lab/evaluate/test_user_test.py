@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.display import TARGET_DEPTHS_M
 from handcal.errors import FileError
 from handcal.lab.evaluate.user_test import UserTest, evaluate_user_test, read_user_test

@@ -6,7 +6,7 @@ from shutil import copytree
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
+from handcal.cli.main import main
 from handcal.errors import FileError
 from handcal.lab.study.methods import MethodSettings
 from handcal.lab.study.recorded import evaluate_recordings, read_recordings

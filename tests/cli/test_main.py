@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.__main__ import main
 from handcal.camera.folder import record_folder
+from handcal.cli.main import main
 from handcal.geometry import rigid
 from handcal.lab import bench
 from handcal.link.pairing import KEY_VARIABLE
@@ -39,7 +39,7 @@ WALL_M = 1.5
 INTERRUPTIBLE = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from handcal.__main__ import main
+from handcal.cli.main import main
 main()
 """
 
