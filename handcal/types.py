@@ -25,6 +25,7 @@ UInt16: TypeAlias = NDArray[np.uint16]
 
 Eye: TypeAlias = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
+EyePlan: TypeAlias = Literal["both", "each", "left", "right"]
 RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]

@@ -16,7 +16,7 @@ from typing import NoReturn
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
-FIRST_SIZE = QSize(1600, 1000)
+from handcal_gui import FIRST_SIZE_PX
 
 
 def main() -> NoReturn:
@@ -47,7 +47,8 @@ def first_window(size: QSize | None) -> QLabel:
     """Show at once that the program starts, where it will appear."""
     window = QLabel("Starting handcal…", alignment=Qt.AlignmentFlag.AlignCenter)
     window.setWindowTitle("Starting…")
-    window.resize(size or QApplication.primaryScreen().availableSize().boundedTo(FIRST_SIZE))
+    screen = QApplication.primaryScreen().availableSize()
+    window.resize(size or screen.boundedTo(QSize(*FIRST_SIZE_PX)))
     window.show()
     QApplication.processEvents()
     return window

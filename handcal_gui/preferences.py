@@ -15,8 +15,8 @@ from handcal.io.files import make_folder, read_json, write_json
 from handcal.io.settings import read_settings, settings_json
 from handcal.link.pairing import read_pairing_key, write_pairing_key
 from handcal.station.settings import StationSettings
-from handcal_gui.pages.wizard.steps import EyePlan
-from handcal_gui.windows.evaluation.entries import EvaluationEntries
+from handcal.types import EyePlan
+from handcal_gui.evaluation_entries import EvaluationEntries
 
 Theme: TypeAlias = Literal["system", "light", "dark"]
 _MOST_WEARERS, _MOST_SESSIONS = 20, 8

@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QObject, Qt
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
@@ -16,12 +16,13 @@ from handcal.export.export import ExportSettings
 from handcal.session.session import SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
-from handcal_gui.app import FIRST_SIZE
+from handcal_gui import FIRST_SIZE_PX
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.live import Live
 from handcal_gui.control.review import Review
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.pages.start.start_page import StartPage
@@ -38,7 +39,6 @@ from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
-from handcal_gui.windows.evaluation.entries import EvaluationEntries
 from handcal_gui.windows.evaluation.offers import make_offers
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 from handcal_gui.windows.rig.wizard import RigWizard
@@ -269,7 +269,7 @@ class Program(QObject):
             self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
         else:
             screen = QGuiApplication.primaryScreen().availableSize()
-            self.window.resize(screen.boundedTo(FIRST_SIZE))
+            self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
         layouts: dict[Page, str] = {
             "live": preferences.live_layout,
             "review": preferences.review_layout,

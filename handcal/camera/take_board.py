@@ -13,7 +13,8 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
-from handcal.rig.board import Board, BoardError, BoardView, find_board
+from handcal.rig.board import Board, BoardError, BoardView
+from handcal.rig.board_finder import find_board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.formats import write_intrinsics, write_pose
 from handcal.types import Frame, UInt8

@@ -24,7 +24,6 @@ from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal.types import EYES, Eye, Rig
 
-EyePlan = Literal["both", "each"]
 Report = Callable[[str, float], None]
 
 _PATIENCE_S = 60.0
@@ -51,7 +50,7 @@ class DemoSettings:
 
     seed: int = 1
     alignments: int = 1
-    eyes: EyePlan = "both"
+    eyes: Literal["both", "each"] = "both"
     loss: float = 0.0
     reorder: float = 0.0
     worn_rig: str = ""

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.rig.board import MIN_CORNERS, Board
 from handcal.types import Float64, UInt8
 
-if TYPE_CHECKING:
-    from handcal.rig.board import Board
-
-MIN_CORNERS = 8
 # Fewer markers than these are also found in leaves and carpets.
 _ENOUGH_MARKERS = 4
 _FAMILIES = (
@@ -28,7 +25,7 @@ _FAMILIES = (
     "DICT_ARUCO_ORIGINAL",
 )
 
-FindCorners: TypeAlias = "Callable[[UInt8, Board], tuple[NDArray[np.int64], Float64]]"
+FindCorners: TypeAlias = Callable[[UInt8, Board], tuple[NDArray[np.int64], Float64]]
 
 
 def why_not_found(gray: UInt8, board: Board, find: FindCorners) -> str:
@@ -40,7 +37,7 @@ def why_not_found(gray: UInt8, board: Board, find: FindCorners) -> str:
     board : Board
         The board looked for.
     find : callable
-        `handcal.rig.board.find_corners`.
+        `handcal.rig.board_finder.find_corners`.
     """
     light = light_trouble(gray)
     if light:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.rig.board import Board, BoardView, charuco, find_board
+from handcal.rig.board import Board, BoardView, charuco
+from handcal.rig.board_finder import find_board
 from handcal.rig.check import MAX_SIDE_PX
 from handcal.types import Float64, UInt8, freeze
 

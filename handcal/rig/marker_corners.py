@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.rig.board import shades_at
+from handcal.rig.board_finder import shades_at
 from handcal.types import Float32, Float64, UInt8
 
 _ALONG = np.linspace(0.1, 0.9, 40)  # the parts of an edge next to the corners are blurred round

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import IMAGE_SUFFIXES, read_image
-from handcal.rig.board import Board, BoardError, BoardView, find_board
+from handcal.rig.board import Board, BoardError, BoardView
+from handcal.rig.board_finder import find_board
 from handcal.types import Intrinsics, UInt8
 
 MAX_VIEWS = 500

@@ -15,9 +15,10 @@ from handcal.session.session import Session
 from handcal.station.procedure import Calibration, State
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
+from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
 from handcal_gui.engine.engine_thread import Command, Stream
-from handcal_gui.pages.wizard.steps import Action, EyePlan, Step, Wizard
+from handcal_gui.pages.wizard.steps import Action, Step, Wizard
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.window import MainWindow, Panel
 

@@ -15,7 +15,8 @@ import pytest
 from handcal.cli.main import main
 from handcal.geometry import rigid
 from handcal.io.images import read_image
-from handcal.rig.board import Board, find_board
+from handcal.rig.board import Board
+from handcal.rig.board_finder import find_board
 from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
 from handcal.sim.boards import BoardPainter, board_poses
 from handcal.types import Float64, Intrinsics

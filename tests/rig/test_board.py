@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from handcal.geometry import image_points, rigid, transform
 from handcal.io.images import read_image
-from handcal.rig.board import Board, BoardError, corners_m, find_board
+from handcal.rig.board import Board, BoardError, corners_m
+from handcal.rig.board_finder import find_board
 from handcal.rig.board_print import draw_board
 from handcal.sim.boards import BoardPainter
 from handcal.types import Intrinsics, UInt8

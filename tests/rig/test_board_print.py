@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from handcal.io.images import read_image
-from handcal.rig.board import Board, charuco, find_board
+from handcal.rig.board import Board, charuco
+from handcal.rig.board_finder import find_board
 from handcal.rig.board_print import MAX_SIDE_PX, draw_board, write_board_pdf
 
 

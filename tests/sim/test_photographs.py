@@ -5,7 +5,7 @@ import numpy as np
 
 from handcal.geometry import invert
 from handcal.io.images import read_image
-from handcal.rig.board import find_board
+from handcal.rig.board_finder import find_board
 from handcal.rig.example import example_rig
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import board_pose

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
 
 import numpy as np
 
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye
+from handcal.types import EYES, Alignment, Eye, EyePlan
 from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.sentence import sentence
 
-EyePlan = Literal["both", "each", "left", "right"]
 PLANS: dict[EyePlan, str] = {
     "each": "One eye after the other",
     "both": "Both eyes at once",

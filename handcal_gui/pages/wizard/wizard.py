@@ -13,7 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.station.snapshot import Snapshot
-from handcal_gui.pages.wizard.steps import PLANS, STEPS, Check, EyePlan, Offer, Step, View, Wizard
+from handcal.types import EyePlan
+from handcal_gui.pages.wizard.steps import PLANS, STEPS, Check, Offer, Step, View, Wizard
 from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.widgets.fields import button, main_button
 

@@ -17,6 +17,7 @@ from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, named, paragraph, whole_number
@@ -26,7 +27,6 @@ from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.evaluation.capture_list import CaptureList
 from handcal_gui.windows.evaluation.cube import capture_plan, read_cube_and_grid
-from handcal_gui.windows.evaluation.entries import CubeEntries
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 _FIRST_SIZE = QSize(1120, 760)

@@ -19,7 +19,7 @@ from handcal.rig.grid import Grid
 from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_captures import CaptureSettings, write_captures
 from handcal.types import Rig
-from handcal_gui.windows.evaluation.entries import CubeEntries
+from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.windows.evaluation.work import Checkpoint
 
 _RENDERING_SHARE = 0.7

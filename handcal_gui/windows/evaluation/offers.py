@@ -18,17 +18,17 @@ from handcal.lab.study.noise_report import noise_report
 from handcal.lab.study.run import Study
 from handcal.report.document import Report
 from handcal.types import EYES
-from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import choice, named, whole_number
-from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
-from handcal_gui.windows.evaluation.cube import evaluate_cube
-from handcal_gui.windows.evaluation.entries import (
+from handcal_gui.evaluation_entries import (
     CubeEntries,
     MethodEntries,
     NoiseEntries,
     UserEntries,
 )
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import choice, named, whole_number
+from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
+from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
+from handcal_gui.windows.evaluation.cube import evaluate_cube
 from handcal_gui.windows.evaluation.evaluation_page import Offer
 from handcal_gui.windows.evaluation.preparation import Preparation
 from handcal_gui.windows.evaluation.work import Checkpoint, GivenData, SimulatedStudy

@@ -19,9 +19,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import named
-from handcal_gui.windows.evaluation.entries import EvaluationEntries
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, Offer
 
 _FIRST_SIZE = QSize(1240, 860)

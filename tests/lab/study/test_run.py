@@ -190,7 +190,7 @@ def test_a_cancelled_study_goes_on(tmp_path: Path) -> None:
 def test_a_killed_study_goes_on_and_leaves_no_process(tmp_path: Path) -> None:
     study = make_study(Settings(kills="parent", folder=str(tmp_path)))
     code = (
-        "from tests.study.test_run import *\n"
+        "from tests.lab.study.test_run import *\n"
         "import handcal.lab.study.run as run\n"
         "run._MAX_CHUNKS = 30\n"
         f"run_study(make_study({study.settings}), Path({str(tmp_path)!r}), workers=2)"

@@ -10,11 +10,10 @@ from handcal.errors import FileError
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye
+from handcal.types import EYES, Alignment, Eye, EyePlan
 from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
-    EyePlan,
     Step,
     View,
     Wizard,

@@ -9,8 +9,7 @@ from pytestqt.qtbot import QtBot
 from handcal.hand.overlay import contour_px
 from handcal.types import UInt8
 from handcal_gui.panels.camera.hand_overlay import HandOverlay, contour_runs
-
-from ..conftest import Shots
+from tests.gui.conftest import Shots
 
 SQUARE_PX = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 

@@ -18,8 +18,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.camera.depth_scale import DepthLegend
 from handcal_gui.panels.camera.panel import CameraPanel, Mode
 from handcal_gui.widgets.image_view import ImageView
-
-from ..conftest import NOW_NS, Shots
+from tests.gui.conftest import NOW_NS, Shots
 
 Maker = Callable[..., Snapshot]
 

@@ -15,8 +15,7 @@ from handcal_gui.panels.link.link_table import REJECTIONS
 from handcal_gui.panels.link.panel import LinkPanel
 from handcal_gui.widgets.number_label import NumberLabel
 from handcal_gui.widgets.plots import Plot
-
-from ..conftest import NOW_NS
+from tests.gui.conftest import NOW_NS
 
 Maker = Callable[..., Snapshot]
 KEY = "a pairing key of the tests"

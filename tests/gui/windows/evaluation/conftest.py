@@ -16,10 +16,10 @@ from handcal.errors import HandcalError
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import Row
 from handcal.report.document import Column, Figure, Report, Section, Table
+from handcal_gui.evaluation_entries import NoiseEntries
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import whole_number
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.evaluation.entries import NoiseEntries
 from handcal_gui.windows.evaluation.evaluation_page import Offer
 from handcal_gui.windows.evaluation.work import SimulatedStudy
 

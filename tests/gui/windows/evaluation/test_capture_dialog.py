@@ -24,10 +24,10 @@ from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.types import Intrinsics, UInt8
+from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
 from handcal_gui.windows.evaluation.capture_list import CaptureList
-from handcal_gui.windows.evaluation.entries import CubeEntries
 
 Kind = TypeVar("Kind", bound=QWidget)
 

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, Q
 from pytestqt.qtbot import QtBot
 
 from handcal.lab.study.run import run_study
-from handcal_gui.windows.evaluation.entries import EvaluationEntries, MethodEntries, NoiseEntries
+from handcal_gui.evaluation_entries import EvaluationEntries, MethodEntries, NoiseEntries
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 

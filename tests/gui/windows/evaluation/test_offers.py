@@ -18,14 +18,14 @@ from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.cube_captures import CaptureSettings
 from handcal.types import EYES, Rig
-from handcal_gui.windows.evaluation.cube import evaluate_cube
-from handcal_gui.windows.evaluation.entries import (
+from handcal_gui.evaluation_entries import (
     CubeEntries,
     EvaluationEntries,
     MethodEntries,
     NoiseEntries,
     UserEntries,
 )
+from handcal_gui.windows.evaluation.cube import evaluate_cube
 from handcal_gui.windows.evaluation.offers import make_offers
 from handcal_gui.windows.evaluation.work import GivenData, SimulatedStudy
 

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.windows.evaluation.entries import EvaluationEntries, NoiseEntries
+from handcal_gui.evaluation_entries import EvaluationEntries, NoiseEntries
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationDialog
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 

@@ -12,7 +12,7 @@ from handcal.errors import CancelledError, FileError
 from handcal.lab.study.run import run_study
 from handcal.report.document import Report
 from handcal.station.doctor import Health
-from handcal_gui.windows.evaluation.entries import NoiseEntries, UserEntries
+from handcal_gui.evaluation_entries import NoiseEntries, UserEntries
 from handcal_gui.windows.evaluation.work import Checkpoint, GivenData
 
 

@@ -1,0 +1,190 @@
+"""Finds a calibration board's corners in an image."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, charuco, corners_m
+from handcal.rig.board_trouble import why_not_found, why_not_plain
+from handcal.types import Float32, Float64, UInt8
+
+# Corners found further from where the others put them belong to something else, in squares.
+_STRAY_SQUARES = 0.5
+_MIN_SIDE_PX = 64
+
+
+def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView:
+    """Find the board's inner corners to a fraction of a pixel.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, 3) uint8
+        Grey or RGB, as the camera sees it: lens included, not mirrored. That a plain checkerboard
+        is mirrored cannot be seen in one image.
+    board : Board
+    explain : bool
+        Whether to find out why there is no board, which takes longer than finding one.
+
+    Raises
+    ------
+    BoardError
+        If fewer than `MIN_CORNERS` are found; the text says why: no board, another board or
+        dictionary, a mirrored image, one too dark …
+    """
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or min(image.shape[:2]) < _MIN_SIDE_PX:
+        raise ValueError(f"an image must be uint8 and at least {_MIN_SIDE_PX} pixels wide and high")
+    gray: UInt8 = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) if image.ndim == 3 else image  # type: ignore[assignment]
+    ids, pixels = find_corners(gray, board)
+    points_m = corners_m(board)[ids]
+    if len(ids) < MIN_CORNERS or np.linalg.matrix_rank(points_m[:, :2] - points_m[0, :2]) < 2:
+        why = why_not_found(gray, board, find_corners) if explain else "no board is seen"
+        raise BoardError(why)
+    fits = _fits(points_m, pixels)
+    if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS:
+        raise BoardError(
+            "the squares do not lie as on this board: check the number of squares and markers"
+        )
+    ids, pixels = ids[fits], pixels[fits]
+    if board.kind == "checkerboard" and _goes_on(gray, ids, pixels, board):
+        columns, rows = board.squares
+        goes_on = f"the checkerboard goes on: it has more squares than {columns}×{rows}"
+        raise BoardError(why_not_plain(gray) or goes_on)
+    pixels = _refine(gray, pixels, board)
+    return BoardView(
+        points_m=corners_m(board)[ids],
+        pixels=pixels,
+        size=(gray.shape[1], gray.shape[0]),
+        ids=ids,
+        blur_px=_blur_px(gray, ids, pixels, board),
+    )
+
+
+def find_corners(gray: UInt8, board: Board) -> tuple[Int64, Float64]:
+    """Return what corners are seen: numbers (N,) and pixels (N, 2), not yet refined or checked."""
+    if board.kind == "checkerboard":
+        return _find_checkerboard(gray, board)
+    pixels, ids, _, _ = cv2.aruco.CharucoDetector(charuco(board)).detectBoard(gray)
+    if ids is None or not len(ids):
+        return np.empty(0, np.int64), np.empty((0, 2))
+    order = np.argsort(ids.ravel())
+    return ids.ravel()[order].astype(np.int64), pixels.reshape(-1, 2)[order].astype(np.float64)
+
+
+def _find_checkerboard(gray: UInt8, board: Board) -> tuple[Int64, Float64]:
+    columns, rows = board.inner
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+    found, corners = cv2.findChessboardCorners(gray, board.inner, flags=flags)
+    if not found:  # slower, and now and then the only one to see it
+        found, corners = cv2.findChessboardCornersSB(gray, board.inner)
+    if not found:
+        return np.empty(0, np.int64), np.empty((0, 2))
+    grid = _upright(gray, corners.reshape(rows, columns, 2).astype(np.float64))
+    return np.arange(columns * rows), grid.reshape(-1, 2)
+
+
+def _upright(gray: UInt8, grid: Float64) -> Float64:
+    """Turn a (rows, columns, 2) grid of pixels so that it begins at the board's upper left."""
+    x, y = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    if x[0] * y[1] < x[1] * y[0]:  # numbered as in a mirror
+        grid = grid[::-1]
+    turns = range(4) if grid.shape[0] == grid.shape[1] else (0, 2)
+    return max((np.rot90(grid, turn) for turn in turns), key=lambda g: _uprightness(gray, g))
+
+
+def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
+    """Tell whether the first square is black, as printed, and how far x points to the right."""
+    middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
+    row, column = np.indices(middles.shape[:2])
+    shades = shades_at(gray, middles)
+    is_black = (row + column) % 2 == 0
+    first_is_black = bool(shades[is_black].mean() < shades[~is_black].mean())
+    return first_is_black, float(grid[0, -1, 0] - grid[0, 0, 0])
+
+
+def _fits(points_m: Float64, pixels: Float64) -> NDArray[np.bool_]:
+    """Tell which corners lie where a plane's image has them, lens distortion allowed."""
+    off_px = _STRAY_SQUARES * float(np.median(_spacings_px(pixels)))
+    H, inliers = cv2.findHomography(points_m[:, :2], pixels, cv2.RANSAC, off_px)
+    return np.zeros(len(pixels), np.bool_) if H is None else np.asarray(inliers).ravel() > 0
+
+
+def _goes_on(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> bool:
+    """Tell whether there are corners beyond any side of the grid: it is part of a larger board."""
+    columns, rows = board.inner
+    corners = corners_m(board)[:, :2] / board.square_m
+    H = np.asarray(cv2.findHomography(corners[ids], pixels)[0], dtype=np.float64)
+    along_x, along_y = np.arange(1, columns + 1), np.arange(1, rows + 1)
+    sides = [np.stack(np.broadcast_arrays(x, along_y), axis=1) for x in (0, columns + 1)]
+    sides += [np.stack(np.broadcast_arrays(along_x, y), axis=1) for y in (0, rows + 1)]
+    contrast = np.percentile(_checker(gray, corners, H), 50)
+    return any(np.median(_checker(gray, side, H)) > 0.75 * contrast for side in sides)
+
+
+def _checker(gray: UInt8, corners: Float64, H: Float64) -> Float64:
+    """Return how much the squares around each corner alternate; half as much at a board's edge."""
+    quadrants = 0.3 * np.array([[-1, -1], [1, 1], [-1, 1], [1, -1]])
+    places = cv2.perspectiveTransform(corners[:, None] + quadrants, H)
+    shades = shades_at(gray, np.asarray(places, dtype=np.float64))
+    alternation: Float64 = np.abs(shades[:, :2].sum(axis=1) - shades[:, 2:].sum(axis=1))
+    return alternation
+
+
+def _refine(gray: UInt8, pixels: Float64, board: Board) -> Float64:
+    """Refine corners in windows that hold no other corner.
+
+    OpenCV's usual radius of 11 pixels reaches the edges of the next squares on a small, steep or
+    turned board, which more than doubles the calibration's residual on its own stereo sample.
+    """
+    gap = (1 - board.marker_m / board.square_m) / 2 if board.kind == "charuco" else 1.0
+    radius = int(np.clip(min(0.3, 0.9 * gap) * _spacings_px(pixels).min(), 2, 11))
+    refined = cv2.cornerSubPix(
+        gray,
+        pixels[:, None].astype(np.float32),
+        (radius, radius),
+        (-1, -1),
+        (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 0.001),
+    )
+    return refined.reshape(-1, 2).astype(np.float64)
+
+
+def _spacings_px(pixels: Float64) -> Float64:
+    """Return each corner's distance to the nearest other."""
+    distances = np.asarray(cKDTree(pixels).query(pixels, k=2)[0])
+    return distances[:, 1]
+
+
+def _blur_px(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> float:
+    """Return the width of the squares' edges: contrast over steepness, halfway between corners."""
+    starts, ends = _neighbours(ids, pixels, board.inner[0])
+    across = (ends - starts)[:, ::-1] * [1, -1]
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    offsets_px = np.arange(-4.0, 4.5, 0.5)
+    places = (starts + ends)[:, None] / 2 + offsets_px[:, None] * across[:, None]
+    shades = shades_at(gray, places)
+    steepness = np.abs(np.diff(shades, axis=1)).max(axis=1) / 0.5
+    widths_px = np.ptp(shades, axis=1) / np.maximum(steepness, 1e-3)
+    # A motion blurs the edges across it only: the wider half counts.
+    return float(np.percentile(widths_px, 75)) if len(widths_px) else float("nan")
+
+
+def _neighbours(ids: Int64, pixels: Float64, columns: int) -> tuple[Float64, Float64]:
+    """Return the two ends, (M, 2) each, of all edges between corners that are both seen."""
+    at = dict(zip(ids.tolist(), pixels, strict=True))
+    pairs = [
+        (at[i], at[j])
+        for i in at
+        for j in (i + 1, i + columns)
+        if j in at and not (j == i + 1 and j % columns == 0)
+    ]
+    edges: Float64 = np.array(pairs).reshape(-1, 2, 2)
+    return edges[:, 0], edges[:, 1]
+
+
+def shades_at(gray: UInt8 | Float32, places: Float64) -> Float64:
+    """Return an image's shades at places of shape (..., 2), in pixels."""
+    x, y = places.reshape(-1, 1, 2).astype(np.float32).T
+    shades = cv2.remap(gray, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(shades, dtype=np.float64).reshape(places.shape[:-1])
