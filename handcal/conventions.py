@@ -31,17 +31,12 @@ _UNITY_FROM_OPENCV = np.diag([1.0, -1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """A pose as OpenXR's XrPosef and Unity's Pose hold it.
-
-    Attributes
-    ----------
-    position_m : (3,) float64
-    quaternion_xyzw : (4,) float64
-        Unit length, w not negative.
-    """
+    """A pose as OpenXR's XrPosef and Unity's Pose hold it."""
 
     position_m: Float64
+    """(3,)."""
     quaternion_xyzw: Float64
+    """(4,); unit length, w not negative."""
 
     def __post_init__(self) -> None:
         freeze(self, "position_m", np.float64, 3)

@@ -124,21 +124,14 @@ def reprojection_error_px(
 
 @dataclass(frozen=True, slots=True)
 class DrawnMove:
-    """How the user test's target moves on the display when φ changes.
-
-    Attributes
-    ----------
-    right_px, up_px : float
-    right_arcmin, up_arcmin : float
-    size_ratio : float
-        Above 1 if it is drawn larger.
-    """
+    """How the user test's target moves on the display when φ changes."""
 
     right_px: float
     up_px: float
     right_arcmin: float
     up_arcmin: float
     size_ratio: float
+    """Above 1 if it is drawn larger."""
 
 
 def effect_at(

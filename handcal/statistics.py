@@ -21,45 +21,31 @@ INTERVAL_METHOD = f"Student's t, corrected for skewness from {_FEWEST_FOR_SKEWNE
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """How numbers are spread.
-
-    Attributes
-    ----------
-    count : int
-    mean, sd : float
-        `sd` is that of a sample, and 0 for a single number.
-    median, q1, q3, min, max : float
-        `q1` to `q3` is the interquartile range.
-    """
+    """How numbers are spread."""
 
     count: int
     mean: float
     sd: float
+    """`sd` is that of a sample, and 0 for a single number."""
     median: float
     q1: float
     q3: float
     min: float
     max: float
+    """`q1` to `q3` is the interquartile range."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeanInterval:
-    """A mean and an interval that covers the true mean as often as `level` says.
-
-    Attributes
-    ----------
-    mean, low, high : float
-    level : float
-        0.95 for 95 %.
-    clusters : int
-        How many independent ones it is from.
-    """
+    """A mean and an interval that covers the true mean as often as `level` says."""
 
     mean: float
     low: float
     high: float
     level: float
+    """0.95 for 95 %."""
     clusters: int
+    """How many independent ones it is from."""
 
 
 @dataclass(frozen=True, slots=True)

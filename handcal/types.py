@@ -87,35 +87,23 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One depth image with its colour image, as the camera delivers them.
-
-    Attributes
-    ----------
-    index : int
-        Running number given by the camera; a gap means dropped frames.
-    t_camera_ns, t_host_ns : int
-        The camera's own time, and the host's monotonic time of arrival.
-    depth : (H, W) uint16
-        0 where there is no measurement.
-    depth_scale_m : float
-        Metres per unit of `depth`.
-    depth_intrinsics : Intrinsics
-    color : (h, w, 3) uint8 or None
-        RGB.
-    color_intrinsics : Intrinsics or None
-    T_C_D : (4, 4) float64
-        From the depth camera to the colour camera; identity for depth aligned to colour.
-    """
+    """One depth image with its colour image, as the camera delivers them."""
 
     index: int
+    """Running number given by the camera; a gap means dropped frames."""
     t_camera_ns: int
     t_host_ns: int
+    """The camera's own time, and the host's monotonic time of arrival."""
     depth: UInt16
+    """(H, W); 0 where there is no measurement."""
     depth_scale_m: float
+    """Metres per unit of `depth`."""
     depth_intrinsics: Intrinsics
     color: UInt8 | None = None
+    """(h, w, 3); RGB."""
     color_intrinsics: Intrinsics | None = None
     T_C_D: Float64 = field(default_factory=lambda: np.eye(4))
+    """(4, 4); from the depth camera to the colour camera; identity for depth aligned to colour."""
 
     def __post_init__(self) -> None:
         intrinsics = self.depth_intrinsics
@@ -130,39 +118,26 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandCloud:
-    """The segmented hand of one frame.
-
-    Attributes
-    ----------
-    t_camera_ns, t_host_ns : int
-        Times of the frame it came from.
-    points_m : (N, 3) float32
-        Visible surface, frame D.
-    is_cut : (N,) bool
-        True where the point lies beside a cut (forearm limit, ROI, image or depth-gate edge), so
-        that the hand goes on there; False elsewhere.
-    colors : (N, 3) uint8 or None
-        RGB of the points.
-    contour_m : (M, 3) float32
-        Outer contour in order around the hand, frame D.
-    contour_is_cut : (M,) bool
-        True on a cut edge, False on a silhouette.
-    mask : (H, W) uint8
-        255 on the hand, in the depth image.
-    box_px : (4,) int
-        x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive.
-    median_depth_m : float
-    """
+    """The segmented hand of one frame."""
 
     t_camera_ns: int
     t_host_ns: int
+    """Times of the frame it came from."""
     points_m: Float32
+    """(N, 3); visible surface, frame D."""
     is_cut: Bool
+    """(N,); True where the point lies beside a cut (forearm limit, ROI, image or depth-gate edge),
+    so that the hand goes on there; False elsewhere."""
     colors: UInt8 | None
+    """(N, 3); RGB of the points."""
     contour_m: Float32
+    """(M, 3); outer contour in order around the hand, frame D."""
     contour_is_cut: Bool
+    """(M,); True on a cut edge, False on a silhouette."""
     mask: UInt8
+    """(H, W); 255 on the hand, in the depth image."""
     box_px: tuple[int, int, int, int]
+    """(4,); x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive."""
     median_depth_m: float
 
     def __post_init__(self) -> None:
@@ -176,38 +151,28 @@ class HandCloud:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """What one confirmed alignment gives the solver.
-
-    Attributes
-    ----------
-    cursor_m, hand_m : (N, 3), (M, 3) float64
-        The hand at t_a and at t_b, frame W.
-    cursor_is_cut, hand_is_cut : (N,), (M,) bool
-        Points beside a cut edge.
-    T_E_W : mapping of eye to (4, 4) float64
-        World to each eye's E at t_b.
-    eyes : tuple of eye
-        The eyes that the wearer aligned with: both, or one.
-    rotation_rad : (3,) float64
-        Rotation vector from the cursor to the hand seen by the guard at t_b, frame D.
-    t_a_ns, t_b_ns : int
-        Camera times of the two frames.
-    drawn_shift_m : mapping of eye to (3,) float64
-        The φ that each eye's cursor was drawn with at t_b; zero for the offline calibration.
-    """
+    """What one confirmed alignment gives the solver."""
 
     cursor_m: Float64
     hand_m: Float64
+    """(N, 3); the hand at t_a and at t_b, frame W."""
     cursor_is_cut: Bool
     hand_is_cut: Bool
+    """(N,); points beside a cut edge."""
     T_E_W: Mapping[Eye, Float64]
+    """each (4, 4); world to each eye's E at t_b."""
     eyes: tuple[Eye, ...]
+    """The eyes that the wearer aligned with: both, or one."""
     rotation_rad: Float64
+    """(3,); rotation vector from the cursor to the hand seen by the guard at t_b, frame D."""
     t_a_ns: int
     t_b_ns: int
+    """Camera times of the two frames."""
     drawn_shift_m: Mapping[Eye, Float64] = field(
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
+    """each (3,); the φ that each eye's cursor was drawn with at t_b; zero for the offline
+    calibration."""
 
     def __post_init__(self) -> None:
         freeze(self, "cursor_m", np.float64, None, 3)
@@ -225,38 +190,25 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeShift:
-    """A solved eye shift φ from C0 to C1, in E's axes, and how far to trust it.
-
-    Attributes
-    ----------
-    shift_m : (3,) float64
-        φ1, φ2, φ3.
-    covariance_m2 : (3, 3) float64
-    rms_m : float
-        Root mean square distance of the inlier pairs after registration.
-    residuals_m : (M,) float64
-        Distance of each hand point to its partner after registration; NaN for an outlier.
-    inlier_ratio : float
-        Inlier pairs over hand points.
-    iterations : int
-    converged : bool
-    stop_reason : str
-    history_m2 : (iterations,) float64
-        Mean squared pair distance at each iteration.
-    method : str
-        One of `METHODS`, or ``"fused"``.
-    """
+    """A solved eye shift φ from C0 to C1, in E's axes, and how far to trust it."""
 
     shift_m: Float64
+    """(3,); φ1, φ2, φ3."""
     covariance_m2: Float64
+    """(3, 3)."""
     rms_m: float
+    """Root mean square distance of the inlier pairs after registration."""
     residuals_m: Float64
+    """(M,); distance of each hand point to its partner after registration; NaN for an outlier."""
     inlier_ratio: float
+    """Inlier pairs over hand points."""
     iterations: int
     converged: bool
     stop_reason: str
     history_m2: Float64
+    """(iterations,); mean squared pair distance at each iteration."""
     method: str
+    """One of `METHODS`, or ``"fused"``."""
 
     def __post_init__(self) -> None:
         freeze(self, "shift_m", np.float64, 3)
@@ -275,21 +227,14 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projection:
-    """What one eye of the headset renders with.
-
-    Attributes
-    ----------
-    eye : {"left", "right"}
-    P : (3, 4) float64
-        Pixels from points in V: ``ζ m = P [p_V; 1]``, OpenCV axes.
-    width_px, height_px : int
-        Size of the display.
-    """
+    """What one eye of the headset renders with."""
 
     eye: Eye
     P: Float64
+    """(3, 4); pixels from points in V: ``ζ m = P [p_V; 1]``, OpenCV axes."""
     width_px: int
     height_px: int
+    """Size of the display."""
 
     def __post_init__(self) -> None:
         freeze(self, "P", np.float64, 3, 4)
@@ -297,17 +242,11 @@ class Projection:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """The user test's target, drawn for one eye and resting before its display.
-
-    Attributes
-    ----------
-    eye : {"left", "right"}
-    corners_V_m : (4, 3) float64
-        Clockwise from the upper left, in V.
-    """
+    """The user test's target, drawn for one eye and resting before its display."""
 
     eye: Eye
     corners_V_m: Float64
+    """(4, 3); clockwise from the upper left, in V."""
 
     def __post_init__(self) -> None:
         freeze(self, "corners_V_m", np.float64, 4, 3)
@@ -315,30 +254,20 @@ class Target:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeDisplay:
-    """One eye's offline calibration.
-
-    Attributes
-    ----------
-    K : (3, 3) float64
-        On-axis intrinsics of E, px.
-    H0 : (3, 3) float64
-        Homography correction of the viewpoint C0 (paper, eq. for H).
-    t_C0_V_m : (3,) float64
-        Position of V from C0 in E's axes, so that ``p_E = p_V + t_C0_V_m``.
-    z_C0_S_m : float
-        Distance from C0 to the display's focal plane S.
-    width_px, height_px : int
-    T_V_H : (4, 4) float64
-        From the headset rig to the rendering camera, as the headset reports it.
-    """
+    """One eye's offline calibration."""
 
     K: Float64
+    """(3, 3); on-axis intrinsics of E, px."""
     H0: Float64
+    """(3, 3); homography correction of the viewpoint C0 (paper, eq. for H)."""
     t_C0_V_m: Float64
+    """(3,); position of V from C0 in E's axes, so that ``p_E = p_V + t_C0_V_m``."""
     z_C0_S_m: float
+    """Distance from C0 to the display's focal plane S."""
     width_px: int
     height_px: int
     T_V_H: Float64
+    """(4, 4); from the headset rig to the rendering camera, as the headset reports it."""
 
     def __post_init__(self) -> None:
         freeze(self, "K", np.float64, 3, 3)
@@ -349,34 +278,23 @@ class EyeDisplay:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Origin:
-    """How a part of a rig was calibrated, and how far to trust it.
-
-    Attributes
-    ----------
-    method : str
-        One line.
-    made : str
-        When: ISO 8601.
-    views : int
-        Images, or pairs of images, that were used.
-    rms_px : float
-        Root mean square of the reprojection error.
-    verdict, reason : str
-        One line each.
-    parameters : tuple of str
-        What the covariance is of, with units.
-    covariance : (n, n) float64
-        Of the n `parameters`.
-    """
+    """How a part of a rig was calibrated, and how far to trust it."""
 
     method: str
+    """One line."""
     made: str
+    """When: ISO 8601."""
     views: int
+    """Images, or pairs of images, that were used."""
     rms_px: float
+    """Root mean square of the reprojection error."""
     verdict: str
     reason: str
+    """One line each."""
     parameters: tuple[str, ...]
+    """What the covariance is of, with units."""
     covariance: Float64
+    """(n, n); of the n `parameters`."""
 
     def __post_init__(self) -> None:
         freeze(self, "covariance", np.float64, len(self.parameters), len(self.parameters))
@@ -384,24 +302,15 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """The offline calibration: both eye displays and where the depth camera sits.
-
-    Attributes
-    ----------
-    name : str
-    eyes : mapping of eye to EyeDisplay
-    T_H_D : (4, 4) float64
-        From the depth camera to the headset rig.
-    depth_intrinsics : Intrinsics
-    origins : mapping of part to Origin
-        How each of `RIG_PARTS` was calibrated, as far as that is known.
-    """
+    """The offline calibration: both eye displays and where the depth camera sits."""
 
     name: str
     eyes: Mapping[Eye, EyeDisplay]
     T_H_D: Float64
+    """(4, 4); from the depth camera to the headset rig."""
     depth_intrinsics: Intrinsics
     origins: Mapping[RigPart, Origin] = field(default_factory=dict)
+    """How each of `RIG_PARTS` was calibrated, as far as that is known."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_D", np.float64, 4, 4)

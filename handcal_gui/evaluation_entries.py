@@ -22,23 +22,14 @@ def _folder(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class NoiseEntries:
-    """What the noise study is to do.
-
-    Attributes
-    ----------
-    size : {"full", "quick"}
-    seed : int
-    processes : int
-        On this computer; 0 for one on each core.
-    scheduler : str
-        Address of a Dask scheduler that does the work instead; empty for none.
-    output : str
-    """
+    """What the noise study is to do."""
 
     size: Size = "full"
     seed: int = 1
     processes: int = 0
+    """On this computer; 0 for one on each core."""
     scheduler: str = ""
+    """Address of a Dask scheduler that does the work instead; empty for none."""
     output: str = field(default_factory=lambda: _folder("noise"))
 
 
@@ -55,39 +46,25 @@ class MethodEntries:
 
 @dataclass(frozen=True, slots=True)
 class CubeEntries:
-    """What the cube test looks at, and the plan of its captures.
-
-    Attributes
-    ----------
-    captures : str
-        Folder; empty to have the simulator render them.
-    cube, camera : str
-        Files; those in the folder of captures if empty.
-    rig : str
-        The example's if empty.
-    eye : {"left", "right"}
-    square_px : int
-        Of the grid on the display.
-    seed : int
-        Of what is rendered.
-    output : str
-    positions, drawn : str
-        Names with commas between them, as of `CapturePlan`.
-    poses : int
-    with_grid : bool
-    """
+    """What the cube test looks at, and the plan of its captures."""
 
     captures: str = ""
+    """Folder; empty to have the simulator render them."""
     cube: str = ""
     camera: str = ""
+    """Files; those in the folder of captures if empty."""
     rig: str = ""
+    """The example's if empty."""
     eye: Eye = "left"
     square_px: int = 80
+    """Of the grid on the display."""
     seed: int = 1
+    """Of what is rendered."""
     output: str = field(default_factory=lambda: _folder("cube"))
     positions: str = ", ".join(_PLAN.positions)
     poses: int = _PLAN.poses
     drawn: str = ", ".join(_PLAN.drawn)
+    """Names with commas between them, as of `CapturePlan`."""
     with_grid: bool = _PLAN.with_grid
 
 

@@ -30,37 +30,24 @@ def _default_station() -> StationSettings:
 
 @dataclass(frozen=True, slots=True)
 class Preferences:
-    """What the technician chose, to be chosen again.
-
-    Attributes
-    ----------
-    station : StationSettings
-    plan : EyePlan
-        Which eyes are aligned when.
-    wearers, sessions : tuple of str
-        Names, and paths of session folders, the newest first.
-    export : ExportSettings
-    export_folder : str
-        Where the last export went; empty before the first.
-    fine_tune_step_m : float
-    evaluation : EvaluationEntries
-    theme : {"system", "light", "dark"}
-    geometry, live_layout, review_layout : str
-        Of the window and of its docks on either page, as Qt gives them, in base64.
-    """
+    """What the technician chose, to be chosen again."""
 
     station: StationSettings = field(default_factory=_default_station)
     plan: EyePlan = "each"
+    """Which eyes are aligned when."""
     wearers: tuple[str, ...] = ()
     sessions: tuple[str, ...] = ()
+    """Names, and paths of session folders, the newest first."""
     export: ExportSettings = field(default_factory=ExportSettings)
     export_folder: str = ""
+    """Where the last export went; empty before the first."""
     fine_tune_step_m: float = 5e-4
     evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
     theme: Theme = "system"
     geometry: str = ""
     live_layout: str = ""
     review_layout: str = ""
+    """Of the window and of its docks on either page, as Qt gives them, in base64."""
 
     def with_wearer(self, name: str) -> Self:
         """Return these with a wearer's name as the newest."""

@@ -27,32 +27,22 @@ SPACING_PX = 8
 
 @dataclass(frozen=True, slots=True)
 class Colors:
-    """Colours with a meaning; everything else comes from the palette.
-
-    Attributes
-    ----------
-    live, cursor : str
-        The live hand while it may be confirmed, and the frozen one.
-    red : str
-        The live hand beyond the guard, and whatever is wrong.
-    good, warning : str
-    left, right : str
-        The two eyes in plots.
-    muted : str
-        Less important text and grid lines.
-    canvas : str
-        Background of pictures and plots.
-    """
+    """Colours with a meaning; everything else comes from the palette."""
 
     live: str
     cursor: str
+    """The live hand while it may be confirmed, and the frozen one."""
     red: str
+    """The live hand beyond the guard, and whatever is wrong."""
     good: str
     warning: str
     left: str
     right: str
+    """The two eyes in plots."""
     muted: str
+    """Less important text and grid lines."""
     canvas: str
+    """Background of pictures and plots."""
 
 
 _LIGHT = Colors(

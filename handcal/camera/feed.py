@@ -18,42 +18,27 @@ _RATE_WINDOW_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class CameraStatus:
-    """How the camera does.
-
-    Attributes
-    ----------
-    name : str
-    problem : str
-        Why no frames come, and what to do; empty while they come.
-    rate_hz : float
-        Frames over the last second.
-    dropped : int
-        Frames missing in the camera's own count since it was opened.
-    """
+    """How the camera does."""
 
     name: str
     problem: str = ""
+    """Why no frames come, and what to do; empty while they come."""
     rate_hz: float = 0.0
+    """Frames over the last second."""
     dropped: int = 0
+    """Frames missing in the camera's own count since it was opened."""
 
 
 @dataclass(frozen=True, slots=True)
 class FeedSettings:
-    """How patient a feed is.
-
-    Attributes
-    ----------
-    read_s : float
-        Longest time that `CameraFeed.read` takes.
-    silent_s : float
-        A camera silent for so long has a problem.
-    reopen_s : float
-        Time between attempts to open a camera that failed.
-    """
+    """How patient a feed is."""
 
     read_s: float = 0.2
+    """Longest time that `CameraFeed.read` takes."""
     silent_s: float = 1.0
+    """A camera silent for so long has a problem."""
     reopen_s: float = 1.0
+    """Time between attempts to open a camera that failed."""
 
 
 class CameraFeed(Closable):

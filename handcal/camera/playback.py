@@ -15,19 +15,13 @@ _LATE_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class PlaybackSettings:
-    """How a recording is played.
-
-    Attributes
-    ----------
-    real_time : bool
-        At the pace it was recorded at, dropping what is read too late; otherwise every frame, as
-        fast as it is read.
-    loop : bool
-        Begin again at the end; index and time of the frames then go back.
-    """
+    """How a recording is played."""
 
     real_time: bool = False
+    """At the pace it was recorded at, dropping what is read too late; otherwise every frame, as
+    fast as it is read."""
     loop: bool = False
+    """Begin again at the end; index and time of the frames then go back."""
 
 
 class PlayedCamera(Closable):

@@ -20,46 +20,29 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class RecordSettings:
-    """When a recording ends by itself.
-
-    Attributes
-    ----------
-    duration_s : float
-        By the camera's time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute.
-    frames : int
-    silent_s : float
-        A camera silent for so long has ended.
-    free_bytes : int
-        Left free on the disk.
-    lead_frames : int
-        So many frames at most are left out at the beginning, until one has colour: cameras pair
-        their first images badly.
-    """
+    """When a recording ends by itself."""
 
     duration_s: float = 60.0
+    """By the camera's time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute."""
     frames: int = 100_000
     silent_s: float = 5.0
+    """A camera silent for so long has ended."""
     free_bytes: int = 2**30
+    """Left free on the disk."""
     lead_frames: int = 30
+    """So many frames at most are left out at the beginning, until one has colour: cameras pair
+    their first images badly."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What was recorded.
-
-    Attributes
-    ----------
-    frames : int
-    dropped : int
-        Frames missing in between by the camera's own count.
-    duration_s : float
-        From the first to the last frame, by the camera's time.
-    stop_reason : str
-    """
+    """What was recorded."""
 
     frames: int
     dropped: int
+    """Frames missing in between by the camera's own count."""
     duration_s: float
+    """From the first to the last frame, by the camera's time."""
     stop_reason: str
 
 

@@ -13,25 +13,17 @@ from handcal.errors import CameraError
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A RealSense device as the SDK lists it; what it does not tell is empty.
-
-    Attributes
-    ----------
-    name, serial, firmware : str
-    usb : str
-        As in "3.2".
-    recommended_firmware : str
-        What this version of the SDK is tested with.
-    temperature_c : float or None
-        Of its processor; None if not told.
-    """
+    """A RealSense device as the SDK lists it; what it does not tell is empty."""
 
     name: str
     serial: str
     firmware: str
     usb: str
+    """As in "3.2"."""
     recommended_firmware: str = ""
+    """What this version of the SDK is tested with."""
     temperature_c: float | None = None
+    """Of its processor; None if not told."""
 
     @property
     def is_slow(self) -> bool:

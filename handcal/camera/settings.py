@@ -14,28 +14,19 @@ class RealSenseSettings:
     """How a RealSense camera is run; what is None stays as the device has it.
 
     Depth is never decimated, since its pixels would no longer be those of the rig's calibration.
-
-    Attributes
-    ----------
-    serial : str
-        Of the device; empty takes the first.
-    profile : {"auto", "1280x720", "848x480"}
-        Size of depth and colour, at 30 Hz; auto takes the largest that the device offers.
-    preset : str or None
-        The SDK's visual preset for the depth.
-    exposure_us : float or None
-        Of the depth, in microseconds; None lets the device choose it from frame to frame.
-    laser_power_mw : float or None
-        Of the projector.
-    spatial_filter, temporal_filter, hole_filling : bool
-        The SDK's filters of the depth image. They smooth and invent, so they are off.
     """
 
     serial: str = ""
+    """Of the device; empty takes the first."""
     profile: Profile = "auto"
+    """Size of depth and colour, at 30 Hz; auto takes the largest that the device offers."""
     preset: Preset | None = None
+    """The SDK's visual preset for the depth."""
     exposure_us: float | None = None
+    """Of the depth, in microseconds; None lets the device choose it from frame to frame."""
     laser_power_mw: float | None = None
+    """Of the projector."""
     spatial_filter: bool = False
     temporal_filter: bool = False
     hole_filling: bool = False
+    """The SDK's filters of the depth image. They smooth and invent, so they are off."""

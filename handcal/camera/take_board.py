@@ -28,37 +28,24 @@ _PATIENCE = 4
 
 @dataclass(frozen=True, slots=True)
 class TakeSettings:
-    """How long images are taken, and which.
-
-    Attributes
-    ----------
-    seconds : float
-        By the cameras' own time.
-    every_s : float
-        Between two moments looked at.
-    choose : ChooseSettings
-    """
+    """How long images are taken, and which."""
 
     seconds: float = 60.0
+    """By the cameras' own time."""
     every_s: float = 0.1
+    """Between two moments looked at."""
     choose: ChooseSettings = field(default_factory=ChooseSettings)
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What was taken.
-
-    Attributes
-    ----------
-    kept, looked_at : int
-        Moments.
-    passed_over : mapping of str to int
-        How many were not kept, by reason.
-    """
+    """What was taken."""
 
     kept: int
     looked_at: int
+    """Moments."""
     passed_over: Mapping[str, int]
+    """How many were not kept, by reason."""
 
 
 def take_views(

@@ -33,27 +33,18 @@ _PATIENCE_STEPS = 300
 
 @dataclass(frozen=True, slots=True)
 class DemoSettings:
-    """What the demonstration runs.
-
-    Attributes
-    ----------
-    seed : int
-        Of the wearer, the hand, the room and all noise.
-    alignments : int
-        How many times the wearer aligns (with each eye, if one at a time).
-    eyes : {"both", "each"}
-    loss, reorder : float
-        Share of the link's datagrams lost, and reordered, in each direction.
-    worn_rig : str
-        Path of the rig that the wearer really looks through; empty takes the one calibrated with.
-    """
+    """What the demonstration runs."""
 
     seed: int = 1
+    """Of the wearer, the hand, the room and all noise."""
     alignments: int = 1
+    """How many times the wearer aligns (with each eye, if one at a time)."""
     eyes: Literal["both", "each"] = "both"
     loss: float = 0.0
     reorder: float = 0.0
+    """Share of the link's datagrams lost, and reordered, in each direction."""
     worn_rig: str = ""
+    """Path of the rig that the wearer really looks through; empty takes the one calibrated with."""
 
 
 def run_demo(

@@ -21,18 +21,12 @@ from handcal.types import Float64, Frame, HandCloud, freeze
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandMotion:
-    """How the hand moved since the last frame that showed it.
-
-    Attributes
-    ----------
-    rotation_rad : (3,) float64
-        Rotation vector, frame D.
-    shift_m : (3,) float64
-        Displacement of the hand's centroid, frame D.
-    """
+    """How the hand moved since the last frame that showed it."""
 
     rotation_rad: Float64
+    """(3,); rotation vector, frame D."""
     shift_m: Float64
+    """(3,); displacement of the hand's centroid, frame D."""
 
     def __post_init__(self) -> None:
         freeze(self, "rotation_rad", np.float64, 3)
@@ -41,25 +35,16 @@ class HandMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReplayStep:
-    """What one frame showed.
-
-    Attributes
-    ----------
-    frame : Frame
-    hand : HandCloud or None
-    problem : str
-        Why there is no hand; empty if there is one.
-    segment_s : float
-        How long the segmentation took.
-    motion : HandMotion or None
-        None for the first hand.
-    """
+    """What one frame showed."""
 
     frame: Frame
     hand: HandCloud | None
     problem: str
+    """Why there is no hand; empty if there is one."""
     segment_s: float
+    """How long the segmentation took."""
     motion: HandMotion | None
+    """None for the first hand."""
 
 
 def replay(camera: Camera, settings: SegmentSettings) -> Iterator[ReplayStep]:

@@ -22,19 +22,13 @@ _SOLVING = "Solving the alignments again"
 
 @dataclass(frozen=True, slots=True)
 class ExportSettings:
-    """What is exported.
-
-    Attributes
-    ----------
-    formats : tuple of str
-        Some of `FORMATS`.
-    near_m, far_m : float
-        Clipping distances of the OpenGL and Unity matrices.
-    """
+    """What is exported."""
 
     formats: tuple[Format, ...] = tuple(FORMATS)
+    """Some of `FORMATS`."""
     near_m: float = 0.1
     far_m: float = 100.0
+    """Clipping distances of the OpenGL and Unity matrices."""
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.formats if name not in FORMATS]

@@ -118,22 +118,15 @@ def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results
 
 @dataclass(frozen=True, slots=True)
 class ResidualCells:
-    """A hand as the eye faces it, in cells, each (N,).
-
-    Attributes
-    ----------
-    x_mm, y_mm : float64
-        Upper left corners, in E.
-    points, inliers : int64
-    mean_mm : float64
-        Of the inliers' residuals; NaN without.
-    """
+    """A hand as the eye faces it, in cells, each (N,)."""
 
     x_mm: Float64
     y_mm: Float64
+    """Upper left corners, in E."""
     points: NDArray[np.int64]
     inliers: NDArray[np.int64]
     mean_mm: Float64
+    """Of the inliers' residuals; NaN without."""
 
 
 def residual_cells(alignment: Alignment, eye: Eye, shift: EyeShift) -> ResidualCells:

@@ -23,24 +23,16 @@ _MAX_CHARACTERS = 1000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """A session and its results, with what a stored session does not keep: residuals, histories.
-
-    Attributes
-    ----------
-    record : SessionRecord
-    settings : SolveSettings
-        The session's own.
-    results : Results or None
-        All alignments solved again; None without alignments.
-    shifts_m : mapping of eye to mapping of origin to (3,) float64
-        Every φ there is for an eye, the final one first: fine-tuned by hand, solved, and the
-        offline calibration's zero.
-    """
+    """A session and its results, with what a stored session does not keep: residuals, histories."""
 
     record: SessionRecord
     settings: SolveSettings
+    """The session's own."""
     results: Results | None
+    """All alignments solved again; None without alignments."""
     shifts_m: Mapping[Eye, Mapping[Origin, Float64]]
+    """each (3,); every φ there is for an eye, the final one first: fine-tuned by hand, solved, and
+    the offline calibration's zero."""
 
     @property
     def name(self) -> str:

@@ -26,45 +26,30 @@ _LARGE_ENOUGH = 0.95
 
 @dataclass(frozen=True, slots=True)
 class DetectSettings:
-    """How hands are detected.
-
-    Attributes
-    ----------
-    pixels : int
-        The network sees the image shrunk or grown to at most so many pixels.
-    score_min : float
-        Hands with a lower score are not returned; `CANDIDATE_SCORE_MIN` at least.
-    overlap_max : float
-        Of two candidates whose intersection over union is larger, the one with the lower score is
-        dropped.
-    agreement_min : float
-        A hand's box is the mean of the candidates, weighted by score, whose intersection over union
-        with the best is as large (box voting, Gidaris & Komodakis 2015), whatever `score_min` is.
-    hands : int
-        At most so many hands are returned, as in COCO's average precision.
-    """
+    """How hands are detected."""
 
     pixels: int = 110_592
+    """The network sees the image shrunk or grown to at most so many pixels."""
     score_min: float = 0.3
+    """Hands with a lower score are not returned; `CANDIDATE_SCORE_MIN` at least."""
     overlap_max: float = 0.4
+    """Of two candidates whose intersection over union is larger, the one with the lower score is
+    dropped."""
     agreement_min: float = 0.6
+    """A hand's box is the mean of the candidates, weighted by score, whose intersection over union
+    with the best is as large (box voting, Gidaris & Komodakis 2015), whatever `score_min` is."""
     hands: int = 100
+    """At most so many hands are returned, as in COCO's average precision."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
-    """Hands found in an image, the surest first.
-
-    Attributes
-    ----------
-    boxes_px : (N, 4) float64
-        x0, y0, x1, y1 from the image's upper left corner.
-    scores : (N,) float64
-        0 to 1: the overlap with the true box that the network expects.
-    """
+    """Hands found in an image, the surest first."""
 
     boxes_px: Float64
+    """(N, 4); x0, y0, x1, y1 from the image's upper left corner."""
     scores: Float64
+    """(N,); 0 to 1: the overlap with the true box that the network expects."""
 
     def __post_init__(self) -> None:
         freeze(self, "boxes_px", np.float64, None, 4)

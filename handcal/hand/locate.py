@@ -46,27 +46,18 @@ _WRIST_BEYOND_M = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocatedHand:
-    """Where the hand is.
-
-    Attributes
-    ----------
-    view : DepthView
-        The part of the image with the surface that the hand is on.
-    hand, arm : (h, w) bool
-        The hand, and the arm that goes on from it, in `view`.
-    palm_m : (3,) float64
-        Centre of the visible palm or back of the hand, camera frame.
-    palm_radius_m : float
-    limit_m : float
-        Distance from `palm_m` at which the arm begins.
-    """
+    """Where the hand is."""
 
     view: DepthView
+    """The part of the image with the surface that the hand is on."""
     hand: Bool
     arm: Bool
+    """(h, w); the hand, and the arm that goes on from it, in `view`."""
     palm_m: Float64
+    """(3,); centre of the visible palm or back of the hand, camera frame."""
     palm_radius_m: float
     limit_m: float
+    """Distance from `palm_m` at which the arm begins."""
 
 
 def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:

@@ -28,30 +28,21 @@ _BORDER_CONTACT_M = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandMask:
-    """The hand in the depth image.
-
-    Attributes
-    ----------
-    view : DepthView
-        The part of the image around the hand, at full resolution.
-    surface : (h, w) bool
-        Measured pixels of the hand.
-    filled : (h, w) uint8
-        255 on the hand, small holes closed.
-    outline : Pixels
-        The outer contour, in order.
-    cut : (h, w) bool
-        Where the hand ends but the arm, the region of interest or the gate's surface goes on.
-    pitch_m : float
-        About the distance between neighbouring pixels on the hand.
-    """
+    """The hand in the depth image."""
 
     view: DepthView
+    """The part of the image around the hand, at full resolution."""
     surface: Bool
+    """(h, w); measured pixels of the hand."""
     filled: UInt8
+    """(h, w); 255 on the hand, small holes closed."""
     outline: Pixels
+    """The outer contour, in order."""
     cut: Bool
+    """(h, w); where the hand ends but the arm, the region of interest or the gate's surface goes
+    on."""
     pitch_m: float
+    """About the distance between neighbouring pixels on the hand."""
 
 
 def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> HandMask:

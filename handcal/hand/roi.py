@@ -34,39 +34,27 @@ class RoiSettings:
     """How the hand is chosen and followed.
 
     Times are kept to the nearest frame.
-
-    Attributes
-    ----------
-    sure_min : float
-        Hands whose score is below this share of the surest one's are not considered.
-    check_s : float
-        The detector looks again at a hand that has been followed for so long,
-    check_margin : float
-        at its surroundings only, so many times its box's longer side on each side,
-    check_pixels : int
-        and with so few pixels, because this goes on all the time.
-    search_s : float
-        While there is none, the detector looks this often, at the whole image.
-    choose_s : float
-        So it does, no more often than this, at a followed hand that may be the wrong one.
-    misses : int
-        A followed hand that the detector does not see in so many looks in a row is dropped.
-    filled_min : float
-        Share of a hand's box that is at the hand's depth.
-    side_min_m, side_max_m : float
-        Range of the square root of a hand's box's area, at its depth.
     """
 
     sure_min: float = 0.7
+    """Hands whose score is below this share of the surest one's are not considered."""
     check_s: float = 0.19
+    """The detector looks again at a hand that has been followed for so long,"""
     check_margin: float = 0.5
+    """at its surroundings only, so many times its box's longer side on each side,"""
     check_pixels: int = 25_600
+    """and with so few pixels, because this goes on all the time."""
     search_s: float = 0.06
+    """While there is none, the detector looks this often, at the whole image."""
     choose_s: float = 1.0
+    """So it does, no more often than this, at a followed hand that may be the wrong one."""
     misses: int = 2
+    """A followed hand that the detector does not see in so many looks in a row is dropped."""
     filled_min: float = 0.25
+    """Share of a hand's box that is at the hand's depth."""
     side_min_m: float = 0.05
     side_max_m: float = 0.30
+    """Range of the square root of a hand's box's area, at its depth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

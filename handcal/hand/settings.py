@@ -15,30 +15,6 @@ Roi = Literal["detector", "left", "right", "depth"]
 class SegmentSettings:
     """How a hand is segmented.
 
-    Attributes
-    ----------
-    roi : {"detector", "left", "right", "depth"}
-        Where to look: where the hand detector sees a hand in the colour image, if there is one (of
-        several the nearest, the leftmost or the rightmost), or for the nearest hand-sized thing in
-        the whole depth image.
-    depth_min_m, depth_max_m : float
-        Depth gate: within arm's reach and the camera's range (paper, section on segmentation).
-    edge_jump_m : float
-        Neighbouring pixels this far apart in depth belong to different surfaces.
-    flying_m : float
-        A point this far behind another two pixels away is taken for a flying pixel.
-    forearm_m : float
-        How much of the forearm beyond the wrist counts as hand.
-    cut_band_m : float
-        Points this close to a cut edge are marked as cut.
-    hole_area_m2 : float
-        Holes in the hand up to this size are closed in the mask.
-    roi_margin : float
-        By how much a given region of interest is widened on each side, as a share of its size: a
-        detector's box ends at the wrist, but the way the arm leaves tells where the hand ends.
-    points : int
-        About how many points of the surface are kept.
-
     Raises
     ------
     ValueError
@@ -46,15 +22,27 @@ class SegmentSettings:
     """
 
     roi: Roi = "detector"
+    """Where to look: where the hand detector sees a hand in the colour image, if there is one (of
+    several the nearest, the leftmost or the rightmost), or for the nearest hand-sized thing in the
+    whole depth image."""
     depth_min_m: float = 0.35
     depth_max_m: float = 0.70
+    """Depth gate: within arm's reach and the camera's range (paper, section on segmentation)."""
     edge_jump_m: float = 0.02
+    """Neighbouring pixels this far apart in depth belong to different surfaces."""
     flying_m: float = 0.01
+    """A point this far behind another two pixels away is taken for a flying pixel."""
     forearm_m: float = 0.02
+    """How much of the forearm beyond the wrist counts as hand."""
     cut_band_m: float = 0.004
+    """Points this close to a cut edge are marked as cut."""
     hole_area_m2: float = 1e-4
+    """Holes in the hand up to this size are closed in the mask."""
     roi_margin: float = 0.4
+    """By how much a given region of interest is widened on each side, as a share of its size: a
+    detector's box ends at the wrist, but the way the arm leaves tells where the hand ends."""
     points: int = 5000
+    """About how many points of the surface are kept."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.depth_min_m < self.depth_max_m:

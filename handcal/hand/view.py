@@ -20,24 +20,16 @@ Pixels: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthView:
-    """Every `step_px`-th pixel of a box of a depth image.
-
-    Attributes
-    ----------
-    depth : (h, w) uint16
-    scale_m : float
-        Metres per unit of `depth`.
-    camera : Intrinsics
-        Of the whole image.
-    box : Box
-        In the whole image.
-    step_px : int
-    """
+    """Every `step_px`-th pixel of a box of a depth image."""
 
     depth: UInt16
+    """(h, w)."""
     scale_m: float
+    """Metres per unit of `depth`."""
     camera: Intrinsics
+    """Of the whole image."""
     box: Box
+    """In the whole image."""
     step_px: int
 
 

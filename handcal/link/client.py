@@ -25,32 +25,21 @@ _POSES_PER_DATAGRAM = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadsetState:
-    """What the PC wants shown.
-
-    Attributes
-    ----------
-    cursor_W_m, live_W_m : (N, 3) float64 or None
-        The frozen and the live hand, frame W; None where there is none.
-    cursor_id : int
-    live_red : bool
-        Whether the live hand is drawn red, turned too far.
-    prompt : str
-    eyes : tuple of eye
-        The eyes to keep open.
-    projections : mapping of eye to Projection
-        What each eye renders with, where the PC has said so.
-    target : Target or None
-        The user test's target; None where there is none.
-    """
+    """What the PC wants shown."""
 
     cursor_W_m: Float64 | None = None
     cursor_id: int = 0
     live_W_m: Float64 | None = None
+    """(N, 3); the frozen and the live hand, frame W; None where there is none."""
     live_red: bool = False
+    """Whether the live hand is drawn red, turned too far."""
     prompt: str = ""
     eyes: tuple[Eye, ...] = EYES
+    """The eyes to keep open."""
     projections: Mapping[Eye, Projection] = field(default_factory=dict)
+    """What each eye renders with, where the PC has said so."""
     target: Target | None = None
+    """The user test's target; None where there is none."""
 
 
 class HeadsetClient(Endpoint):

@@ -17,24 +17,16 @@ MIN_SAMPLES = 5
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """``t_headset - t_host = offset_ns + drift × (t_host - reference_host_ns)``.
-
-    Attributes
-    ----------
-    reference_host_ns : int
-    offset_ns, drift : float
-    round_trip_ns : float
-        Median over the pings kept.
-    uncertainty_ns : float
-        Half the shortest round trip, beyond which no asymmetry of the way can push the offset,
-        plus the standard error of the fit.
-    """
+    """``t_headset - t_host = offset_ns + drift × (t_host - reference_host_ns)``."""
 
     reference_host_ns: int
     offset_ns: float
     drift: float
     round_trip_ns: float
+    """Median over the pings kept."""
     uncertainty_ns: float
+    """Half the shortest round trip, beyond which no asymmetry of the way can push the offset, plus
+    the standard error of the fit."""
 
 
 class ClockEstimator:

@@ -14,24 +14,16 @@ from handcal.link.transport import Address, Transport
 
 @dataclass(frozen=True, slots=True)
 class Impairment:
-    """What happens to datagrams, in each direction.
-
-    Attributes
-    ----------
-    loss, duplicate, reorder : float
-        Probabilities, 0 to 1.
-    delay_s : float
-        For every datagram.
-    reorder_delay_s : float
-        More, for one that is reordered.
-    seed : int
-    """
+    """What happens to datagrams, in each direction."""
 
     loss: float = 0.0
     duplicate: float = 0.0
     reorder: float = 0.0
+    """Probabilities, 0 to 1."""
     delay_s: float = 0.0
+    """For every datagram."""
     reorder_delay_s: float = 0.01
+    """More, for one that is reordered."""
     seed: int = 0
 
     def __post_init__(self) -> None:

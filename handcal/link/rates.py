@@ -9,18 +9,12 @@ from handcal.link.server import LinkStatistics
 
 @dataclass(frozen=True, slots=True)
 class LinkRates:
-    """What passed between PC and headset, each way, over a while.
-
-    Attributes
-    ----------
-    lost, lost_inbound : float or None
-        Share of the datagrams to the headset and from it that did not arrive, 0 to 1; None if
-        there were none. Those to the headset are counted by its reports, a moment late.
-    sent_bytes_s, received_bytes_s : float
-    """
+    """What passed between PC and headset, each way, over a while."""
 
     lost: float | None
     lost_inbound: float | None
+    """Share of the datagrams to the headset and from it that did not arrive, 0 to 1; None if there
+    were none. Those to the headset are counted by its reports, a moment late."""
     sent_bytes_s: float
     received_bytes_s: float
 

@@ -31,64 +31,43 @@ _MAX_CONFIRMATIONS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Confirmation:
-    """The wearer says that the hand covers the cursor.
-
-    Attributes
-    ----------
-    t_headset_ns, t_host_ns : int
-        t_b on the headset's clock, and on the host's monotonic clock.
-    T_E_W : mapping of eye to (4, 4) float64
-        E0(t_b).
-    cursor_id : int
-    """
+    """The wearer says that the hand covers the cursor."""
 
     t_headset_ns: int
     t_host_ns: int
+    """t_b on the headset's clock, and on the host's monotonic clock."""
     T_E_W: Mapping[Eye, Float64]
+    """each (4, 4); E0(t_b)."""
     cursor_id: int
 
 
 @dataclass(frozen=True, slots=True)
 class LinkStatistics:
-    """How the link does.
-
-    Attributes
-    ----------
-    connected : bool
-    sent, received : int
-        Datagrams; of the received, the accepted ones.
-    lost, lost_inbound : int
-        Of this session's datagrams to the headset by its last report, and from it by gaps.
-    resent : int
-        Fragments sent again.
-    acked, unacked, failed : int
-        Reliable messages acknowledged, waiting, and given up.
-    rejected : mapping of str to int
-        Datagrams dropped, by reason (`wire.Rejection`).
-    pose_rate_hz : float
-        Distinct poses over the newest second of them.
-    latency_ms : float or None
-        Half the median round trip.
-    clock_offset_ms, clock_drift_ppm, clock_uncertainty_ms : float or None
-        Headset's clock less the host's; None before it is known.
-    bytes_sent, bytes_received : int
-    """
+    """How the link does."""
 
     connected: bool
     sent: int
     received: int
+    """Datagrams; of the received, the accepted ones."""
     lost: int
     lost_inbound: int
+    """Of this session's datagrams to the headset by its last report, and from it by gaps."""
     resent: int
+    """Fragments sent again."""
     acked: int
     unacked: int
     failed: int
+    """Reliable messages acknowledged, waiting, and given up."""
     rejected: Mapping[str, int]
+    """Datagrams dropped, by reason (`wire.Rejection`)."""
     pose_rate_hz: float
+    """Distinct poses over the newest second of them."""
     latency_ms: float | None
+    """Half the median round trip."""
     clock_offset_ms: float | None
     clock_drift_ppm: float | None
     clock_uncertainty_ms: float | None
+    """Headset's clock less the host's; None before it is known."""
     bytes_sent: int
     bytes_received: int
 

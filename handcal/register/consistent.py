@@ -39,27 +39,19 @@ _TURNED_SHARE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandMatch:
-    """Cursor and hand registered rigidly, whichever the eye.
-
-    Attributes
-    ----------
-    cursor_m, hand_m : (N, 3), (M, 3) float64
-        Both clouds in one frame.
-    cursor_near_cut : (N,) bool
-    spacing_m : float
-        Distance between neighbours in the thinned cursor.
-    tree : cKDTree
-        Of the cursor.
-    rigid : RigidResult
-        Its target is the cursor, its source the hand.
-    """
+    """Cursor and hand registered rigidly, whichever the eye."""
 
     cursor_m: Float64
     hand_m: Float64
+    """(N, 3); both clouds in one frame."""
     cursor_near_cut: Bool
+    """(N,)."""
     spacing_m: float
+    """Distance between neighbours in the thinned cursor."""
     tree: cKDTree
+    """Of the cursor."""
     rigid: RigidResult
+    """Its target is the cursor, its source the hand."""
 
 
 def match_hands(

@@ -33,25 +33,17 @@ Observed: TypeAlias = tuple[Float64, Float64, Float64]
 
 @dataclass(frozen=True, slots=True)
 class FuseSettings:
-    """What is known before, and how well people align.
-
-    Attributes
-    ----------
-    eye_box_sigma_m : float
-        Each component of φ, standard deviation: the eye box is about 2 cm wide (paper).
-    eye_difference_sigma_m : tuple of 3 float
-        Of the right φ from the left. x is the eye distance against the rig's: 2 mm where the
-        headset is set to the wearer's; 3.6 mm among adults (Gordon et al. 2014, ANSUR II).
-    lateral_sigma_arcmin : float
-        How exactly a wearer overlays, about each of two axes.
-    depth_sigma : float
-        How exactly a wearer matches the size, relative.
-    """
+    """What is known before, and how well people align."""
 
     eye_box_sigma_m: float = 0.010
+    """Each component of φ, standard deviation: the eye box is about 2 cm wide (paper)."""
     eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
+    """Of the right φ from the left. x is the eye distance against the rig's: 2 mm where the headset
+    is set to the wearer's; 3.6 mm among adults (Gordon et al. 2014, ANSUR II)."""
     lateral_sigma_arcmin: float = 3.0
+    """How exactly a wearer overlays, about each of two axes."""
     depth_sigma: float = 0.003
+    """How exactly a wearer matches the size, relative."""
 
 
 def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> EyeShift:

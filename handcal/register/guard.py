@@ -40,15 +40,10 @@ _ADVICE: dict[Axis, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class GuardSettings:
-    """When an alignment is refused.
-
-    Attributes
-    ----------
-    limit_rad : float
-        Largest rotation; 9° in the paper, for its 4 mm line.
-    """
+    """When an alignment is refused."""
 
     limit_rad: float = float(np.radians(9.0))
+    """Largest rotation; 9° in the paper, for its 4 mm line."""
 
 
 class RotationGuard:
@@ -141,21 +136,14 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
 
 @dataclass(frozen=True, slots=True)
 class TurnAdvice:
-    """How to turn the hand back, about the axis about which it is turned most.
-
-    Attributes
-    ----------
-    axis : {"x", "y", "z"}
-        Of the depth camera: pitch, yaw, roll of the hand.
-    angle_rad : float
-        To turn the hand by, right-handed about that axis.
-    text : str
-        In words for the wearer, without the angle or a full stop.
-    """
+    """How to turn the hand back, about the axis about which it is turned most."""
 
     axis: Axis
+    """Of the depth camera: pitch, yaw, roll of the hand."""
     angle_rad: float
+    """To turn the hand by, right-handed about that axis."""
     text: str
+    """In words for the wearer, without the angle or a full stop."""
 
 
 def turn_advice(rotation_rad: ArrayLike) -> TurnAdvice:

@@ -22,46 +22,29 @@ RESULTS_VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class SolveSettings:
-    """How alignments are solved.
-
-    Attributes
-    ----------
-    method : str
-        One of `handcal.types.METHODS`.
-    fuse : FuseSettings
-    verdict : VerdictSettings
-    """
+    """How alignments are solved."""
 
     method: Method = "consistent"
+    """One of `handcal.types.METHODS`."""
     fuse: FuseSettings = field(default_factory=FuseSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """What all alignments so far say.
-
-    Attributes
-    ----------
-    method : str
-    alignments : tuple of mapping of eye to EyeShift
-        Each alignment alone, without prior.
-    shifts : mapping of eye to EyeShift
-        Fused; what the headset shall render with.
-    verdicts : mapping of eye to Verdict
-    eye_distance_m : float or None
-        Implied by the shifts; None unless both eyes are solved.
-    expected_after_another_arcmin : mapping of eye to float
-        What `expected_error_arcmin` of the shifts would become with one more alignment like those
-        so far.
-    """
+    """What all alignments so far say."""
 
     method: Method
     alignments: tuple[Mapping[Eye, EyeShift], ...]
+    """Each alignment alone, without prior."""
     shifts: Mapping[Eye, EyeShift]
+    """Fused; what the headset shall render with."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
+    """Implied by the shifts; None unless both eyes are solved."""
     expected_after_another_arcmin: Mapping[Eye, float]
+    """What `expected_error_arcmin` of the shifts would become with one more alignment like those so
+    far."""
 
 
 def solve_session(

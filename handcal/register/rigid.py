@@ -22,48 +22,31 @@ from handcal.types import Float64
 
 @dataclass(frozen=True, slots=True)
 class RigidSettings:
-    """How to register rigidly.
-
-    Attributes
-    ----------
-    max_points : int
-        Each cloud is thinned to this many.
-    max_interior : int
-        Points off the outline used from each side at every step.
-    max_iterations : int
-    tolerance_m : float
-        Stop when a step moves no point of the hand by more than this.
-    outlier_m : float
-        Distance at which an outline pair counts a quarter (Geman-McClure), once most pairs lie
-        closer than a third of it.
-    """
+    """How to register rigidly."""
 
     max_points: int = 1500
+    """Each cloud is thinned to this many."""
     max_interior: int = 500
+    """Points off the outline used from each side at every step."""
     max_iterations: int = 40
     tolerance_m: float = 3e-5
+    """Stop when a step moves no point of the hand by more than this."""
     outlier_m: float = 0.004
+    """Distance at which an outline pair counts a quarter (Geman-McClure), once most pairs lie
+    closer than a third of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidResult:
-    """A rigid registration.
-
-    Attributes
-    ----------
-    T_target_source : (4, 4) float64
-    information : (6, 6) float64
-        Gauss-Newton matrix at the end, for a rotation (rad) about the source's centroid and a
-        translation (m), for residuals of unit variance.
-    history_m2 : (iterations,) float64
-        Weighted mean squared residual at each iteration.
-    converged : bool
-    stop_reason : str
-    """
+    """A rigid registration."""
 
     T_target_source: Float64
+    """(4, 4)."""
     information: Float64
+    """(6, 6); gauss-Newton matrix at the end, for a rotation (rad) about the source's centroid and
+    a translation (m), for residuals of unit variance."""
     history_m2: Float64
+    """(iterations,); weighted mean squared residual at each iteration."""
     converged: bool
     stop_reason: str
 

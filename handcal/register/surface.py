@@ -28,36 +28,25 @@ _LEAST_FREE = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """A thinned hand cloud with its local shape.
-
-    Attributes
-    ----------
-    points_m : (N, 3) float64
-    normals : (N, 3) float64
-        Unit normals, sign undefined.
-    outward : (N, 3) float64
-        Unit tangent away from the neighbours: on the outline, out of the hand.
-    near_cut : (N,) bool
-        Within a few point spacings of a cut edge.
-    outline : (M,) int
-        Indices of the points on the silhouette, cut edges excluded.
-    outline_weight : (M,) float64
-        0..1, how surely each lies on the silhouette.
-    tree, outline_tree : cKDTree
-        Of `points_m` and of its outline.
-    spacing_m : float
-        Distance between neighbours.
-    """
+    """A thinned hand cloud with its local shape."""
 
     points_m: Float64
+    """(N, 3)."""
     normals: Float64
+    """(N, 3); unit normals, sign undefined."""
     outward: Float64
+    """(N, 3); unit tangent away from the neighbours: on the outline, out of the hand."""
     near_cut: Bool
+    """(N,); within a few point spacings of a cut edge."""
     outline: Indices
+    """(M,); indices of the points on the silhouette, cut edges excluded."""
     outline_weight: Float64
+    """(M,); 0..1, how surely each lies on the silhouette."""
     tree: cKDTree
     outline_tree: cKDTree
+    """Of `points_m` and of its outline."""
     spacing_m: float
+    """Distance between neighbours."""
 
 
 def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) -> Surface:

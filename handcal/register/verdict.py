@@ -14,25 +14,16 @@ from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Float64, Rig, Verdict
 
 @dataclass(frozen=True, slots=True)
 class VerdictSettings:
-    """Limits.
-
-    Attributes
-    ----------
-    eye_box_m : float
-        Longest plausible φ.
-    eye_distance_min_m, eye_distance_max_m : float
-        Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm).
-    error_max_arcmin : float
-        Largest error to expect in the display. Published methods leave medians of 10 to 17′ (paper,
-        its table of reprojection errors).
-    rms_max_m : float
-    inlier_ratio_min : float
-    """
+    """Limits."""
 
     eye_box_m: float = 0.020
+    """Longest plausible φ."""
     eye_distance_min_m: float = 0.050
     eye_distance_max_m: float = 0.080
+    """Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm)."""
     error_max_arcmin: float = 15.0
+    """Largest error to expect in the display. Published methods leave medians of 10 to 17′ (paper,
+    its table of reprojection errors)."""
     rms_max_m: float = 0.005
     inlier_ratio_min: float = 0.6
 

@@ -39,21 +39,6 @@ class Table:
 class Figure:
     """A strip of axes beside one another, over a page's width.
 
-    Attributes
-    ----------
-    name : str
-        Of its files: lower-case letters, digits and hyphens, once in a report.
-    caption : str
-    draw : callable
-        Draws into the axes that it is given; called once for each file the figure is in.
-    rows : sequence of mapping
-        The numbers behind it: the rows of its CSV.
-    height_mm : float
-    columns : int
-        How many axes.
-    left_mm : float
-        Room for tick labels and title on the left of each.
-
     Raises
     ------
     ValueError
@@ -61,12 +46,17 @@ class Figure:
     """
 
     name: str
+    """Of its files: lower-case letters, digits and hyphens, once in a report."""
     caption: str
     draw: Callable[[Sequence[Axes]], None]
+    """Draws into the axes that it is given; called once for each file the figure is in."""
     rows: Sequence[Row]
+    """The numbers behind it: the rows of its CSV."""
     height_mm: float = 60.0
     columns: int = 1
+    """How many axes."""
     left_mm: float = AXES_LEFT_MM
+    """Room for tick labels and title on the left of each."""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
@@ -92,15 +82,6 @@ class Section:
 class Report:
     """All that a report says.
 
-    Attributes
-    ----------
-    title : str
-    subject : str
-        What it is of, in one line; on every page.
-    lead : str
-        The finding in a sentence or two.
-    sections : sequence of Section
-
     Raises
     ------
     ValueError
@@ -109,7 +90,9 @@ class Report:
 
     title: str
     subject: str
+    """What it is of, in one line; on every page."""
     lead: str
+    """The finding in a sentence or two."""
     sections: Sequence[Section]
 
     def __post_init__(self) -> None:

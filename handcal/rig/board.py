@@ -31,29 +31,21 @@ class Board:
 
     Its frame has the origin at the outer corner of its upper left square, x to the right and y
     down along the print, and z into it. Inner corners are numbered row by row from the upper left.
-
-    Attributes
-    ----------
-    kind : {"charuco", "checkerboard"}
-        A ChArUco board may be seen in part, and tells which side is up. A checkerboard must be
-        seen whole. With an even number of squares along one side and an odd one along the other
-        it tells which side is up; otherwise it is taken to stand as upright as it can.
-    squares : (int, int)
-        Columns and rows of squares, 3 to 40.
-    square_m, marker_m : float
-        Sides of a square and of a marker.
-    dictionary : str
-        Of the markers, as OpenCV calls it.
-    legacy : bool
-        Printed by OpenCV before 4.6, which began with a white square if the rows are even.
     """
 
     kind: BoardKind = "charuco"
+    """A ChArUco board may be seen in part, and tells which side is up. A checkerboard must be seen
+    whole. With an even number of squares along one side and an odd one along the other it tells
+    which side is up; otherwise it is taken to stand as upright as it can."""
     squares: tuple[int, int] = (10, 7)
+    """(int, int); columns and rows of squares, 3 to 40."""
     square_m: float = 0.025
     marker_m: float = 0.016
+    """Sides of a square and of a marker."""
     dictionary: str = "DICT_5X5_100"
+    """Of the markers, as OpenCV calls it."""
     legacy: bool = False
+    """Printed by OpenCV before 4.6, which began with a white square if the rows are even."""
 
     def __post_init__(self) -> None:
         columns, rows = self.squares
@@ -86,27 +78,18 @@ class Board:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardView:
-    """The corners of a board seen in one image.
-
-    Attributes
-    ----------
-    points_m : (N, 3) float64
-        Corners in the board's frame; z is 0.
-    pixels : (N, 2) float64
-        The same in the image.
-    size : (int, int)
-        Width and height of the image.
-    ids : (N,) int64
-        Their numbers on the board, ascending.
-    blur_px : float
-        How wide the squares' edges are in the image: 1 to 3 where it is sharp.
-    """
+    """The corners of a board seen in one image."""
 
     points_m: Float64
+    """(N, 3); corners in the board's frame; z is 0."""
     pixels: Float64
+    """(N, 2); the same in the image."""
     size: tuple[int, int]
+    """(int, int); width and height of the image."""
     ids: Int64
+    """(N,); their numbers on the board, ascending."""
     blur_px: float
+    """How wide the squares' edges are in the image: 1 to 3 where it is sharp."""
 
     def __post_init__(self) -> None:
         freeze(self, "points_m", np.float64, None, 3)

@@ -42,62 +42,40 @@ MIN_VIEWS = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """How intrinsics are solved, and when they are good.
-
-    Attributes
-    ----------
-    lens : {"none", "radial", "full", "rational"}
-        Distortion: none; k1, k2; k1, k2, p1, p2, k3; the same and k4 to k6.
-    good_views : int
-        With fewer, more are asked for.
-    good_coverage : float
-        Share of the image's cells that must have had a corner.
-    good_spread_rad : float
-        How far the boards' normals must spread about their mean, RMS.
-    max_focal_sigma, bad_focal_sigma : float
-        Relative standard deviation of the focal lengths: up to which they are good, and from which
-        on they are as good as unknown.
-    max_rms_px : float
-        Above, something is wrong: board, focus or exposure.
-    """
+    """How intrinsics are solved, and when they are good."""
 
     lens: LensModel = "full"
+    """Distortion: none; k1, k2; k1, k2, p1, p2, k3; the same and k4 to k6."""
     good_views: int = 10
+    """With fewer, more are asked for."""
     good_coverage: float = 0.6
+    """Share of the image's cells that must have had a corner."""
     good_spread_rad: float = 0.2
+    """How far the boards' normals must spread about their mean, RMS."""
     max_focal_sigma: float = 0.001
     bad_focal_sigma: float = 0.03
+    """Relative standard deviation of the focal lengths: up to which they are good, and from which
+    on they are as good as unknown."""
     max_rms_px: float = 1.0
+    """Above, something is wrong: board, focus or exposure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraCalibration:
-    """A camera's intrinsics, and how far to trust them.
-
-    Attributes
-    ----------
-    intrinsics : Intrinsics
-    covariance : (P, P) float64 or None
-        Of fx, fy, cx, cy and the coefficients solved for, in order; None if not determined.
-    rms_px : float
-        Root mean square distance of seen and expected corners.
-    residuals_px : mapping of name to float
-        The same of each view.
-    T_C_B : mapping of name to (4, 4) float64
-        The board's pose in each view.
-    dropped : tuple of str
-        Views left out by a person.
-    coverage : Coverage
-    worst : WorstView
-    verdict : CalibrationVerdict
-    """
+    """A camera's intrinsics, and how far to trust them."""
 
     intrinsics: Intrinsics
     covariance: Float64 | None
+    """(P, P); of fx, fy, cx, cy and the coefficients solved for, in order; None if not
+    determined."""
     rms_px: float
+    """Root mean square distance of seen and expected corners."""
     residuals_px: Mapping[str, float]
+    """The same of each view."""
     T_C_B: Mapping[str, Float64]
+    """each (4, 4); the board's pose in each view."""
     dropped: tuple[str, ...]
+    """Views left out by a person."""
     coverage: Coverage
     worst: WorstView
     verdict: CalibrationVerdict

@@ -12,25 +12,17 @@ from handcal.rig.board import BoardView
 
 @dataclass(frozen=True, slots=True)
 class ChooseSettings:
-    """What is kept.
-
-    Attributes
-    ----------
-    most : int
-        Views, or pairs of views.
-    rest_share : float
-        A board at rest has moved by less since the moment looked at before: mean distance of its
-        corners, of the image's width. The images of a pair are seldom taken quite together.
-    apart_share : float
-        What is kept differs by more from everything kept before; 0 keeps like views as well.
-    most_blur_px : float
-        Width of the squares' edges.
-    """
+    """What is kept."""
 
     most: int = 25
+    """Views, or pairs of views."""
     rest_share: float = 0.003
+    """A board at rest has moved by less since the moment looked at before: mean distance of its
+    corners, of the image's width. The images of a pair are seldom taken quite together."""
     apart_share: float = 0.06
+    """What is kept differs by more from everything kept before; 0 keeps like views as well."""
     most_blur_px: float = 4.0
+    """Width of the squares' edges."""
 
 
 ALIKE = ChooseSettings(most=5, apart_share=0.0)

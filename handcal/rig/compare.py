@@ -20,21 +20,14 @@ from handcal.types import EYES, Eye, EyeDisplay, Float64, Intrinsics, Rig
 
 @dataclass(frozen=True, slots=True)
 class RigDifference:
-    """One difference.
-
-    Attributes
-    ----------
-    name : str
-        What differs.
-    value : float
-        By how much; not negative.
-    unit : str
-        mm, °, px, ′ or %.
-    """
+    """One difference."""
 
     name: str
+    """What differs."""
     value: float
+    """By how much; not negative."""
     unit: str
+    """mm, °, px, ′ or %."""
 
 
 def compare_rigs(a: Rig, b: Rig) -> tuple[RigDifference, ...]:

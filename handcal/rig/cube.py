@@ -45,21 +45,15 @@ class Cube:
     Its frame has the origin in the cube's middle. Who looks at the front has x to the right, y
     down and z into the cube. The net is left, front, right and back side by side, top above the
     front, bottom below it.
-
-    Attributes
-    ----------
-    side_m, marker_m : float
-        Sides of a face and of a marker, as measured on the cube.
-    dictionary : str
-        Of the markers, as OpenCV calls it.
-    ids : tuple of 6 int
-        The markers on front, right, back, left, top and bottom.
     """
 
     side_m: float = 0.060
     marker_m: float = 0.045
+    """Sides of a face and of a marker, as measured on the cube."""
     dictionary: str = "DICT_4X4_50"
+    """Of the markers, as OpenCV calls it."""
     ids: tuple[int, int, int, int, int, int] = (0, 1, 2, 3, 4, 5)
+    """The markers on front, right, back, left, top and bottom."""
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.side_m <= 1.0:

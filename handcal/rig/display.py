@@ -31,18 +31,12 @@ DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screen:
-    """What the headset itself tells of one eye's display.
-
-    Attributes
-    ----------
-    width_px, height_px : int
-    T_V_H : (4, 4) float64
-        From the headset rig to the rendering camera.
-    """
+    """What the headset itself tells of one eye's display."""
 
     width_px: int
     height_px: int
     T_V_H: Float64
+    """(4, 4); from the headset rig to the rendering camera."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_V_H", np.float64, 4, 4)
@@ -52,36 +46,25 @@ class Screen:
 
 @dataclass(frozen=True, slots=True)
 class DisplaySettings:
-    """How far the display is, and what calibration is accepted.
-
-    Attributes
-    ----------
-    distance_m : float or None
-        z(C0→S) as measured, such as by the focus of the viewpoint camera.
-    pixel_m : float or None
-        Size of a display's pixel on S, to solve z(C0→S) from the grid: see `pixel_size_m`. Either
-        this or `distance_m`.
-    distance_sigma : float
-        How well either is known, relative; standard deviation.
-    good_px, bad_px : float
-        Root mean square reprojection error in the camera up to which the plane fits well, and from
-        which on it does not fit.
-    good_sigma_px : float
-        How well the place of the display's corners must be known, standard deviation, px.
-    largest_turn_rad : float
-        Between the axes of the display and of V.
-    largest_offset_m : float
-        From C0 to V: the eye box.
-    """
+    """How far the display is, and what calibration is accepted."""
 
     distance_m: float | None = None
+    """z(C0→S) as measured, such as by the focus of the viewpoint camera."""
     pixel_m: float | None = None
+    """Size of a display's pixel on S, to solve z(C0→S) from the grid: see `pixel_size_m`. Either
+    this or `distance_m`."""
     distance_sigma: float = 0.01
+    """How well either is known, relative; standard deviation."""
     good_px: float = 0.5
     bad_px: float = 2.0
+    """Root mean square reprojection error in the camera up to which the plane fits well, and from
+    which on it does not fit."""
     good_sigma_px: float = 0.3
+    """How well the place of the display's corners must be known, standard deviation, px."""
     largest_turn_rad: float = 0.05
+    """Between the axes of the display and of V."""
     largest_offset_m: float = 0.02
+    """From C0 to V: the eye box."""
 
     def __post_init__(self) -> None:
         if (self.distance_m is None) == (self.pixel_m is None):
@@ -94,24 +77,16 @@ class DisplaySettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplayHomography:
-    """Where the display's plane is in the viewpoint camera's undistorted image.
-
-    Attributes
-    ----------
-    H_C_S : (3, 3) float64
-        Pixels of the camera from those of the display.
-    residuals_px : mapping of name to float
-        Root mean square error of each view, px of the camera.
-    rms_px : float
-    sigma_px : float
-        How well the least known corner of the display is known: standard deviation, px of the
-        display.
-    """
+    """Where the display's plane is in the viewpoint camera's undistorted image."""
 
     H_C_S: Float64
+    """(3, 3); pixels of the camera from those of the display."""
     residuals_px: Mapping[str, float]
+    """Root mean square error of each view, px of the camera."""
     rms_px: float
     sigma_px: float
+    """How well the least known corner of the display is known: standard deviation, px of the
+    display."""
 
     def __post_init__(self) -> None:
         freeze(self, "H_C_S", np.float64, 3, 3)
@@ -120,26 +95,16 @@ class DisplayHomography:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplayCalibration:
-    """One eye's display, calibrated.
-
-    Attributes
-    ----------
-    display : EyeDisplay
-    homography : DisplayHomography
-    R_S_C : (3, 3) float64
-        From the viewpoint camera's axes to the display's.
-    turn_rad : float
-        Angle between the display's axes and V's; H0 takes it up.
-    covariance : (4, 4) float64
-        Of `DISPLAY_PARAMETERS`.
-    verdict : CalibrationVerdict
-    """
+    """One eye's display, calibrated."""
 
     display: EyeDisplay
     homography: DisplayHomography
     R_S_C: Float64
+    """(3, 3); from the viewpoint camera's axes to the display's."""
     turn_rad: float
+    """Angle between the display's axes and V's; H0 takes it up."""
     covariance: Float64
+    """(4, 4); of `DISPLAY_PARAMETERS`."""
     verdict: CalibrationVerdict
 
     def __post_init__(self) -> None:

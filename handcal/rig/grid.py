@@ -23,22 +23,16 @@ class Grid:
 
     Any part of it tells where it belongs and which side is up, so that the camera need not see
     the whole display.
-
-    Attributes
-    ----------
-    width_px, height_px : int
-        Size of the display.
-    square_px : int
-        Side of a square; as many squares are shown as there is room for, 40 at most each way.
-        A multiple of 10 gives markers whose edges lie between pixels.
-    dictionary : str
-        Of the markers, as OpenCV calls it.
     """
 
     width_px: int
     height_px: int
+    """Size of the display."""
     square_px: int = 80
+    """Side of a square; as many squares are shown as there is room for, 40 at most each way. A
+    multiple of 10 gives markers whose edges lie between pixels."""
     dictionary: str = "DICT_5X5_1000"
+    """Of the markers, as OpenCV calls it."""
 
     def __post_init__(self) -> None:
         if not _SMALLEST_SQUARE_PX <= self.square_px <= _LARGEST_SQUARE_PX:
@@ -74,21 +68,14 @@ class Grid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridView:
-    """The corners of a display's grid seen in one image.
-
-    Attributes
-    ----------
-    display_px : (N, 2) float64
-        Corners on the display.
-    pixels : (N, 2) float64
-        The same in the camera's image, lens included.
-    size : (int, int)
-        Width and height of the image.
-    """
+    """The corners of a display's grid seen in one image."""
 
     display_px: Float64
+    """(N, 2); corners on the display."""
     pixels: Float64
+    """(N, 2); the same in the camera's image, lens included."""
     size: tuple[int, int]
+    """(int, int); width and height of the image."""
 
     def __post_init__(self) -> None:
         freeze(self, "display_px", np.float64, None, 2)

@@ -21,20 +21,13 @@ _HAND_DEPTHS_M = (0.4, 0.5, 0.6)
 
 @dataclass(frozen=True, slots=True)
 class RigFinding:
-    """One thing about a rig.
-
-    Attributes
-    ----------
-    what, found : str
-    is_fine : bool
-    expected : str
-        Empty where anything is.
-    """
+    """One thing about a rig."""
 
     what: str
     found: str
     is_fine: bool = True
     expected: str = ""
+    """Empty where anything is."""
 
 
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:

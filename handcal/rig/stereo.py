@@ -42,65 +42,42 @@ _SWAPPED = "the cameras are swapped: the depth camera's images are the headset's
 
 @dataclass(frozen=True, slots=True)
 class StereoSettings:
-    """When the pose between two cameras is good.
-
-    Attributes
-    ----------
-    camera : CameraSettings
-        For intrinsics that are not given.
-    good_pairs : int
-    good_spread_rad : float
-        How far the boards' normals must spread about their mean, RMS.
-    max_rms_px : float
-    max_angle_sigma_rad, max_shift_sigma_m : float
-        Standard deviation of the rotation and the translation, each along its worst axis.
-    max_shift_m : float
-        Two cameras on one headset are not further apart.
-    """
+    """When the pose between two cameras is good."""
 
     camera: CameraSettings = field(default_factory=CameraSettings)
+    """For intrinsics that are not given."""
     good_pairs: int = 10
     good_spread_rad: float = 0.15
+    """How far the boards' normals must spread about their mean, RMS."""
     max_rms_px: float = 1.0
     max_angle_sigma_rad: float = 1e-3
     max_shift_sigma_m: float = 3e-4
+    """Standard deviation of the rotation and the translation, each along its worst axis."""
     max_shift_m: float = 0.5
+    """Two cameras on one headset are not further apart."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoCalibration:
-    """Where the depth camera sits, and how far to trust that.
-
-    Attributes
-    ----------
-    T_H_D : (4, 4) float64
-        From the depth camera (or its colour imager) to the headset's.
-    covariance : (6, 6) float64 or None
-        Of T_H_D's rotation vector (rad) and translation (m), with the uncertainty of intrinsics
-        that were solved, not of given ones. None if not determined.
-    depth, headset : Intrinsics
-        Given or solved.
-    rms_px : float
-        Over both images of all pairs.
-    residuals_px : mapping of name to float
-        Of each pair, called as the depth camera's image.
-    spread_rad, spread_m : float
-        RMS difference of T_H_D from what each pair alone gives.
-    dropped : tuple of str
-        Pairs left out by a person.
-    worst : WorstView
-    verdict : CalibrationVerdict
-    """
+    """Where the depth camera sits, and how far to trust that."""
 
     T_H_D: Float64
+    """(4, 4); from the depth camera (or its colour imager) to the headset's."""
     covariance: Float64 | None
+    """(6, 6); of T_H_D's rotation vector (rad) and translation (m), with the uncertainty of
+    intrinsics that were solved, not of given ones. None if not determined."""
     depth: Intrinsics
     headset: Intrinsics
+    """Given or solved."""
     rms_px: float
+    """Over both images of all pairs."""
     residuals_px: Mapping[str, float]
+    """Of each pair, called as the depth camera's image."""
     spread_rad: float
     spread_m: float
+    """RMS difference of T_H_D from what each pair alone gives."""
     dropped: tuple[str, ...]
+    """Pairs left out by a person."""
     worst: WorstView
     verdict: CalibrationVerdict
 

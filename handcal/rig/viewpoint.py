@@ -26,18 +26,12 @@ _GOOD_SIGMA_M = 0.001
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedView:
-    """A board seen by the viewpoint camera while the headset knows where the board is.
-
-    Attributes
-    ----------
-    view : BoardView
-        As the viewpoint camera sees it.
-    T_H_B : (4, 4) float64
-        From the board to the headset rig, as tracked.
-    """
+    """A board seen by the viewpoint camera while the headset knows where the board is."""
 
     view: BoardView
+    """As the viewpoint camera sees it."""
     T_H_B: Float64
+    """(4, 4); from the board to the headset rig, as tracked."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_B", np.float64, 4, 4)
@@ -45,23 +39,14 @@ class TrackedView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewpointPose:
-    """Where the viewpoint camera sits.
-
-    Attributes
-    ----------
-    T_H_C : (4, 4) float64
-        From the viewpoint camera to the headset rig.
-    covariance : (6, 6) float64
-        Of a small rotation about the camera's axes, rad, and of its position in H, m.
-    residuals_px : mapping of name to float
-        Root mean square reprojection error of each view.
-    rms_px : float
-    verdict : CalibrationVerdict
-    """
+    """Where the viewpoint camera sits."""
 
     T_H_C: Float64
+    """(4, 4); from the viewpoint camera to the headset rig."""
     covariance: Float64
+    """(6, 6); of a small rotation about the camera's axes, rad, and of its position in H, m."""
     residuals_px: Mapping[str, float]
+    """Root mean square reprojection error of each view."""
     rms_px: float
     verdict: CalibrationVerdict
 

@@ -28,39 +28,25 @@ class ViewsError(HandcalError):
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One image, and what was found in it.
-
-    Attributes
-    ----------
-    name : str
-        Unique among the views, as the file's name.
-    found : BoardView or None
-    problem : str
-        Why nothing was found; empty if it was.
-    dropped : bool
-        Left out by a person.
-    """
+    """One image, and what was found in it."""
 
     name: str
+    """Unique among the views, as the file's name."""
     found: BoardView | None
     problem: str = ""
+    """Why nothing was found; empty if it was."""
     dropped: bool = False
+    """Left out by a person."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """How the corners of all views lie over the image.
-
-    Attributes
-    ----------
-    hits : (6, 8) int64
-        In how many views each cell of the image has a corner.
-    share : float
-        Cells with one.
-    """
+    """How the corners of all views lie over the image."""
 
     hits: NDArray[np.int64]
+    """(6, 8); in how many views each cell of the image has a corner."""
     share: float
+    """Cells with one."""
 
 
 def view(name: str, image: UInt8, board: Board) -> View:

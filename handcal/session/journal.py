@@ -20,40 +20,25 @@ MAX_JOURNAL_BYTES = 64 * 2**20
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One line of the journal.
-
-    Attributes
-    ----------
-    number : int
-        Running number from 1.
-    time : str
-        UTC, ISO 8601.
-    name : str
-    data : dict
-    """
+    """One line of the journal."""
 
     number: int
+    """Running number from 1."""
     time: str
+    """UTC, ISO 8601."""
     name: str
     data: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class JournalContent:
-    """What a journal holds.
-
-    Attributes
-    ----------
-    events : tuple of Event
-    complete_bytes : int
-        Length of the complete lines.
-    torn_bytes : int
-        Length of an unfinished last line, which is left out; 0 if there is none.
-    """
+    """What a journal holds."""
 
     events: tuple[Event, ...]
     complete_bytes: int
+    """Length of the complete lines."""
     torn_bytes: int
+    """Length of an unfinished last line, which is left out; 0 if there is none."""
 
 
 def happens_now(number: int, name: str, data: dict[str, Any]) -> Event:

@@ -50,64 +50,42 @@ MAX_NOTES_CHARACTERS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecord:
-    """What a session folder holds.
-
-    Attributes
-    ----------
-    path : Path
-    rig : Rig
-    settings : dict
-    wearer : str
-        Name or code; empty if not told.
-    notes : str
-    events : tuple of Event
-    alignments : tuple of Alignment
-        Those not deleted, in the order in which they were saved.
-    alignment_numbers : tuple of int
-        Theirs, by which they can be deleted.
-    deleted : mapping of int to Alignment
-        The others, by number; they can be restored.
-    trials, trial_numbers, deleted_trials
-        Likewise, trials of the user test.
-    results : dict or None
-        The newest; None if none were saved since an alignment was deleted or restored.
-    is_solved : bool
-        Whether the results are those of all `alignments`.
-    is_applied : bool
-        Whether the headset has acknowledged the projections of these results.
-    applied_shift_m : mapping of eye to (3,) float64
-        What the headset rendered with last, solved or set by hand; an eye that is not in it was
-        left as in the offline calibration.
-    fine_tuned : mapping of eye to (3,) float64, or None
-        The φ last set by hand, as settled; None if none since the last results.
-    is_finished : bool
-        Whether the session was ended on purpose, and nothing happened since.
-    journal_bytes : int
-        Length of the journal's complete lines.
-    torn_bytes : int
-        Length of an unfinished last line, which is left out; 0 if there is none.
-    """
+    """What a session folder holds."""
 
     path: Path
     rig: Rig
     settings: dict[str, Any]
     wearer: str
+    """Name or code; empty if not told."""
     notes: str
     events: tuple[Event, ...]
     alignments: tuple[Alignment, ...]
+    """Those not deleted, in the order in which they were saved."""
     alignment_numbers: tuple[int, ...]
+    """Theirs, by which they can be deleted."""
     deleted: Mapping[int, Alignment]
+    """The others, by number; they can be restored."""
     trials: tuple[Trial, ...]
     trial_numbers: tuple[int, ...]
     deleted_trials: Mapping[int, Trial]
+    """Likewise, trials of the user test."""
     results: dict[str, Any] | None
+    """The newest; None if none were saved since an alignment was deleted or restored."""
     is_solved: bool
+    """Whether the results are those of all `alignments`."""
     is_applied: bool
+    """Whether the headset has acknowledged the projections of these results."""
     applied_shift_m: Mapping[Eye, Float64]
+    """each (3,); what the headset rendered with last, solved or set by hand; an eye that is not in
+    it was left as in the offline calibration."""
     fine_tuned: Mapping[Eye, Float64] | None
+    """each (3,); the φ last set by hand, as settled; None if none since the last results."""
     is_finished: bool
+    """Whether the session was ended on purpose, and nothing happened since."""
     journal_bytes: int
+    """Length of the journal's complete lines."""
     torn_bytes: int
+    """Length of an unfinished last line, which is left out; 0 if there is none."""
 
 
 class Session(Closable):

@@ -34,21 +34,6 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 class Trial:
     """One target at one distance, seen by one eye.
 
-    Attributes
-    ----------
-    eye : {"left", "right"}
-    target_depth_m : float
-    corners_E_m : (4, 3) float64
-        The target's corners in E, clockwise from the upper left.
-    calibrated_shift_m, adjusted_shift_m : (3,) float64
-        φ as calibrated, and as adjusted by hand.
-    drawn_px, truth_px : (4, 2) float64
-        The corners drawn with the one and with the other.
-    error_px, error_arcmin : (4,) float64
-        Their distances.
-    time : str
-        When it was saved, UTC, ISO 8601; empty before.
-
     Raises
     ------
     ValueError
@@ -58,13 +43,18 @@ class Trial:
     eye: Eye
     target_depth_m: float
     corners_E_m: Float64
+    """(4, 3); the target's corners in E, clockwise from the upper left."""
     calibrated_shift_m: Float64
     adjusted_shift_m: Float64
+    """(3,); φ as calibrated, and as adjusted by hand."""
     drawn_px: Float64
     truth_px: Float64
+    """(4, 2); the corners drawn with the one and with the other."""
     error_px: Float64
     error_arcmin: Float64
+    """(4,); their distances."""
     time: str = ""
+    """When it was saved, UTC, ISO 8601; empty before."""
 
     def __post_init__(self) -> None:
         if self.eye not in EYES:
@@ -78,34 +68,21 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class ErrorStatistics:
-    """Errors of several trials.
-
-    Attributes
-    ----------
-    trials, corners : int
-        Each corner counts as one error, as in the paper.
-    px, arcmin : Summary
-    """
+    """Errors of several trials."""
 
     trials: int
     corners: int
+    """Each corner counts as one error, as in the paper."""
     px: Summary
     arcmin: Summary
 
 
 @dataclass(frozen=True, slots=True)
 class TrialStatistics:
-    """All trials, and those of each eye and of each distance that there are.
-
-    Attributes
-    ----------
-    total : ErrorStatistics or None
-        None without trials.
-    by_eye : mapping of eye to ErrorStatistics
-    by_depth_m : mapping of float to ErrorStatistics
-    """
+    """All trials, and those of each eye and of each distance that there are."""
 
     total: ErrorStatistics | None
+    """None without trials."""
     by_eye: Mapping[Eye, ErrorStatistics]
     by_depth_m: Mapping[float, ErrorStatistics]
 

@@ -14,26 +14,17 @@ from handcal.session.state import SessionEvent
 
 @dataclass(frozen=True, slots=True)
 class UnfinishedSession:
-    """A session whose journal does not end in `finished`.
-
-    Attributes
-    ----------
-    path : Path
-    started : str
-        UTC, ISO 8601; empty if it cannot be told.
-    wearer : str
-    alignments, trials : int
-        Those not deleted.
-    problem : str
-        Why it cannot be gone on with, such as damage or another program; empty if it can.
-    """
+    """A session whose journal does not end in `finished`."""
 
     path: Path
     started: str = ""
+    """UTC, ISO 8601; empty if it cannot be told."""
     wearer: str = ""
     alignments: int = 0
     trials: int = 0
+    """Those not deleted."""
     problem: str = ""
+    """Why it cannot be gone on with, such as damage or another program; empty if it can."""
 
 
 def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:

@@ -20,64 +20,44 @@ from handcal.types import Bool, Float64, Intrinsics
 
 @dataclass(frozen=True, slots=True)
 class AlignmentSettings:
-    """What an alignment is made of.
-
-    Attributes
-    ----------
-    count : int
-        Points of each cloud.
-    exact : bool
-        False makes the cursor as the paper does.
-    shift_max_m : float
-        Each component of φ is uniform within ± this.
-    display_distance_m : float
-        z(C0→S).
-    resample : bool
-        Sample cursor and hand apart; else both hold the same points in another order.
-    depth_sigma_m : float
-        Standard deviation of each point's depth noise.
-    cursor_forearm_m, hand_forearm_m : float
-        How far beyond the wrist each cloud reaches.
-    """
+    """What an alignment is made of."""
 
     count: int = 5000
+    """Points of each cloud."""
     exact: bool = True
+    """False makes the cursor as the paper does."""
     shift_max_m: float = 0.010
+    """Each component of φ is uniform within ± this."""
     display_distance_m: float = 2.0
+    """z(C0→S)."""
     resample: bool = False
+    """Sample cursor and hand apart; else both hold the same points in another order."""
     depth_sigma_m: float = 0.0
+    """Standard deviation of each point's depth noise."""
     cursor_forearm_m: float = 0.04
     hand_forearm_m: float = 0.04
+    """How far beyond the wrist each cloud reaches."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedAlignment:
-    """Two clouds and the truth about them.
-
-    Attributes
-    ----------
-    cursor_m, hand_m : (N, 3), (M, 3) float64
-        In W.
-    cursor_cut, hand_cut : (N,), (M,) bool
-    T_E_W : (4, 4) float64
-    shift_m : (3,) float64
-        The true φ.
-    rotation_rad : (3,) float64
-        By which the cursor is turned against the hand, in W.
-    known_cursor_m, known_hand_m : (K, 3) float64
-        Noise-free true pairs in E0(t_b), of what both clouds show.
-    display_distance_m : float
-    """
+    """Two clouds and the truth about them."""
 
     cursor_m: Float64
     hand_m: Float64
+    """(N, 3); in W."""
     cursor_cut: Bool
     hand_cut: Bool
+    """(N,)."""
     T_E_W: Float64
+    """(4, 4)."""
     shift_m: Float64
+    """(3,); the true φ."""
     rotation_rad: Float64
+    """(3,); by which the cursor is turned against the hand, in W."""
     known_cursor_m: Float64
     known_hand_m: Float64
+    """(K, 3); noise-free true pairs in E0(t_b), of what both clouds show."""
     display_distance_m: float
 
 

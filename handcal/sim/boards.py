@@ -20,21 +20,14 @@ BLACK, WHITE, WALL = 30.0, 215.0, 120.0
 
 @dataclass(frozen=True, slots=True)
 class PictureSettings:
-    """How a simulated camera takes pictures.
-
-    Attributes
-    ----------
-    blur_px : float
-        Standard deviation of the lens's blur.
-    noise : float
-        Standard deviation of the sensor's noise, in shades of 255.
-    samples : int
-        Rays along each side of a pixel.
-    """
+    """How a simulated camera takes pictures."""
 
     blur_px: float = 0.7
+    """Standard deviation of the lens's blur."""
     noise: float = 3.0
+    """Standard deviation of the sensor's noise, in shades of 255."""
     samples: int = 3
+    """Rays along each side of a pixel."""
 
 
 class BoardPainter:

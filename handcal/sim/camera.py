@@ -25,24 +25,16 @@ _T_C_D = rigid([0.002, -0.003, 0.001], [0.015, 0.0, 0.0])
 
 @dataclass(frozen=True, slots=True)
 class SyntheticSettings:
-    """The simulated camera.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Frames per second at most; fewer where rendering takes longer.
-    aligned : bool
-        Colour rendered in the depth camera's own image, as after the SDK's alignment; otherwise a
-        raw pair from two cameras.
-    clock_offset_s, clock_drift : float
-        The camera's clock is ``(1 + clock_drift) t + clock_offset_s`` of the host's t.
-    sensor : SensorSettings
-    """
+    """The simulated camera."""
 
     rate_hz: float = 30.0
+    """Frames per second at most; fewer where rendering takes longer."""
     aligned: bool = True
+    """Colour rendered in the depth camera's own image, as after the SDK's alignment; otherwise a
+    raw pair from two cameras."""
     clock_offset_s: float = 123.456
     clock_drift: float = 20e-6
+    """The camera's clock is ``(1 + clock_drift) t + clock_offset_s`` of the host's t."""
     sensor: SensorSettings = field(default_factory=SensorSettings)
 
 

@@ -54,49 +54,31 @@ _VERTICES = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 @dataclass(frozen=True, slots=True)
 class CaptureSettings:
-    """How the test is done.
-
-    Attributes
-    ----------
-    seed : int
-    eye : {"left", "right"}
-    positions : tuple of str
-        Of the camera; names in `POSITIONS`.
-    poses : int
-        Of the cube at each position, 0.4 to 0.6 m away.
-    alignments : int
-        Of the hand at each position.
-    aside_m : float
-        From the middle of the eye box to the other positions.
-    place_sigma_m : float
-        How exactly the camera is put there, each axis.
-    turn_sigma_rad : float
-        How far the camera is turned against the display, about each axis.
-    points : int
-        Of the hand's clouds.
-    depth_sigma_m : float
-        Noise of the depth camera's points.
-    wearer : WearerSettings
-        How exactly the hand is overlaid.
-    cube : Cube
-    camera : Intrinsics
-        The eye-replacement camera.
-    pictures : PictureSettings
-    """
+    """How the test is done."""
 
     seed: int = 1
     eye: Eye = "left"
     positions: tuple[str, ...] = tuple(POSITIONS)
+    """Of the camera; names in `POSITIONS`."""
     poses: int = 4
+    """Of the cube at each position, 0.4 to 0.6 m away."""
     alignments: int = 1
+    """Of the hand at each position."""
     aside_m: float = 0.004
+    """From the middle of the eye box to the other positions."""
     place_sigma_m: float = 0.001
+    """How exactly the camera is put there, each axis."""
     turn_sigma_rad: float = 0.02
+    """How far the camera is turned against the display, about each axis."""
     points: int = 5000
+    """Of the hand's clouds."""
     depth_sigma_m: float = 0.001
+    """Noise of the depth camera's points."""
     wearer: WearerSettings = field(default_factory=WearerSettings)
+    """How exactly the hand is overlaid."""
     cube: Cube = field(default_factory=Cube)
     camera: Intrinsics = VIEWPOINT_CAMERA
+    """The eye-replacement camera."""
     pictures: PictureSettings = field(default_factory=lambda: PictureSettings(samples=2))
 
 

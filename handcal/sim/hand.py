@@ -51,52 +51,35 @@ _SKIN = np.array([[236, 200, 180], [205, 155, 125], [160, 108, 78], [98, 66, 50]
 
 @dataclass(frozen=True, slots=True)
 class HandSettings:
-    """How a hand is drawn from its seed.
-
-    Attributes
-    ----------
-    length_m, length_sigma_m : float
-        Wrist crease to middle fingertip: both sexes of ANSUR II (Gordon et al. 2014) pooled.
-    forearm_m : float
-        Length of forearm below the wrist.
-    grid_m : float
-        Spacing of the grid on which the skin is found.
-    side : {"left", "right"} or None
-        None lets the seed choose.
-    """
+    """How a hand is drawn from its seed."""
 
     length_m: float = 0.187
     length_sigma_m: float = 0.010
+    """Wrist crease to middle fingertip: both sexes of ANSUR II (Gordon et al. 2014) pooled."""
     forearm_m: float = 0.25
+    """Length of forearm below the wrist."""
     grid_m: float = 0.002
+    """Spacing of the grid on which the skin is found."""
     side: Side | None = None
+    """None lets the seed choose."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandModel:
-    """A hand with its forearm: a closed triangle mesh in the hand's frame.
-
-    Attributes
-    ----------
-    vertices_m : (V, 3) float32
-    normals : (V, 3) float32
-        Unit, outward.
-    colors : (V, 3) uint8
-        RGB of the skin.
-    triangles : (T, 3) int32
-    wrist_m : (3,) float64
-        Centre of the wrist.
-    arm_axis : (3,) float64
-        Unit vector from the wrist toward the elbow.
-    side : {"left", "right"}
-    """
+    """A hand with its forearm: a closed triangle mesh in the hand's frame."""
 
     vertices_m: Float32
+    """(V, 3)."""
     normals: Float32
+    """(V, 3); unit, outward."""
     colors: UInt8
+    """(V, 3); RGB of the skin."""
     triangles: np.ndarray[tuple[int, ...], np.dtype[np.int32]]
+    """(T, 3)."""
     wrist_m: Float64
+    """(3,); centre of the wrist."""
     arm_axis: Float64
+    """(3,); unit vector from the wrist toward the elbow."""
     side: Side
 
     def __post_init__(self) -> None:

@@ -29,50 +29,34 @@ from handcal.types import EYES, Eye, Float64, Rig
 
 @dataclass(frozen=True, slots=True)
 class HeadsetSettings:
-    """What the virtual headset is, and how badly it is connected.
-
-    Attributes
-    ----------
-    rig_path : str
-        The rig that the headset goes by, the PC's.
-    host, port : str, int
-        Where the PC listens.
-    scene_port : int or None
-        Where the synthetic camera listens, on this machine; None if there is none.
-    seed : int
-        Of the wearer, the wearer's hand and the tracking noise.
-    worn_rig_path : str
-        The rig that the wearer really looks through; empty takes `rig_path`.
-    wearer : WearerSettings
-    impairment : Impairment
-        Of the network, in both directions.
-    rate_hz : float
-        Displayed images, and poses, a second.
-    clock_offset_s, clock_drift_ppm : float
-        The headset's clock less the host's, at the start and its growth.
-    tracking_sigma_m, tracking_sigma_rad : float
-        Noise of the poses told.
-    patience_s : float
-        Longest time without a PC.
-    duration_s : float or None
-        When to end; None goes on until told.
-    """
+    """What the virtual headset is, and how badly it is connected."""
 
     rig_path: str
+    """The rig that the headset goes by, the PC's."""
     port: int
+    """Where the PC listens."""
     scene_port: int | None = None
+    """Where the synthetic camera listens, on this machine; None if there is none."""
     host: str = "127.0.0.1"
     seed: int = 0
+    """Of the wearer, the wearer's hand and the tracking noise."""
     worn_rig_path: str = ""
+    """The rig that the wearer really looks through; empty takes `rig_path`."""
     wearer: WearerSettings = field(default_factory=WearerSettings)
     impairment: Impairment = UNIMPAIRED
+    """Of the network, in both directions."""
     rate_hz: float = 90.0
+    """Displayed images, and poses, a second."""
     clock_offset_s: float = 12.345
     clock_drift_ppm: float = 30.0
+    """The headset's clock less the host's, at the start and its growth."""
     tracking_sigma_m: float = 0.0002
     tracking_sigma_rad: float = 0.0003
+    """Noise of the poses told."""
     patience_s: float = 10.0
+    """Longest time without a PC."""
     duration_s: float | None = None
+    """When to end; None goes on until told."""
 
 
 def run_headset(

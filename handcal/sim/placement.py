@@ -28,56 +28,36 @@ _FEWEST_POINTS = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CursorMatch:
-    """Which points of the hand a cursor shows.
-
-    Attributes
-    ----------
-    cursor_m : (N, 3) float64
-        The cursor, W.
-    surface_m : (N, 3) float64
-        The same points on the hand's surface, in the hand's frame.
-    T_W_hand : (4, 4) float64
-        The hand's pose when the cursor was made.
-    """
+    """Which points of the hand a cursor shows."""
 
     cursor_m: Float64
+    """(N, 3); the cursor, W."""
     surface_m: Float64
+    """(N, 3); the same points on the hand's surface, in the hand's frame."""
     T_W_hand: Float64
+    """(4, 4); the hand's pose when the cursor was made."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeView:
-    """One open eye.
-
-    Attributes
-    ----------
-    seen : (3, 4) float64
-        Display pixels from world points seen through the display by the true eye.
-    drawn_px : (N, 2) float64
-        Where the headset draws the cursor's points; NaN outside the display.
-    """
+    """One open eye."""
 
     seen: Float64
+    """(3, 4); display pixels from world points seen through the display by the true eye."""
     drawn_px: Float64
+    """(N, 2); where the headset draws the cursor's points; NaN outside the display."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slip:
-    """How a placement misses.
-
-    Attributes
-    ----------
-    rotation_rad : (3,) float64
-        Of the hand against its cursor.
-    lateral_rad : (2,) float64
-        Angles about two axes across the line of sight.
-    depth_ratio : float
-        Error of the hand's apparent size.
-    """
+    """How a placement misses."""
 
     rotation_rad: Float64
+    """(3,); of the hand against its cursor."""
     lateral_rad: Float64
+    """(2,); angles about two axes across the line of sight."""
     depth_ratio: float
+    """Error of the hand's apparent size."""
 
 
 def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> CursorMatch:

@@ -22,22 +22,15 @@ D415 = Intrinsics(width=1280, height=720, fx=1005.0, fy=1005.0, cx=639.5, cy=359
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandImage:
-    """The part of a camera's image that holds the hand.
-
-    Attributes
-    ----------
-    x0, y0 : int
-        Its upper left pixel in the whole image.
-    depth_m : (h, w) float32
-        z in the camera's frame; infinite beside the hand.
-    color : (h, w, 3) float32
-        The vertices' values, interpolated; 0 beside the hand.
-    """
+    """The part of a camera's image that holds the hand."""
 
     x0: int
     y0: int
+    """Its upper left pixel in the whole image."""
     depth_m: Float32
+    """(h, w); z in the camera's frame; infinite beside the hand."""
     color: Float32
+    """(h, w, 3); the vertices' values, interpolated; 0 beside the hand."""
 
 
 def draw_hand(

@@ -13,42 +13,28 @@ from handcal.types import Float32, Float64, Intrinsics, UInt8, freeze
 
 @dataclass(frozen=True, slots=True)
 class RoomSettings:
-    """How a room is drawn from its seed.
-
-    Attributes
-    ----------
-    nearest_wall_m, farthest_wall_m : float
-        Range of the distances from W's origin to each wall, the floor and the ceiling.
-    texel_m : float
-        Size of a texture's pixel.
-    """
+    """How a room is drawn from its seed."""
 
     nearest_wall_m: float = 1.2
     farthest_wall_m: float = 2.4
+    """Range of the distances from W's origin to each wall, the floor and the ceiling."""
     texel_m: float = 0.004
+    """Size of a texture's pixel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """A box in W, seen from inside.
-
-    Attributes
-    ----------
-    low_m, high_m : (3,) float64
-        Its corners, W.
-    textures : tuple of (h, w, 3) uint8
-        RGB of the walls −x, +x, −y, +y, −z, +z; rows run along the later of the two axes that
-        span the wall, columns along the earlier.
-    texel_m : float
-    light : (3,) float64
-        Unit vector toward the light, W.
-    """
+    """A box in W, seen from inside."""
 
     low_m: Float64
     high_m: Float64
+    """(3,); its corners, W."""
     textures: tuple[UInt8, ...]
+    """each (h, w, 3); RGB of the walls −x, +x, −y, +y, −z, +z; rows run along the later of the two
+    axes that span the wall, columns along the earlier."""
     texel_m: float
     light: Float64
+    """(3,); unit vector toward the light, W."""
 
     def __post_init__(self) -> None:
         freeze(self, "low_m", np.float64, 3)

@@ -28,21 +28,14 @@ _REACH_M = 1e3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneState:
-    """The moving part of the world at one instant.
-
-    Attributes
-    ----------
-    t_ns : int
-        Host's monotonic time.
-    T_W_D : (4, 4) float64
-        True pose of the depth camera.
-    T_W_hand : (4, 4) float64 or None
-        True pose of the hand; None while it is out of sight.
-    """
+    """The moving part of the world at one instant."""
 
     t_ns: int
+    """Host's monotonic time."""
     T_W_D: Float64
+    """(4, 4); True pose of the depth camera."""
     T_W_hand: Float64 | None
+    """(4, 4); True pose of the hand; None while it is out of sight."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_W_D", np.float64, 4, 4)

@@ -16,35 +16,24 @@ from handcal.types import Bool, Float32, UInt16
 
 @dataclass(frozen=True, slots=True)
 class SensorSettings:
-    """The depth sensor.
-
-    Attributes
-    ----------
-    baseline_m : float
-        Between the imagers; D415: 55 mm (data sheet).
-    disparity_sigma_px : float
-        Subpixel error of the matching.
-    correlation_px : float
-        Neighbours share matching windows and so errors: standard deviation of the Gaussian that
-        correlates them.
-    disparity_step_px : float
-        The matcher's resolution; D4xx: 1/32 px.
-    edge_px : int
-        Width of the band along a depth edge where the matching window sees both sides.
-    edge_hole_ratio, edge_flying_ratio : float
-        Of the pixels in that band, those without a depth, and those with a depth in between.
-    depth_scale_m : float
-        Metres per unit.
-    """
+    """The depth sensor."""
 
     baseline_m: float = 0.055
+    """Between the imagers; D415: 55 mm (data sheet)."""
     disparity_sigma_px: float = 0.08
+    """Subpixel error of the matching."""
     correlation_px: float = 2.0
+    """Neighbours share matching windows and so errors: standard deviation of the Gaussian that
+    correlates them."""
     disparity_step_px: float = 1.0 / 32.0
+    """The matcher's resolution; D4xx: 1/32 px."""
     edge_px: int = 3
+    """Width of the band along a depth edge where the matching window sees both sides."""
     edge_hole_ratio: float = 0.35
     edge_flying_ratio: float = 0.15
+    """Of the pixels in that band, those without a depth, and those with a depth in between."""
     depth_scale_m: float = 0.0001
+    """Metres per unit."""
 
 
 # Disparity that differs by more than this within the band is an edge, not a slope.

@@ -34,110 +34,75 @@ _ARCMIN = np.radians(1.0 / 60.0)
 
 @dataclass(frozen=True, slots=True)
 class WearerSettings:
-    """How the wearer is built and behaves.
-
-    Attributes
-    ----------
-    headset_sigma_m : tuple of 3 float
-        How the headset sits, common to both eyes, E axes: lateral, vertical, eye relief.
-    eye_distance_sigma_m : float
-        Deviation of the eye distance from the rig's.
-    eye_sigma_m : float
-        Each eye's own deviation along each axis.
-    largest_shift_m : float
-        The eye box: longer shifts are shortened to it.
-    raise_m, raise_spread_m : tuple of 3 float
-        Where the palm is raised, from the middle of the viewpoints C0 in the head's axes, and how
-        far it may differ each time.
-    raise_turn_rad : float
-        How far the raised palm turns from facing the eyes, standard deviation about each axis.
-    reaction_s, movement_s, dwell_s, patience_s : float
-        From a new cursor to the start of the movement; the movement; holding still before
-        confirming; waiting for an answer before confirming again.
-    lateral_sigma_arcmin : float
-        Error of the overlay about each of two axes.
-    depth_sigma : float
-        Error of the overlay's size, relative.
-    rotation_sigma_rad : float
-        Rotation of the hand against the cursor, about a random axis.
-    novice : bool or None
-        A novice overlays a rotated hand first and confirms it; None lets the seed choose.
-    novice_rotation_rad : float
-        By how much.
-    head_sway_m, head_sway_rad, hand_sway_m, hand_sway_rad : float
-        Amplitudes of slow sway.
-    tremor_m : float
-        Amplitude of the hand's tremor, 8 to 12 Hz.
-    """
+    """How the wearer is built and behaves."""
 
     headset_sigma_m: tuple[float, float, float] = (0.002, 0.0015, 0.003)
+    """How the headset sits, common to both eyes, E axes: lateral, vertical, eye relief."""
     eye_distance_sigma_m: float = 0.002
+    """Deviation of the eye distance from the rig's."""
     eye_sigma_m: float = 0.0005
+    """Each eye's own deviation along each axis."""
     largest_shift_m: float = 0.010
+    """The eye box: longer shifts are shortened to it."""
     raise_m: tuple[float, float, float] = (0.0, 0.048, 0.56)
     raise_spread_m: tuple[float, float, float] = (0.015, 0.006, 0.025)
+    """Where the palm is raised, from the middle of the viewpoints C0 in the head's axes, and how
+    far it may differ each time."""
     raise_turn_rad: float = 0.1
+    """How far the raised palm turns from facing the eyes, standard deviation about each axis."""
     reaction_s: float = 0.4
     movement_s: float = 0.8
     dwell_s: float = 0.6
     patience_s: float = 6.0
+    """From a new cursor to the start of the movement; the movement; holding still before
+    confirming; waiting for an answer before confirming again."""
     lateral_sigma_arcmin: float = 3.0
+    """Error of the overlay about each of two axes."""
     depth_sigma: float = 0.003
+    """Error of the overlay's size, relative."""
     rotation_sigma_rad: float = 0.035
+    """Rotation of the hand against the cursor, about a random axis."""
     novice: bool | None = None
+    """A novice overlays a rotated hand first and confirms it; None lets the seed choose."""
     novice_rotation_rad: float = 0.23
+    """By how much."""
     head_sway_m: float = 0.003
     head_sway_rad: float = 0.005
     hand_sway_m: float = 0.0005
     hand_sway_rad: float = 0.003
+    """Amplitudes of slow sway."""
     tremor_m: float = 0.0001
+    """Amplitude of the hand's tremor, 8 to 12 Hz."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplayView:
-    """What the headset shows at one instant.
-
-    Attributes
-    ----------
-    t_s : float
-    cursor_W_m : (N, 3) float64 or None
-        The points drawn as cursor, W.
-    cursor_id : int
-    P : mapping of eye to (3, 4) float64
-        Pixels from points in V, as rendered now.
-    T_V_H : mapping of eye to (4, 4) float64
-    eyes : tuple of eye
-        The eyes that shall be open.
-    guard_red : bool
-        Whether the live hand is drawn red.
-    prompt : str
-    """
+    """What the headset shows at one instant."""
 
     t_s: float
     cursor_W_m: Float64 | None
+    """(N, 3); the points drawn as cursor, W."""
     cursor_id: int
     P: Mapping[Eye, Float64]
+    """each (3, 4); pixels from points in V, as rendered now."""
     T_V_H: Mapping[Eye, Float64]
+    """each (4, 4)."""
     eyes: tuple[Eye, ...]
+    """The eyes that shall be open."""
     guard_red: bool
+    """Whether the live hand is drawn red."""
     prompt: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerAction:
-    """What the wearer does at one instant.
-
-    Attributes
-    ----------
-    T_W_H, T_W_hand : (4, 4) float64
-        Poses of the headset and of the hand.
-    confirm : bool
-        True at the instants when the button is pressed.
-    """
+    """What the wearer does at one instant."""
 
     T_W_H: Float64
     T_W_hand: Float64
+    """(4, 4); poses of the headset and of the hand."""
     confirm: bool
+    """True at the instants when the button is pressed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

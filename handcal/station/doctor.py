@@ -46,22 +46,14 @@ class Health(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at.
-
-    Attributes
-    ----------
-    what : str
-    health : Health
-        LIMITED where the simulator and recordings work all the same.
-    found : str
-    advice : str
-        What to do; empty if nothing.
-    """
+    """One thing looked at."""
 
     what: str
     health: Health
+    """LIMITED where the simulator and recordings work all the same."""
     found: str
     advice: str = ""
+    """What to do; empty if nothing."""
 
 
 def examine() -> list[Finding]:

@@ -74,89 +74,58 @@ class ProcedureError(HandcalError):
 
 @dataclass(frozen=True, slots=True)
 class CalibrationSettings:
-    """How a calibration runs.
-
-    Attributes
-    ----------
-    segment : SegmentSettings
-    guard : GuardSettings
-    solve : SolveSettings
-    camera_latency_s : float
-        From a frame's exposure to its earliest arrival.
-    match_tolerance_s : float
-        The frame of an alignment may lie this far from t_b.
-    steady_s, steady_m : float
-        The hand is steady if it moved less than this for so long.
-    apply_timeout_s : float
-        The headset has so long to acknowledge projections (`Calibration.poll_applied`).
-    """
+    """How a calibration runs."""
 
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     camera_latency_s: float = 0.03
+    """From a frame's exposure to its earliest arrival."""
     match_tolerance_s: float = 0.15
+    """The frame of an alignment may lie this far from t_b."""
     steady_s: float = 0.4
     steady_m: float = 0.005
+    """The hand is steady if it moved less than this for so long."""
     apply_timeout_s: float = 5.0
+    """The headset has so long to acknowledge projections (`Calibration.poll_applied`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedHand:
-    """A hand cloud with its place in the world.
-
-    Attributes
-    ----------
-    cloud : HandCloud
-    t_host_ns : int
-        Of its exposure, host's monotonic clock.
-    T_W_D : (4, 4) float64
-    points_W_m : (N, 3) float64
-        The cloud's surface.
-    middle_W_m : (3,) float64
-        Its median, to a millimetre.
-    """
+    """A hand cloud with its place in the world."""
 
     cloud: HandCloud
     t_host_ns: int
+    """Of its exposure, host's monotonic clock."""
     T_W_D: Float64
+    """(4, 4)."""
     points_W_m: Float64
+    """(N, 3); the cloud's surface."""
     middle_W_m: Float64
+    """(3,); its median, to a millimetre."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """What one step saw.
-
-    Attributes
-    ----------
-    state : State
-        After the step.
-    hand : PlacedHand or None
-        The newest whose place has become known, maybe from an earlier frame; None if none has.
-    problem : str
-        Why there is no hand; empty if there is one.
-    is_steady : bool
-        Whether a cursor may be made now.
-    cloud : HandCloud or None
-        The hand in the step's own frame, whether or not its place is known.
-    rotation_rad : (3,) float64 or None
-        From the cursor to the live hand, about D's axes, while aligning.
-    is_red : bool
-        Whether that is beyond the guard's limit.
-    segment_ms, guard_ms : float or None
-        What those stages took.
-    """
+    """What one step saw."""
 
     state: State
+    """After the step."""
     hand: PlacedHand | None
+    """The newest whose place has become known, maybe from an earlier frame; None if none has."""
     problem: str
+    """Why there is no hand; empty if there is one."""
     is_steady: bool
+    """Whether a cursor may be made now."""
     cloud: HandCloud | None = None
+    """The hand in the step's own frame, whether or not its place is known."""
     rotation_rad: Float64 | None = None
+    """(3,); from the cursor to the live hand, about D's axes, while aligning."""
     is_red: bool = False
+    """Whether that is beyond the guard's limit."""
     segment_ms: float | None = None
     guard_ms: float | None = None
+    """What those stages took."""
 
 
 class Calibration:

@@ -21,19 +21,13 @@ _NO_TARGET_M = np.empty((0, 3))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlay:
-    """The live hand's outline as a headset draws it, and by how much that misses the hand.
-
-    Attributes
-    ----------
-    outline_px : (N, 2) float64
-        Point by point that of `EyeView.hand_px`.
-    error_px, error_arcmin : float or None
-        Mean distance of these points; None without an outline.
-    """
+    """The live hand's outline as a headset draws it, and by how much that misses the hand."""
 
     outline_px: Float64
+    """(N, 2); point by point that of `EyeView.hand_px`."""
     error_px: float | None
     error_arcmin: float | None
+    """Mean distance of these points; None without an outline."""
 
     def __post_init__(self) -> None:
         freeze(self, "outline_px", np.float64, None, 2)
@@ -41,42 +35,30 @@ class Overlay:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeView:
-    """One eye's view, in pixels of its display.
-
-    Attributes
-    ----------
-    eye : {"left", "right"}
-    width_px, height_px : int
-        Size of the display.
-    hand_px : (N, 2) float64
-        Outline of the live hand as the eye sees it through the display.
-    drawn : Overlay
-        With what the headset renders with now: on the hand if the calibration is right.
-    offline : Overlay
-        With the offline calibration, as before any alignment.
-    cursor_px : (M, 2) float64
-        The cursor as the headset draws it; empty if there is none.
-    target_px : (4, 2) or (0, 2) float64
-        The user test's target at its place, as the eye sees it; empty while it is not shown.
-    drawn_target_px : (4, 2) or (0, 2) float64
-        The target as the headset draws it: on the other if the calibration is right.
-    is_true : bool
-        Whether the eye is the simulated wearer's true one; otherwise it is predicted.
-    image : (h, w, 3) uint8 or None
-        RGB of the world behind the display, stretched over it; None if it is not known.
-    """
+    """One eye's view, in pixels of its display."""
 
     eye: Eye
     width_px: int
     height_px: int
+    """Size of the display."""
     hand_px: Float64
+    """(N, 2); outline of the live hand as the eye sees it through the display."""
     drawn: Overlay
+    """With what the headset renders with now: on the hand if the calibration is right."""
     offline: Overlay
+    """With the offline calibration, as before any alignment."""
     cursor_px: Float64
+    """(M, 2); the cursor as the headset draws it; empty if there is none."""
     target_px: Float64
+    """(4, 2); the user test's target at its place, as the eye sees it; empty while it is not
+    shown."""
     drawn_target_px: Float64
+    """(4, 2); the target as the headset draws it: on the other if the calibration is right."""
     is_true: bool
+    """Whether the eye is the simulated wearer's true one; otherwise it is predicted."""
     image: UInt8 | None = None
+    """(h, w, 3); RGB of the world behind the display, stretched over it; None if it is not
+    known."""
 
     def __post_init__(self) -> None:
         freeze(self, "hand_px", np.float64, None, 2)

@@ -29,63 +29,41 @@ _CHECKPOINT = "checkpoint.pt"
 
 @dataclass(frozen=True, slots=True)
 class TrainSettings:
-    """How the network is trained.
-
-    Attributes
-    ----------
-    seed : int
-    steps, batch : int
-    rate, backbone_rate : float
-        Highest learning rates of AdamW, of the new layers and of the pretrained ones; rising over
-        the first `rise` of the steps, falling linearly to 0 over the last `fall`.
-    rise, fall : float
-    weight_decay : float
-    gradient_max : float
-        Longer gradients are shortened to this norm.
-    average : float
-        Decay per step of the running mean of the weights, which is what is evaluated.
-    settled : int
-        Batches over which batch normalisation takes the moments of the averaged weights, at the
-        end.
-    validated : float
-        Share of the photographs kept aside to judge progress by.
-    samples : SampleSettings
-    """
+    """How the network is trained."""
 
     seed: int = 1
     steps: int = 60_000
     batch: int = 4
     rate: float = 1e-3
     backbone_rate: float = 3e-4
+    """Highest learning rates of AdamW, of the new layers and of the pretrained ones; rising over
+    the first `rise` of the steps, falling linearly to 0 over the last `fall`."""
     rise: float = 0.03
     fall: float = 0.8
     weight_decay: float = 0.03
     gradient_max: float = 10.0
+    """Longer gradients are shortened to this norm."""
     average: float = 0.998
+    """Decay per step of the running mean of the weights, which is what is evaluated."""
     settled: int = 300
+    """Batches over which batch normalisation takes the moments of the averaged weights, at the
+    end."""
     validated: float = 0.1
+    """Share of the photographs kept aside to judge progress by."""
     samples: SampleSettings = field(default_factory=SampleSettings)
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How often progress is written, and what computes it.
-
-    Attributes
-    ----------
-    checkpoint_s : float
-    validate_steps : int
-    threads, workers : int
-        Of the network, and processes that prepare samples.
-    bfloat16 : bool
-        Whether a processor computes gradients with numbers of 16 bits, as CUDA devices always do.
-    """
+    """How often progress is written, and what computes it."""
 
     checkpoint_s: float = 180.0
     validate_steps: int = 2000
     threads: int = 1
     workers: int = 1
+    """Of the network, and processes that prepare samples."""
     bfloat16: bool = False
+    """Whether a processor computes gradients with numbers of 16 bits, as CUDA devices always do."""
 
 
 class Training:

@@ -38,42 +38,29 @@ _BLEND_MIN = 0.35
 
 @dataclass(frozen=True, slots=True)
 class SampleSettings:
-    """How samples are drawn.
-
-    Attributes
-    ----------
-    side_px : int
-        Of the square crops; a multiple of the largest stride.
-    whole_px : float
-        Side of a square with as many pixels as the detector will shrink a whole image to.
-    zoomed : float
-        Share of the crops as large as makes one hand fill 12–85 % of the side, as a wearer's
-        does; the others show the photograph about as large as the detector will see it.
-    centered : float
-        Share of the crops that are about that hand. The others show any part of the photograph,
-        as large: faces, arms and things that are no hands.
-    zoom_max : float
-        A photograph is enlarged no further.
-    large_weight : float
-        How much likelier a photograph is chosen if a hand fills 15 % of it or more.
-    simulated, pasted : float
-        Shares of samples that are simulated pictures, and photographs with a simulated hand.
-    blended : float
-        Share of samples that are two of the others, one seen through the other.
-    disturbed : float
-        Share of samples whose light and sharpness are changed.
-    """
+    """How samples are drawn."""
 
     side_px: int = 288
+    """Of the square crops; a multiple of the largest stride."""
     whole_px: float = 332.0
+    """Side of a square with as many pixels as the detector will shrink a whole image to."""
     zoomed: float = 0.5
+    """Share of the crops as large as makes one hand fill 12–85 % of the side, as a wearer's does;
+    the others show the photograph about as large as the detector will see it."""
     centered: float = 0.72
+    """Share of the crops that are about that hand. The others show any part of the photograph, as
+    large: faces, arms and things that are no hands."""
     zoom_max: float = 4.0
+    """A photograph is enlarged no further."""
     large_weight: float = 2.0
+    """How much likelier a photograph is chosen if a hand fills 15 % of it or more."""
     simulated: float = 0.1
     pasted: float = 0.08
+    """Shares of samples that are simulated pictures, and photographs with a simulated hand."""
     blended: float = 0.2
+    """Share of samples that are two of the others, one seen through the other."""
     disturbed: float = 1.0
+    """Share of samples whose light and sharpness are changed."""
 
 
 class Samples(Dataset[tuple[UInt8, Float32]]):

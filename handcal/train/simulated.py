@@ -26,25 +26,17 @@ _TILT = 1.6  # foreshortened and sideways hands are the hardest to find
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A simulated hand in a simulated room.
-
-    Attributes
-    ----------
-    color : (H, W, 3) uint8
-        RGB.
-    is_hand : (H, W) bool
-        The hand and its forearm.
-    box : (4,) float64
-        x0, y0, x1, y1 about the hand without its forearm, px from the image's upper left corner;
-        may reach beyond the image.
-    skin : (3,) float64
-        Mean colour of the skin in even light, RGB of 0 to 255.
-    """
+    """A simulated hand in a simulated room."""
 
     color: UInt8
+    """(H, W, 3); RGB."""
     is_hand: Bool
+    """(H, W); the hand and its forearm."""
     box: Float64
+    """(4,); x0, y0, x1, y1 about the hand without its forearm, px from the image's upper left
+    corner; may reach beyond the image."""
     skin: Float64
+    """(3,); mean colour of the skin in even light, RGB of 0 to 255."""
 
 
 def picture(

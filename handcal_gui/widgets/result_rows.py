@@ -22,25 +22,17 @@ NOTHING = "–"
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One number of an eye shift.
-
-    Attributes
-    ----------
-    name, suffix, meaning : str
-        The unit is in one of the first two.
-    value : callable
-        From the shift and the eye's display to the number in its unit.
-    decimals : int
-    sigma : callable or None
-        From the shift to the number's standard deviation.
-    """
+    """One number of an eye shift."""
 
     name: str
     suffix: str
     meaning: str
+    """The unit is in one of the first two."""
     value: Callable[[EyeShift, EyeDisplay], float]
+    """From the shift and the eye's display to the number in its unit."""
     decimals: int
     sigma: Callable[[EyeShift], float] | None = None
+    """From the shift to the number's standard deviation."""
 
     def text(self, shift: EyeShift, display: EyeDisplay) -> str:
         """Return the number, with its standard deviation if it has one."""

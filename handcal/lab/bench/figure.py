@@ -8,23 +8,15 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One measured number.
-
-    Attributes
-    ----------
-    what : str
-    value : float
-    unit : str
-        Empty for a ratio.
-    at_least, at_most : float or None
-        The target; None where there is none on that side.
-    """
+    """One measured number."""
 
     what: str
     value: float
     unit: str
+    """Empty for a ratio."""
     at_least: float | None = None
     at_most: float | None = None
+    """The target; None where there is none on that side."""
 
     def to_json(self) -> dict[str, Any]:
         """Return what was measured, the target as text, and whether it is met: None without one."""

@@ -55,53 +55,35 @@ _FIGURES = (
 
 @dataclass(frozen=True, slots=True)
 class OfflineSettings:
-    """What is photographed.
-
-    Attributes
-    ----------
-    views : int
-        Of the board, for each camera's intrinsics and for each pair of cameras.
-    grids : int
-        Of each display.
-    viewpoint_camera, headset_camera : Intrinsics
-        The true ones.
-    pictures : PictureSettings
-        Blur and noise.
-    """
+    """What is photographed."""
 
     views: int = 20
+    """Of the board, for each camera's intrinsics and for each pair of cameras."""
     grids: int = 3
+    """Of each display."""
     viewpoint_camera: Intrinsics = VIEWPOINT_CAMERA
     headset_camera: Intrinsics = HEADSET_CAMERA
+    """The true ones."""
     pictures: PictureSettings = field(default_factory=lambda: PictureSettings(samples=2))
+    """Blur and noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OfflineRun:
-    """A rig calibrated from photographs, and how far its parts are from the truth.
-
-    Attributes
-    ----------
-    rig : Rig
-    rotation_deg, translation_mm : float
-        Error of T_H_D.
-    focal_share : float
-        The largest relative error of both cameras' focal lengths.
-    homography_px : float
-        The largest error on both displays, px of the display.
-    distance_share : float
-        The larger relative error of z(C0→S).
-    viewpoint_mm : float
-        The larger error of t(C0→V).
-    """
+    """A rig calibrated from photographs, and how far its parts are from the truth."""
 
     rig: Rig
     rotation_deg: float
     translation_mm: float
+    """Error of T_H_D."""
     focal_share: float
+    """The largest relative error of both cameras' focal lengths."""
     homography_px: float
+    """The largest error on both displays, px of the display."""
     distance_share: float
+    """The larger relative error of z(C0→S)."""
     viewpoint_mm: float
+    """The larger error of t(C0→V)."""
 
 
 def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:

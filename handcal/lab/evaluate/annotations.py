@@ -25,26 +25,17 @@ _REACH = 10.0  # so many image sides away a box may end
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
-    """One annotated photograph.
-
-    Attributes
-    ----------
-    path : Path
-    width, height : int
-    boxes : (M, 4) float64
-        x0, y0, x1, y1 of each hand, px from the image's upper left corner.
-    quads : (M, 4, 2) float64
-        The same hands' corners, px.
-    large : (M,) bool
-        The data set's own rule.
-    """
+    """One annotated photograph."""
 
     path: Path
     width: int
     height: int
     boxes: Float64
+    """(M, 4); x0, y0, x1, y1 of each hand, px from the image's upper left corner."""
     quads: Float64
+    """(M, 4, 2); the same hands' corners, px."""
     large: Bool
+    """(M,); the data set's own rule."""
 
     @property
     def relative_sizes(self) -> Float64:

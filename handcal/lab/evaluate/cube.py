@@ -19,30 +19,20 @@ from handcal.types import Float64, Intrinsics, freeze
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CubeMisalignment:
-    """The virtual cube less the real one, in the axes of the (turned) camera.
-
-    Attributes
-    ----------
-    faces : int
-        Seen in both captures.
-    depth_m : float
-        z of the real cube's middle.
-    offset_m : (N, 2) float64
-        Of each corner across the line of sight, at the real corner's depth.
-    offset_rad : (N, 2) float64
-        The same as angles.
-    along_m : float
-        Of the cube's middle along z.
-    rotation_rad : (3,) float64
-        Rotation vector from the real cube to the virtual one.
-    """
+    """The virtual cube less the real one, in the axes of the (turned) camera."""
 
     faces: int
+    """Seen in both captures."""
     depth_m: float
+    """z of the real cube's middle."""
     offset_m: Float64
+    """(N, 2); of each corner across the line of sight, at the real corner's depth."""
     offset_rad: Float64
+    """(N, 2); the same as angles."""
     along_m: float
+    """Of the cube's middle along z."""
     rotation_rad: Float64
+    """(3,); rotation vector from the real cube to the virtual one."""
 
     def __post_init__(self) -> None:
         freeze(self, "offset_m", np.float64, None, 2)

@@ -22,21 +22,14 @@ REAL, VIRTUAL, GRID = "real", "virtual", "grid"
 
 @dataclass(frozen=True, slots=True)
 class PlannedCapture:
-    """An image that shall be there.
-
-    Attributes
-    ----------
-    where : str
-        POSITION, or POSITION/POSE.
-    kind : str
-        `REAL`, `VIRTUAL` or `GRID`.
-    drawn : str
-        Which of the ways of drawing that are compared; empty if there is just one.
-    """
+    """An image that shall be there."""
 
     where: str
+    """POSITION, or POSITION/POSE."""
     kind: str
+    """`REAL`, `VIRTUAL` or `GRID`."""
     drawn: str = ""
+    """Which of the ways of drawing that are compared; empty if there is just one."""
 
     @property
     def name(self) -> str:
@@ -51,24 +44,16 @@ class PlannedCapture:
 
 @dataclass(frozen=True, slots=True)
 class CapturePlan:
-    """What shall be captured.
-
-    Attributes
-    ----------
-    positions : sequence of str
-        Of the camera in the eye box.
-    poses : int
-        Of the cube at each position.
-    drawn : sequence of str
-        Ways of drawing that are compared; empty for just one.
-    with_grid : bool
-        Whether the display's grid is captured at each position.
-    """
+    """What shall be captured."""
 
     positions: Sequence[str] = ("centre", "up", "down", "left", "right")
+    """Of the camera in the eye box."""
     poses: int = 4
+    """Of the cube at each position."""
     drawn: Sequence[str] = ()
+    """Ways of drawing that are compared; empty for just one."""
     with_grid: bool = True
+    """Whether the display's grid is captured at each position."""
 
     def __post_init__(self) -> None:
         for names in (self.positions, self.drawn):
@@ -97,21 +82,14 @@ class CapturePlan:
 
 @dataclass(frozen=True, slots=True)
 class CapturedPose:
-    """The captures of one pose of the cube.
-
-    Attributes
-    ----------
-    position, pose : str
-        Of the camera in the eye box, and of the cube: the folders' names.
-    real : Path
-    virtual : mapping of str to Path
-        By NAME, or ``virtual`` where there is none.
-    """
+    """The captures of one pose of the cube."""
 
     position: str
     pose: str
+    """Of the camera in the eye box, and of the cube: the folders' names."""
     real: Path
     virtual: Mapping[str, Path]
+    """By NAME, or ``virtual`` where there is none."""
 
 
 def missing_captures(folder: Path, plan: CapturePlan) -> list[PlannedCapture]:

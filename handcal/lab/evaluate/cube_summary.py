@@ -11,18 +11,12 @@ from handcal.statistics import MeanInterval, Summary, mean_interval, summarise
 
 @dataclass(frozen=True, slots=True)
 class ErrorSummary:
-    """One error over all pairs.
-
-    Attributes
-    ----------
-    spread : Summary
-    interval : MeanInterval or None
-        Of the mean; positions of the camera count as independent, as each has its own calibration.
-        None of a single position.
-    """
+    """One error over all pairs."""
 
     spread: Summary
     interval: MeanInterval | None
+    """Of the mean; positions of the camera count as independent, as each has its own calibration.
+    None of a single position."""
 
 
 def cube_summary(rows: Sequence[CubeRow]) -> dict[str, dict[str, ErrorSummary]]:

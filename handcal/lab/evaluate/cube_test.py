@@ -32,18 +32,12 @@ _UNUSABLE = (CubeError, BoardError, ViewsError, FileError, ValueError)
 
 @dataclass(frozen=True, slots=True)
 class CubeTest:
-    """What the captures show.
-
-    Attributes
-    ----------
-    rows : list of dict
-        `cube_row` of each pair, and whose it is: ``position``, ``pose``, ``drawn``.
-    left_out : mapping of str to str
-        Why, by what could not be used.
-    """
+    """What the captures show."""
 
     rows: list[CubeRow]
+    """`cube_row` of each pair, and whose it is: ``position``, ``pose``, ``drawn``."""
     left_out: dict[str, str]
+    """Why, by what could not be used."""
 
 
 def judge_captures(

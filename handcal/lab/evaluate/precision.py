@@ -16,38 +16,27 @@ MATCH_OVERLAP = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageResult:
-    """What was found in one image, and what is there.
-
-    Attributes
-    ----------
-    boxes : (N, 4) float64
-        Found: x0, y0, x1, y1 in pixels.
-    scores : (N,) float64
-    hands : (M, 4) float64
-        True boxes.
-    """
+    """What was found in one image, and what is there."""
 
     boxes: Float64
+    """(N, 4); found: x0, y0, x1, y1 in pixels."""
     scores: Float64
+    """(N,)."""
     hands: Float64
+    """(M, 4); True boxes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrecisionRecall:
-    """A detector's curve over falling score.
-
-    Attributes
-    ----------
-    scores, precision, recall : (K,) float64
-    average_precision : float
-        Area under the curve with precision made monotonic (all-point interpolation, Everingham et
-        al. 2010); NaN where there are no hands.
-    """
+    """A detector's curve over falling score."""
 
     scores: Float64
     precision: Float64
     recall: Float64
+    """(K,)."""
     average_precision: float
+    """Area under the curve with precision made monotonic (all-point interpolation, Everingham et
+    al. 2010); NaN where there are no hands."""
 
 
 def precision_recall(results: Iterable[tuple[ImageResult, Bool]]) -> PrecisionRecall:

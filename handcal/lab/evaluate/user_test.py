@@ -34,35 +34,19 @@ Unit: TypeAlias = Literal["wearer", "calibration"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UserTest:
-    """The trials of all sessions.
-
-    Attributes
-    ----------
-    sessions : mapping of str to SessionRecord
-        Those with trials, by a name of their own.
-    left_out : mapping of str to str
-        Why the others are left out, by their folders.
-    corners : sequence of dict
-        All errors.
-    """
+    """The trials of all sessions."""
 
     sessions: Mapping[str, SessionRecord]
+    """Those with trials, by a name of their own."""
     left_out: Mapping[str, str]
+    """Why the others are left out, by their folders."""
     corners: Sequence[CornerRow]
+    """All errors."""
 
 
 @dataclass(frozen=True, slots=True)
 class GroupErrors:
-    """The errors of some of the trials.
-
-    Attributes
-    ----------
-    calibrations, trials, corners : int
-    px, arcmin : Summary
-    unit : {"wearer", "calibration"}
-    interval_arcmin : MeanInterval or None
-        Of the mean over units; None if there are less than two.
-    """
+    """The errors of some of the trials."""
 
     calibrations: int
     trials: int
@@ -71,26 +55,19 @@ class GroupErrors:
     arcmin: Summary
     unit: Unit
     interval_arcmin: MeanInterval | None
+    """Of the mean over units; None if there are less than two."""
 
 
 @dataclass(frozen=True, slots=True)
 class UserTestResult:
-    """What a user test came to; JSON-able with `dataclasses.asdict`.
-
-    Attributes
-    ----------
-    total : GroupErrors
-    by_wearer, by_eye, by_depth_m : mapping of str to GroupErrors
-    components_arcmin : VarianceComponents or None
-        How far wearers differ, and the errors of one; None for a single wearer.
-    left_out : mapping of str to str
-    """
+    """What a user test came to; JSON-able with `dataclasses.asdict`."""
 
     total: GroupErrors
     by_wearer: Mapping[str, GroupErrors]
     by_eye: Mapping[str, GroupErrors]
     by_depth_m: Mapping[str, GroupErrors]
     components_arcmin: VarianceComponents | None
+    """How far wearers differ, and the errors of one; None for a single wearer."""
     left_out: Mapping[str, str]
 
 

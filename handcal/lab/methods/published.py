@@ -22,18 +22,7 @@ class PublishedReprojection:
 
 @dataclass(frozen=True, slots=True)
 class PublishedMisalignment:
-    """Misalignment at arm's reach, each "mean ± sd" as far as given.
-
-    Attributes
-    ----------
-    study, alignments : str
-    x_mm, y_mm, z_mm : str
-    across_mm, across_arcmin : str
-        In x and y together.
-    rotation_deg : str
-    whole_mm : str
-        Where components are not given.
-    """
+    """Misalignment at arm's reach, each "mean ± sd" as far as given."""
 
     study: str
     alignments: str
@@ -42,8 +31,10 @@ class PublishedMisalignment:
     z_mm: str = "–"
     across_mm: str = "–"
     across_arcmin: str = "–"
+    """In x and y together."""
     rotation_deg: str = "–"
     whole_mm: str = ""
+    """Where components are not given."""
 
 
 REPROJECTION = (

@@ -44,45 +44,30 @@ _PAPER_SOLVES_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class MethodSettings:
-    """What the methods are compared on.
-
-    Attributes
-    ----------
-    wearers : int
-    eye_distance_sigmas_m : tuple of float
-        Populations: how far eye distances vary from the rig's. 0 is a headset set to its wearer.
-    noise_scale : float
-        Errors of an overlay, in those of `WearerSettings`. Set so that the paper's own method
-        errs as in the paper (`handcal.lab.study.wearer_noise`).
-    points : int
-        Of each cloud of the hand.
-    depth_sigma_m : float
-        Of each of its points.
-    hands : int
-        How many different hands there are.
-    pointing_sigma_arcmin : float
-        Of a tracked point against crosshairs, about each of two axes: what 11 recorded SPAAM
-        calibrations leave, tracker included (`handcal.lab.study.recorded`).
-    fingertip_sigma_m : float
-        Of a tracked fingertip, each axis, beyond that. An assumption.
-    corner_sigma_m : float
-        Of a tracked cube's corner, each axis. An assumption.
-    eye_tracker_sigma_m : tuple of 3 float
-        Of a tracked eye, E axes: x and y as far as those recordings differ from the eye that
-        their alignments tell, without what is common to all; z an assumption.
-    seed : int
-    """
+    """What the methods are compared on."""
 
     wearers: int = 100
     eye_distance_sigmas_m: tuple[float, ...] = (0.0, 0.002)
+    """Populations: how far eye distances vary from the rig's. 0 is a headset set to its wearer."""
     noise_scale: float = 1.0
+    """Errors of an overlay, in those of `WearerSettings`. Set so that the paper's own method errs
+    as in the paper (`handcal.lab.study.wearer_noise`)."""
     points: int = 1500
+    """Of each cloud of the hand."""
     depth_sigma_m: float = 0.001
+    """Of each of its points."""
     hands: int = 10
+    """How many different hands there are."""
     pointing_sigma_arcmin: float = 5.9
+    """Of a tracked point against crosshairs, about each of two axes: what 11 recorded SPAAM
+    calibrations leave, tracker included (`handcal.lab.study.recorded`)."""
     fingertip_sigma_m: float = 0.003
+    """Of a tracked fingertip, each axis, beyond that. An assumption."""
     corner_sigma_m: float = 0.001
+    """Of a tracked cube's corner, each axis. An assumption."""
     eye_tracker_sigma_m: tuple[float, float, float] = (0.0021, 0.0008, 0.002)
+    """Of a tracked eye, E axes: x and y as far as those recordings differ from the eye that their
+    alignments tell, without what is common to all; z an assumption."""
     seed: int = 1
 
 
@@ -92,24 +77,16 @@ QUICK_METHODS = MethodSettings(wearers=3, points=300)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """What a method made of one wearer.
-
-    Attributes
-    ----------
-    method : str
-    alignments : int
-        The wearer's, for both eyes together.
-    wearer_s : float
-        Of the wearer's time.
-    projections : mapping of eye to (3, 4) float64, or None
-        None if the method refused the alignments. One that puts the target behind an eye counts
-        as refused too.
-    """
+    """What a method made of one wearer."""
 
     method: str
     alignments: int
+    """The wearer's, for both eyes together."""
     wearer_s: float
+    """Of the wearer's time."""
     projections: Projections | None
+    """each (3, 4); None if the method refused the alignments. One that puts the target behind an
+    eye counts as refused too."""
 
 
 def methods_study(settings: MethodSettings) -> Study:

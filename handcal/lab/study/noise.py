@@ -40,56 +40,39 @@ class NoiseSettings:
 
     Where a section varies something else, clouds are as a sensor gives them: sampled apart, with
     `depth_sigma_m` of noise, the hand turned by `angle_deg`, φ uniform within ± 10 mm.
-
-    Attributes
-    ----------
-    seed : int
-    trials : int
-        Alignments of each value, for ``consistent`` and ``icp``.
-    linear_trials, paper_trials : int
-        The first so many of them, but for the section of hand shapes, are solved by ``linear``,
-        and by ``paper``, which is slow.
-    hands : int
-        People, who come again; errors of one are not independent of one another.
-    points : int
-        Of each cloud.
-    depth_sigma_m, angle_deg : float
-    coarse_deg, fine_deg : tuple of float
-        Rotations of the paper's two figures.
-    kept_deg : tuple of float
-        Rotations of a hand that keeps its size, as the paper's does not quite.
-    shift_max_m : tuple of float
-        Each component of φ is uniform within ± these.
-    depth_sigmas_m : tuple of float
-        Standard deviations of each point's depth.
-    forearms_m : tuple of float
-        How much forearm the hand's cloud shows; the cursor's shows 40 mm.
-    counts : tuple of int
-        Points of each cloud.
-    shapes, shape_trials : int
-        Hands of other people, and how often each is aligned.
-    slips : tuple of float
-        How much a wearer who looks through the displays errs, as a multiple of the usual.
     """
 
     seed: int = 1
     trials: int = 100
+    """Alignments of each value, for ``consistent`` and ``icp``."""
     linear_trials: int = 20
     paper_trials: int = 8
+    """The first so many of them, but for the section of hand shapes, are solved by ``linear``, and
+    by ``paper``, which is slow."""
     hands: int = 20
+    """People, who come again; errors of one are not independent of one another."""
     points: int = 1000
+    """Of each cloud."""
     depth_sigma_m: float = 0.001
     angle_deg: float = 3.0
     coarse_deg: tuple[float, ...] = tuple(5.0 * i for i in range(13))
     fine_deg: tuple[float, ...] = tuple(float(i) for i in range(21))
+    """Rotations of the paper's two figures."""
     kept_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 20.0)
+    """Rotations of a hand that keeps its size, as the paper's does not quite."""
     shift_max_m: tuple[float, ...] = (0.005, 0.010, 0.015, 0.020, 0.030)
+    """Each component of φ is uniform within ± these."""
     depth_sigmas_m: tuple[float, ...] = (0.0, 0.0005, 0.001, 0.002, 0.004)
+    """Standard deviations of each point's depth."""
     forearms_m: tuple[float, ...] = (0.0, 0.02, 0.04, 0.06, 0.08)
+    """How much forearm the hand's cloud shows; the cursor's shows 40 mm."""
     counts: tuple[int, ...] = (250, 500, 1000, 2000, 4000)
+    """Points of each cloud."""
     shapes: int = 24
     shape_trials: int = 20
+    """Hands of other people, and how often each is aligned."""
     slips: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)
+    """How much a wearer who looks through the displays errs, as a multiple of the usual."""
 
 
 QUICK_NOISE = NoiseSettings(
@@ -115,27 +98,18 @@ _Making: TypeAlias = "tuple[AlignmentSettings, float]"
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of the study, in which one thing varies.
-
-    Attributes
-    ----------
-    name : str
-    values : callable
-        What there is of it, from the settings.
-    making : callable or None
-        From settings and value, how alignments are made, and their rotation in degrees; None for
-        those that a wearer makes.
-    label : str
-        What varies, with the unit in which it is shown.
-    scale : float
-        From a value to that unit.
-    """
+    """A part of the study, in which one thing varies."""
 
     name: str
     values: Callable[[NoiseSettings], Sequence[float]]
+    """What there is of it, from the settings."""
     making: Callable[[NoiseSettings, float], _Making] | None
+    """From settings and value, how alignments are made, and their rotation in degrees; None for
+    those that a wearer makes."""
     label: str
+    """What varies, with the unit in which it is shown."""
     scale: float = 1.0
+    """From a value to that unit."""
 
 
 def _measured(settings: NoiseSettings, **changes: Any) -> _Making:

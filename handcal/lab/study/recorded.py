@@ -33,79 +33,53 @@ _UNKNOWNS = 11
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """One recorded calibration.
-
-    Attributes
-    ----------
-    points_m : (N, 3) float64
-        The marker, in the world camera's frame.
-    pixels : (N, 2) float64
-        Crosshairs it was aligned with.
-    eye_m : (3,) float64
-        The tracked eye, in the same frame.
-    P_authors : (3, 4) float64
-        Their SPAAM.
-    """
+    """One recorded calibration."""
 
     points_m: Float64
+    """(N, 3); the marker, in the world camera's frame."""
     pixels: Float64
+    """(N, 2); crosshairs it was aligned with."""
     eye_m: Float64
+    """(3,); the tracked eye, in the same frame."""
     P_authors: Float64
+    """(3, 4); their SPAAM."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedSet:
-    """All recordings, and the display that they share.
-
-    Attributes
-    ----------
-    recordings : mapping of str to Recording
-        By name, the base first.
-    T_S_W : (3, 4) float64
-        To the display's frame, z away from the eye.
-    focal_px_m : float
-        Pixels per metre on it.
-    centre_px : (2,) float64
-    """
+    """All recordings, and the display that they share."""
 
     recordings: Mapping[str, Recording]
+    """By name, the base first."""
     T_S_W: Float64
+    """(3, 4); to the display's frame, z away from the eye."""
     focal_px_m: float
+    """Pixels per metre on it."""
     centre_px: Float64
+    """(2,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedResult:
-    """What one recording gives; errors are means over its alignments.
-
-    Attributes
-    ----------
-    alignments : int
-    spaam_px, authors_spaam_px : float
-        Of SPAAM on its own alignments, ours and the authors'.
-    difference_px : float
-        Largest difference, in x or y, between where the two draw a marker.
-    base_px : float
-        Of the base recording's SPAAM, as it is.
-    recycled_px, full_px : float
-        Of INDICA's two setups.
-    pointing_sigma_px, pointing_sigma_arcmin : float
-        What SPAAM leaves, about each axis, with its 11 unknowns taken into account.
-    eye_miss_mm : tuple of 3 float
-        From the eye that best explains the alignments through the base's display to the tracked
-        eye: right, along pixel rows downward, away from the eye. The last is hardly determined.
-    """
+    """What one recording gives; errors are means over its alignments."""
 
     alignments: int
     spaam_px: float
     authors_spaam_px: float
+    """Of SPAAM on its own alignments, ours and the authors'."""
     difference_px: float
+    """Largest difference, in x or y, between where the two draw a marker."""
     base_px: float
+    """Of the base recording's SPAAM, as it is."""
     recycled_px: float
     full_px: float
+    """Of INDICA's two setups."""
     pointing_sigma_px: float
     pointing_sigma_arcmin: float
+    """What SPAAM leaves, about each axis, with its 11 unknowns taken into account."""
     eye_miss_mm: tuple[float, float, float]
+    """From the eye that best explains the alignments through the base's display to the tracked eye:
+    right, along pixel rows downward, away from the eye. The last is hardly determined."""
 
 
 def read_recordings(folder: Path) -> RecordedSet:

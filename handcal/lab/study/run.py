@@ -24,24 +24,16 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """What there is to do.
-
-    Attributes
-    ----------
-    name : str
-    settings : object
-        A frozen dataclass of JSON-able fields, which can be pickled.
-    cases : sequence of dict
-    trial : callable
-        Gives the rows of one case from `settings` and the case, its random numbers from these
-        alone. A function of a module, so that other processes can import it; no number in its
-        rows is NaN or infinite.
-    """
+    """What there is to do."""
 
     name: str
     settings: Any
+    """A frozen dataclass of JSON-able fields, which can be pickled."""
     cases: Sequence[Case]
     trial: Callable[[Any, Case], list[Row]]
+    """Gives the rows of one case from `settings` and the case, its random numbers from these alone.
+    A function of a module, so that other processes can import it; no number in its rows is NaN or
+    infinite."""
 
 
 def run_study(

@@ -28,22 +28,15 @@ _NEAR_ENOUGH = 0.02
 
 @dataclass(frozen=True, slots=True)
 class NoiseFit:
-    """What the search found.
-
-    Attributes
-    ----------
-    scale : float
-        Errors of an overlay in those of `WearerSettings`.
-    mean_arcmin, sd_arcmin : float
-        The paper's method with it, over all corners of all wearers.
-    mean_by_scale : mapping of float to float
-        The mean at every scale tried, in arcmin.
-    """
+    """What the search found."""
 
     scale: float
+    """Errors of an overlay in those of `WearerSettings`."""
     mean_arcmin: float
     sd_arcmin: float
+    """The paper's method with it, over all corners of all wearers."""
     mean_by_scale: dict[float, float]
+    """The mean at every scale tried, in arcmin."""
 
 
 def fit_noise(

@@ -35,19 +35,12 @@ _MPAAM_CORNERS = (0, 2, 4, 6, 7)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StudyWearer:
-    """Somebody who wears the example rig.
-
-    Attributes
-    ----------
-    rig : Rig
-    hand : HandModel
-    true_shift_m : mapping of eye to (3,) float64
-        φ of the eyes, in E's axes.
-    """
+    """Somebody who wears the example rig."""
 
     rig: Rig
     hand: HandModel
     true_shift_m: Mapping[Eye, Float64]
+    """each (3,); φ of the eyes, in E's axes."""
 
     def T_E_H(self, eye: Eye) -> Float64:
         """Return the transform from the headset to an eye's E."""

@@ -16,19 +16,12 @@ from handcal_gui.widgets.times import local_time
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One session.
-
-    Attributes
-    ----------
-    path : Path
-    text : str
-    is_enabled : bool
-        Whether it may be chosen; otherwise `text` says why not.
-    """
+    """One session."""
 
     path: Path
     text: str
     is_enabled: bool = True
+    """Whether it may be chosen; otherwise `text` says why not."""
 
 
 @dataclass(frozen=True, slots=True)

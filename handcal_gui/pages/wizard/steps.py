@@ -76,27 +76,17 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the wizard shows.
-
-    Attributes
-    ----------
-    step : Step
-    sentence : str
-        What the wearer, or the technician, must do.
-    checks : tuple of Check
-    main : Offer
-        What the space bar does.
-    others : tuple of Offer
-    note : str
-        What just happened or goes on, such as a refusal; empty if nothing.
-    """
+    """What the wizard shows."""
 
     step: Step
     sentence: str
+    """What the wearer, or the technician, must do."""
     checks: tuple[Check, ...]
     main: Offer
+    """What the space bar does."""
     others: tuple[Offer, ...] = ()
     note: str = ""
+    """What just happened or goes on, such as a refusal; empty if nothing."""
 
 
 def next_eyes(plan: EyePlan, alignments: Sequence[Alignment]) -> tuple[Eye, ...]:

@@ -20,21 +20,14 @@ _SMOOTHED_PX = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandOverlay:
-    """A hand in one picture.
-
-    Attributes
-    ----------
-    cloud : HandCloud
-    depth_px, image_px : (M, 2) float64
-        Its contour in the depth image and in the picture.
-    is_red : bool
-        Whether it is turned beyond the guard.
-    """
+    """A hand in one picture."""
 
     cloud: HandCloud
     depth_px: Float64
     image_px: Float64
+    """(M, 2); its contour in the depth image and in the picture."""
     is_red: bool
+    """Whether it is turned beyond the guard."""
 
     def draw(self, painter: QPainter) -> None:
         """Draw box, mask and contour in the picture's pixels; dashed where the hand is cut."""

@@ -25,12 +25,7 @@ _LEAST_AXIS_PX = 40.0
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """An upright box with its sides at multiples of 50 mm.
-
-    Attributes
-    ----------
-    low_mm, high_mm : tuple of 3 float
-    """
+    """An upright box with its sides at multiples of 50 mm."""
 
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]

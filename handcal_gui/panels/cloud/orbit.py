@@ -24,21 +24,14 @@ class Direction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Orbit:
-    """A turntable: up stays up, and a millimetre is as long everywhere.
-
-    Attributes
-    ----------
-    yaw_rad, pitch_rad : float
-        How far the scene is turned about its vertical, then about the picture's horizontal.
-    px_per_mm : float
-    centre_mm : tuple of 3 float
-        The scene's point in the picture's middle.
-    """
+    """A turntable: up stays up, and a millimetre is as long everywhere."""
 
     yaw_rad: float = Direction.ASLANT.value[0]
     pitch_rad: float = Direction.ASLANT.value[1]
+    """How far the scene is turned about its vertical, then about the picture's horizontal."""
     px_per_mm: float = 1.0
     centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """The scene's point in the picture's middle."""
 
     @property
     def rotation(self) -> Float64:

@@ -25,25 +25,16 @@ from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Standing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Offer:
-    """What can be evaluated.
-
-    Attributes
-    ----------
-    title : str
-    question : str
-        What it answers, and how long it takes.
-    evaluation : Evaluation
-    form : callable
-        Makes the fields for its entries.
-    preparation : Preparation, optional
-        Makes what is evaluated.
-    """
+    """What can be evaluated."""
 
     title: str
     question: str
+    """What it answers, and how long it takes."""
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
+    """Makes the fields for its entries."""
     preparation: Preparation | None = None
+    """Makes what is evaluated."""
 
 
 class EvaluationPage(QWidget):

@@ -26,22 +26,15 @@ class PreparationDialog(QDialog):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
-    """How an evaluation offers such a dialog.
-
-    Attributes
-    ----------
-    button, help_text : str
-        What the button says that opens it, and its tooltip.
-    is_possible : callable
-        Whether entries suffice for it.
-    dialog : callable
-        Makes it for entries, with a parent.
-    """
+    """How an evaluation offers such a dialog."""
 
     button: str
     help_text: str
+    """What the button says that opens it, and its tooltip."""
     is_possible: Callable[[Any], bool]
+    """Whether entries suffice for it."""
     dialog: Callable[[Any, QWidget], PreparationDialog]
+    """Makes it for entries, with a parent."""
 
 
 class PreparationButton(QPushButton):

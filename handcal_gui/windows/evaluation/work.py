@@ -44,20 +44,13 @@ class Standing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What an evaluation came to.
-
-    Attributes
-    ----------
-    folder : Path
-        Of all its files.
-    report : Report
-    pictures : sequence of (h, w, 3) uint8
-        The report's figures, RGB, as they were written.
-    """
+    """What an evaluation came to."""
 
     folder: Path
+    """Of all its files."""
     report: Report
     pictures: Sequence[UInt8]
+    """each (h, w, 3); the report's figures, RGB, as they were written."""
 
 
 class Evaluation(Protocol):
@@ -72,18 +65,12 @@ class Evaluation(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedStudy:
-    """A study on simulated wearers; entries name processes and scheduler.
-
-    Attributes
-    ----------
-    study : callable
-        Makes the study of the entries.
-    describe : callable
-        Makes the report of the study's settings and rows.
-    """
+    """A study on simulated wearers; entries name processes and scheduler."""
 
     study: Callable[[Any], Study]
+    """Makes the study of the entries."""
     describe: Callable[[Any, Sequence[Row]], Report]
+    """Makes the report of the study's settings and rows."""
 
     def standing(self, entries: Any) -> Standing:
         """Tell how much of the study the folder holds."""
@@ -124,18 +111,12 @@ class SimulatedStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GivenData:
-    """An evaluation of what is in files.
-
-    Attributes
-    ----------
-    missing : callable
-        Says what has yet to be entered; empty if nothing has.
-    describe : callable
-        Reads the files and makes the report, telling a `Checkpoint`.
-    """
+    """An evaluation of what is in files."""
 
     missing: Callable[[Any], str]
+    """Says what has yet to be entered; empty if nothing has."""
     describe: Callable[[Any, Checkpoint], Report]
+    """Reads the files and makes the report, telling a `Checkpoint`."""
 
     def standing(self, entries: Any) -> Standing:
         """Tell what is missing, and whether an earlier report will be replaced."""

@@ -22,20 +22,13 @@ _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One image, or the two of a pair that were taken at one moment.
-
-    Attributes
-    ----------
-    views : tuple of View
-        One for each camera.
-    files : tuple of Path
-    small : (h, w, 3) uint8 or None
-        The first image, small; None if it cannot be read.
-    """
+    """One image, or the two of a pair that were taken at one moment."""
 
     views: tuple[View, ...]
+    """One for each camera."""
     files: tuple[Path, ...]
     small: UInt8 | None
+    """(h, w, 3); the first image, small; None if it cannot be read."""
 
     @property
     def name(self) -> str:

@@ -42,26 +42,17 @@ from handcal_gui.windows.rig.work import DisplayEntries, StereoEntries, Viewpoin
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """What a step came to.
-
-    Attributes
-    ----------
-    verdict : CalibrationVerdict
-    rows : tuple of Row
-        The numbers, with how well they are known.
-    residuals_px, tilts_rad : mapping of name to float
-        Of each image; the tilt is between the board's normal and the line of sight.
-    worst : WorstView or None
-    put : callable or None
-        Returns a rig with this part in it; None if it is no part of a rig, or bad.
-    """
+    """What a step came to."""
 
     verdict: CalibrationVerdict
     rows: tuple[Row, ...]
+    """The numbers, with how well they are known."""
     residuals_px: Mapping[str, float]
     tilts_rad: Mapping[str, float] = field(default_factory=dict)
+    """Of each image; the tilt is between the board's normal and the line of sight."""
     worst: WorstView | None = None
     put: Callable[[Rig], Rig] | None = None
+    """Returns a rig with this part in it; None if it is no part of a rig, or bad."""
 
 
 def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:

@@ -22,31 +22,22 @@ Distance: TypeAlias = Literal["measured", "solved"]
 
 @dataclass(frozen=True, slots=True)
 class StereoEntries:
-    """What the pose of the depth camera is solved from; paths, empty where there is none.
-
-    Attributes
-    ----------
-    depth_images, headset_images : str
-        Folders of the two cameras' images.
-    depth_intrinsics, headset_intrinsics : str
-        Files; solved from the images if empty.
-    imager_intrinsics, depth_to_color : str
-        Files: the depth imager's own, and its pose in the colour imager, if the images are the
-        colour imager's.
-    lens : LensModel
-        Of intrinsics that are solved.
-    dropped : tuple of str
-        Images left out, by the depth camera's name.
-    """
+    """What the pose of the depth camera is solved from; paths, empty where there is none."""
 
     depth_images: str = ""
     headset_images: str = ""
+    """Folders of the two cameras' images."""
     depth_intrinsics: str = ""
     headset_intrinsics: str = ""
+    """Files; solved from the images if empty."""
     imager_intrinsics: str = ""
     depth_to_color: str = ""
+    """Files: the depth imager's own, and its pose in the colour imager, if the images are the
+    colour imager's."""
     lens: LensModel = "full"
+    """Of intrinsics that are solved."""
     dropped: tuple[str, ...] = ()
+    """Images left out, by the depth camera's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,38 +52,26 @@ class ViewpointEntries:
 
 @dataclass(frozen=True, slots=True)
 class DisplayEntries:
-    """What one eye's display is calibrated from.
-
-    Attributes
-    ----------
-    grid_images : str
-        Folder of images of the grid on the display.
-    square_px : int
-        Side of the grid's squares.
-    board_images, tracked : str
-        Folder of images of the tracked board, and the file of its poses.
-    stereo : str
-        Instead of both, the JSON of a stereo calibration with the viewpoint camera as its depth
-        camera.
-    view : str
-        File of T_V_H, as the headset reports it; that of the rig if empty.
-    distance : {"measured", "solved"}
-        How z(C0→S) is known: as `distance_m`, or from what a square subtends.
-    distance_m, square_arcmin, nominal_m : float
-        As measured; what a square subtends from the nominal distance.
-    dropped_grid, dropped_board : tuple of str
-    """
+    """What one eye's display is calibrated from."""
 
     grid_images: str = ""
+    """Folder of images of the grid on the display."""
     square_px: int = 80
+    """Side of the grid's squares."""
     board_images: str = ""
     tracked: str = ""
+    """Folder of images of the tracked board, and the file of its poses."""
     stereo: str = ""
+    """Instead of both, the JSON of a stereo calibration with the viewpoint camera as its depth
+    camera."""
     view: str = ""
+    """File of T_V_H, as the headset reports it; that of the rig if empty."""
     distance: Distance = "measured"
+    """How z(C0→S) is known: as `distance_m`, or from what a square subtends."""
     distance_m: float = 2.0
     square_arcmin: float = 112.0
     nominal_m: float = 2.0
+    """As measured; what a square subtends from the nominal distance."""
     dropped_grid: tuple[str, ...] = ()
     dropped_board: tuple[str, ...] = ()
 
