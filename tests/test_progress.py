@@ -1,0 +1,36 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.errors import CancelledError
+from handcal.progress import Progress
+
+shares = st.floats(0.0, 1.0)
+
+
+@given(st.lists(st.tuples(shares, shares).map(sorted), max_size=4), shares)
+def test_parts_of_parts_stay_within_their_spans(spans: list[list[float]], share: float) -> None:
+    shown: list[float] = []
+    progress = Progress(lambda _what, whole: shown.append(whole))
+    bounds = (0.0, 1.0)
+    for low, high in spans:
+        progress = progress.part(low, high)
+        width = bounds[1] - bounds[0]
+        bounds = bounds[0] + low * width, bounds[0] + high * width
+    progress.at(share, "busy")
+    assert bounds[0] - 1e-12 <= shown[0] <= bounds[1] + 1e-12
+    assert progress.span == pytest.approx(bounds)
+
+
+def test_a_cancelled_task_ends_before_it_reports() -> None:
+    shown: list[float] = []
+    progress = Progress(lambda _what, whole: shown.append(whole), is_cancelled=lambda: True)
+    with pytest.raises(CancelledError, match="nothing has changed"):
+        progress.at(0.5)
+    with pytest.raises(CancelledError):
+        progress.part(0.0, 0.5).check()
+    assert shown == []
+
+
+def test_progress_is_silent_by_default() -> None:
+    Progress().at(1.0, "done")
