@@ -1,4 +1,4 @@
-"""What other systems call the same poses and projections: OpenGL, Unity, WinRT and OpenXR.
+"""Poses and projections in the conventions of OpenGL, Unity, WinRT and OpenXR.
 
 handcal's own axes are OpenCV's, x right, y down, z forward, and its pixels have their centres at
 whole numbers, so that a display's image runs from -0.5 to width - 0.5. The others:
@@ -45,7 +45,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Fov:
-    """The angles of OpenXR's XrFovf from the forward axis; left and down are usually negative."""
+    """OpenXR's XrFovf: angles from the forward axis; left and down are usually negative."""
 
     left_rad: float
     right_rad: float
@@ -80,18 +80,18 @@ def unity_world_to_camera(T_V_W: Float64) -> Float64:
 
 
 def opengl_projection(projection: Projection, near_m: float, far_m: float) -> Float64:
-    """Return the OpenGL projection matrix, which is also what Unity takes for a stereo camera.
+    """Return the OpenGL projection matrix, which Unity's stereo cameras take as well.
 
     Parameters
     ----------
     projection : Projection
     near_m, far_m : float
-        Distances in front of the eye that land on z = -1 and +1 in normalised device coordinates.
+        Distances in front of the eye that map to z = -1 and +1 in normalised device coordinates.
 
     Returns
     -------
     (4, 4) float64
-        From OpenGL's axes in V to clip space. It keeps all of P, the eye's translation included.
+        From OpenGL's axes in V to clip space, including the eye's translation.
 
     Raises
     ------
@@ -121,10 +121,10 @@ def pose(T: Float64) -> Pose:
 
 
 def openxr_view(projection: Projection) -> tuple[Pose, Fov]:
-    """Return an eye's view as OpenXR has it: its pose in V, in OpenXR's axes, and its angles.
+    """Return an eye's view for OpenXR: its pose in V, in OpenXR's axes, and its field of view.
 
-    OpenXR allows only a frustum that is square to its pose. The moved eye of this model is one,
-    at the position that P leaves out. A P with skew or rotation is not.
+    OpenXR allows only a frustum that is perpendicular to its pose. The shifted eye of this model
+    has one, at the centre of projection of P. A P with skew or rotation does not.
 
     Raises
     ------

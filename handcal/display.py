@@ -1,4 +1,4 @@
-"""The eye-display model: how a moved eye changes what the headset must render.
+"""The eye-display model: the projection to render for an eye that has moved.
 
 Pixel of world point v seen from the offline viewpoint C0: ``ζ m = K H0 E0 v``. Moving the eye by
 φ from C0 to C1, in E's axes, puts the update matrix UQ between H0 and E0 (paper, eq. for UQ).
@@ -17,7 +17,7 @@ from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig
 
 TARGET_SIDE_M = 0.08
 TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
-"""Where the target of the user test stands (Hu et al. 2021, user test)."""
+"""Distances of the user test's target (Hu et al. 2021, user test)."""
 
 
 def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:
@@ -63,7 +63,7 @@ def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:
 
 
 def view_of_eye(display: EyeDisplay, T_W_H: Float64) -> Float64:
-    """Return ``T_E_W``, E0 at a moment, from the headset's pose: ``[I t(C0→V)] T_V_H T_H_W``."""
+    """Return ``T_E_W`` for a headset pose: ``[I t(C0→V)] T_V_H T_H_W``."""
     T_E_H = rigid(translation_m=display.t_C0_V_m) @ display.T_V_H
     T_E_W: Float64 = T_E_H @ invert(T_W_H)
     return T_E_W
@@ -77,7 +77,7 @@ def eye_projection(display: EyeDisplay, shift_m: ArrayLike = (0.0, 0.0, 0.0)) ->
 
 
 def projection_matrix(display: EyeDisplay, shift_m: ArrayLike = (0.0, 0.0, 0.0)) -> Float64:
-    """Return P1 (3, 4), what the headset renders with: pixels from points in V.
+    """Return P1 (3, 4), the projection that the headset renders with: pixels from points in V.
 
     ``P1 = K H0 UQ [I t(C0→V); 0 1]`` (Hu et al. 2021, eq. for P1). A zero shift gives the offline
     calibration.
@@ -107,13 +107,13 @@ def target_corners_m(depth_m: float) -> Float64:
 def reprojection_error_px(
     display: EyeDisplay, shift_m: ArrayLike, true_shift_m: ArrayLike, points_E_m: Float64
 ) -> Float64:
-    """Return (N,) distances between where points are drawn and where the true eye needs them.
+    """Return the (N,) distances on the display between drawn points and their true places.
 
     Parameters
     ----------
     display : EyeDisplay
     shift_m, true_shift_m : (3,) array_like
-        The shift rendered with, and the eye's own.
+        The shift rendered with, and the true one.
     points_E_m : (N, 3) float64
         Points in E.
     """
@@ -124,20 +124,20 @@ def reprojection_error_px(
 
 @dataclass(frozen=True, slots=True)
 class DrawnMove:
-    """How the user test's target moves on the display when φ changes."""
+    """The movement of the user test's target on the display when φ changes."""
 
     right_px: float
     up_px: float
     right_arcmin: float
     up_arcmin: float
     size_ratio: float
-    """Above 1 if it is drawn larger."""
+    """Above 1 if the target is drawn larger."""
 
 
 def effect_at(
     display: EyeDisplay, from_shift_m: ArrayLike, to_shift_m: ArrayLike, depth_m: float
 ) -> DrawnMove:
-    """Return what a change of φ does to the target at a distance from the offline viewpoint."""
+    """Return the effect of a change of φ on a target at a distance from the offline viewpoint."""
     corners_E_m = target_corners_m(depth_m)
     before_px, after_px = (
         project(eye_projection(display, shift_m), corners_E_m)
@@ -161,9 +161,9 @@ def reprojection_arcmin(
     true_shifts_m: Mapping[Eye, Float64],
     worn_rig: Rig | None = None,
 ) -> float:
-    """Return the mean error seen by the true eyes, in arcmin.
+    """Return the mean reprojection error seen by the true eyes, in arcmin.
 
-    At the corners of the user test's target at its three distances, tracked by the depth camera.
+    Evaluated at the corners of the user test's target at its three distances, tracked by the depth camera.
 
     Parameters
     ----------
@@ -174,11 +174,11 @@ def reprojection_arcmin(
     true_shifts_m : mapping of eye to (3,) float64
         φ of the true eyes, from the C0 of `worn_rig`.
     worn_rig : Rig, optional
-        The true one, if it is another.
+        The true rig, if it differs.
     """
     worn_rig = worn_rig or rig
     corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
-    T_H_H = rig.T_H_D @ invert(worn_rig.T_H_D)  # how far off the tracked target is
+    T_H_H = rig.T_H_D @ invert(worn_rig.T_H_D)  # error of the tracked target
     errors = []
     for eye in EYES:
         worn = worn_rig.eyes[eye]

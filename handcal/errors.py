@@ -1,8 +1,8 @@
-"""Errors that a person can do something about: one line that says what is wrong and what to do."""
+"""User-facing errors: one line that says what is wrong and how to fix it."""
 
 
 class HandcalError(Exception):
-    """Base of every error that handcal raises on purpose; its text is shown as it is."""
+    """Base class of all user-facing errors; the text is shown unchanged."""
 
 
 class CameraError(HandcalError):
@@ -30,12 +30,12 @@ class FileError(HandcalError):
 
 
 class PoseError(HandcalError):
-    """The headset's pose at a time cannot be told; the text says why."""
+    """The headset's pose at a time is unknown; the text says why."""
 
 
 class PosePendingError(PoseError):
-    """The headset's pose at a time has not arrived yet; asking again soon may succeed."""
+    """The headset's pose at a time has not arrived yet; the next request may succeed."""
 
 
 class CancelledError(HandcalError):
-    """Something long was given up on request; nothing has changed."""
+    """A long task was cancelled on request; nothing has changed."""

@@ -1,4 +1,4 @@
-"""Rigid transforms and the pinhole: pure functions on arrays.
+"""Rigid transforms and the pinhole camera: pure functions on arrays.
 
 Transforms are (4, 4) float64, ``T_dst_src``; points are rows of (N, 3) arrays.
 """
@@ -33,10 +33,10 @@ def invert(T_dst_src: Float64) -> Float64:
 
 
 def is_rigid(T: Float64, reach_m: float) -> bool:
-    """Tell whether a (4, 4) matrix from elsewhere, NaN allowed, is a rigid transform.
+    """Return whether an untrusted (4, 4) matrix, which may hold NaN, is a rigid transform.
 
-    Its rotation must be right-handed and orthonormal to 1e-5, as that of a float32 is, and its
-    translation below `reach_m` in each component.
+    Its rotation must be right-handed and orthonormal to 1e-5, the accuracy of float32, and each
+    component of its translation below `reach_m`.
     """
     R = T[:3, :3]
     return bool(
@@ -66,7 +66,7 @@ def project(P: Float64, points: ArrayLike) -> Float64:
 
 
 def camera_matrix(intrinsics: Intrinsics) -> Float64:
-    """Return the (3, 3) matrix K of a pinhole."""
+    """Return the (3, 3) camera matrix K."""
     return np.array(
         [
             [intrinsics.fx, 0.0, intrinsics.cx],
@@ -77,8 +77,8 @@ def camera_matrix(intrinsics: Intrinsics) -> Float64:
 
 
 def image_points(points_m: ArrayLike, intrinsics: Intrinsics) -> Float64:
-    """Project (N, 3) points in front of a camera, in its frame, to (N, 2) pixels, lens included."""
-    if not any(intrinsics.distortion):  # several times as fast as OpenCV's way
+    """Project (N, 3) points in a camera's frame to (N, 2) pixels, lens distortion included."""
+    if not any(intrinsics.distortion):  # several times faster than OpenCV
         return project(np.hstack([camera_matrix(intrinsics), np.zeros((3, 1))]), points_m)
     pixels, _ = cv2.projectPoints(
         np.asarray(points_m, dtype=np.float64),
@@ -102,11 +102,11 @@ def interpolate_pose(T_0: Float64, T_1: Float64, fraction: float) -> Float64:
     Raises
     ------
     ValueError
-        If `fraction` lies outside 0..1: poses are never extrapolated.
+        If `fraction` lies outside 0 to 1; poses are not extrapolated.
     """
     if not 0.0 <= fraction <= 1.0:
         raise ValueError(f"fraction {fraction} lies outside 0..1; poses are not extrapolated")
-    # scipy's Slerp, made for many keyframes, takes ten times as long.
+    # scipy's Slerp, made for many keyframes, is ten times slower.
     turn_rad = Rotation.from_matrix(T_0[:3, :3].T @ T_1[:3, :3]).as_rotvec()
     R = T_0[:3, :3] @ Rotation.from_rotvec(fraction * turn_rad).as_matrix()
     return rigid(R, (1.0 - fraction) * T_0[:3, 3] + fraction * T_1[:3, 3])

@@ -1,4 +1,4 @@
-"""What a study or a test reports of its errors: their spread, and their mean with an interval."""
+"""Descriptive statistics of errors: spread, mean with interval, variance components."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from scipy.special import stdtrit
 
 from handcal.types import Float64
 
-# Of so few clusters the skewness cannot be told.
+# Fewer clusters than this do not determine the skewness.
 _FEWEST_FOR_SKEWNESS = 10
 _NO_SKEWNESS = 1e-6
 
 INTERVAL_METHOD = f"Student's t, corrected for skewness from {_FEWEST_FOR_SKEWNESS} on (Hall 1992)"
-"""How `mean_interval` is found, as reports say it."""
+"""Description of `mean_interval` for reports."""
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """How numbers are spread."""
+    """The spread of a set of numbers."""
 
     count: int
     mean: float
     sd: float
-    """`sd` is that of a sample, and 0 for a single number."""
+    """Sample standard deviation; 0 for a single number."""
     median: float
     q1: float
     q3: float
@@ -37,7 +37,7 @@ class Summary:
 
 @dataclass(frozen=True, slots=True)
 class MeanInterval:
-    """A mean and an interval that covers the true mean as often as `level` says."""
+    """A mean with its confidence interval at `level`."""
 
     mean: float
     low: float
@@ -45,19 +45,19 @@ class MeanInterval:
     level: float
     """0.95 for 95 %."""
     clusters: int
-    """How many independent ones it is from."""
+    """Number of independent values or clusters."""
 
 
 @dataclass(frozen=True, slots=True)
 class VarianceComponents:
-    """How far clusters differ, and how far the values within one do: standard deviations."""
+    """Standard deviations between clusters and within them."""
 
     between: float
     within: float
 
 
 def summarise(values: ArrayLike) -> Summary:
-    """Return how numbers are spread; ValueError if there are none or one is not finite."""
+    """Return the spread of numbers; ValueError if there are none or one is not finite."""
     numbers = _numbers(values)
     q1, median, q3 = np.quantile(numbers, [0.25, 0.5, 0.75]).tolist()
     return Summary(
@@ -88,13 +88,13 @@ def mean_interval(
     A bootstrap of few clusters is too narrow. From ten clusters on, Student's interval is
     corrected for skewness by Hall's monotone cubic transformation of the t statistic (Hall 1992,
     "On the removal of skewness by transformation", J. R. Statist. Soc. B 54:221-228), which does
-    what a bootstrap-t does, without random numbers; of fewer, it is Student's own.
+    what a bootstrap-t does, without random numbers; for fewer, it is Student's own.
 
     Parameters
     ----------
     values : (N,) array_like
     clusters : sequence of N hashable, optional
-        Whose each value is; by default every value is independent of the others.
+        The cluster of each value; by default all values are independent.
     level : float
 
     Raises
@@ -110,7 +110,7 @@ def mean_interval(
     )
     count = len(means)
     if count < 2:
-        raise ValueError("an interval needs two independent values or clusters at least")
+        raise ValueError("an interval needs at least two independent values or clusters")
     center, sd = float(means.mean()), float(means.std(ddof=1))
     bound = stdtrit(count - 1, 0.5 + level / 2.0) / np.sqrt(count)  # Student's t
     low, high = center - sd * _deskewed(np.array([bound, -bound]), means)
@@ -120,9 +120,9 @@ def mean_interval(
 def variance_components(values: ArrayLike, clusters: Sequence[object]) -> VarianceComponents:
     """Return the standard deviations between and within clusters.
 
-    By the analysis of variance of a random intercept for each cluster, also of unequal numbers
-    (Searle, Casella, McCulloch 1992, Variance Components, section 3.6); `between` is 0 where the
-    clusters differ less than chance would make them.
+    Analysis of variance with a random intercept for each cluster, balanced or not (Searle,
+    Casella, McCulloch 1992, Variance Components, section 3.6); `between` is 0 where the clusters
+    differ less than expected by chance.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def variance_components(values: ArrayLike, clusters: Sequence[object]) -> Varian
     groups = _groups(numbers, clusters)
     count, total = len(groups), len(numbers)
     if not 1 < count < total:
-        raise ValueError("two clusters at least, one of them of two values, are needed")
+        raise ValueError("at least two clusters are needed, one of them with two values")
     sizes = np.array([len(group) for group in groups])
     means = np.array([group.mean() for group in groups])
     within = sum(((group - group.mean()) ** 2).sum() for group in groups) / (total - count)
@@ -145,7 +145,7 @@ def variance_components(values: ArrayLike, clusters: Sequence[object]) -> Varian
 
 
 def _deskewed(bounds: Float64, values: Float64) -> Float64:
-    """Return what (mean - true mean) / sd is where Hall's transformation of it is at `bounds`."""
+    """Return (mean - true mean) / sd at which Hall's transformation equals `bounds`."""
     if len(values) < _FEWEST_FOR_SKEWNESS or np.ptp(values) == 0.0:
         return bounds
     skewness = _skewness(values)
@@ -156,7 +156,7 @@ def _deskewed(bounds: Float64, values: Float64) -> Float64:
 
 
 def _skewness(values: Float64) -> float:
-    """Return the sample skewness, corrected for the bias of few values."""
+    """Return the sample skewness, corrected for bias."""
     count, offsets = len(values), values - values.mean()
     offsets /= np.abs(offsets).max()
     third, second = (offsets**3).mean(), (offsets**2).mean()

@@ -1,4 +1,4 @@
-"""The values that travel through handcal: frozen, with read-only arrays, units and frames.
+"""Values passed between rooms: frozen, with read-only arrays and units and frames in their names.
 
 Frames are named as in the paper (Hu, Rodriguez y Baena, Cutolo, ISMAR 2021): ``W`` world,
 ``H`` headset camera rig, ``D`` depth camera, ``C0`` viewpoint of the offline calibration,
@@ -34,7 +34,7 @@ VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
 
 
 def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """Return `values` as a read-only array of `dtype` in C order, copying only if it is not.
+    """Return `values` as a read-only, C-ordered array of `dtype`; copy only if necessary.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...])
 
 
 def freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) -> None:
-    """Make an array field of a frozen dataclass `readonly`, from its ``__post_init__``.
+    """Make an array field of a frozen dataclass read-only; called from its ``__post_init__``.
 
     None stays None. ValueError names the field whose shape does not match.
     """
@@ -87,13 +87,13 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One depth image with its colour image, as the camera delivers them."""
+    """One depth image and, if the camera has one, its colour image."""
 
     index: int
-    """Running number given by the camera; a gap means dropped frames."""
+    """Running number from the camera; a gap means dropped frames."""
     t_camera_ns: int
     t_host_ns: int
-    """The camera's own time, and the host's monotonic time of arrival."""
+    """Exposure time on the camera's clock, and time of arrival on the host's monotonic clock."""
     depth: UInt16
     """(H, W); 0 where there is no measurement."""
     depth_scale_m: float
@@ -126,16 +126,16 @@ class HandCloud:
     points_m: Float32
     """(N, 3); visible surface, frame D."""
     is_cut: Bool
-    """(N,); True where the point lies beside a cut (forearm limit, ROI, image or depth-gate edge),
-    so that the hand goes on there; False elsewhere."""
+    """(N,); True beside a cut: a forearm limit, or an edge of the ROI, the image or the depth gate,
+    beyond which the hand continues."""
     colors: UInt8 | None
     """(N, 3); RGB of the points."""
     contour_m: Float32
     """(M, 3); outer contour in order around the hand, frame D."""
     contour_is_cut: Bool
-    """(M,); True on a cut edge, False on a silhouette."""
+    """(M,); True on a cut edge, False on the silhouette."""
     mask: UInt8
-    """(H, W); 255 on the hand, in the depth image."""
+    """(H, W); 255 on the hand, in the depth image; 0 elsewhere."""
     box_px: tuple[int, int, int, int]
     """(4,); x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive."""
     median_depth_m: float
@@ -151,7 +151,7 @@ class HandCloud:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """What one confirmed alignment gives the solver."""
+    """One confirmed alignment: the input of the solver."""
 
     cursor_m: Float64
     hand_m: Float64
@@ -162,17 +162,16 @@ class Alignment:
     T_E_W: Mapping[Eye, Float64]
     """each (4, 4); world to each eye's E at t_b."""
     eyes: tuple[Eye, ...]
-    """The eyes that the wearer aligned with: both, or one."""
+    """Eyes that were open during the alignment: both, or one."""
     rotation_rad: Float64
-    """(3,); rotation vector from the cursor to the hand seen by the guard at t_b, frame D."""
+    """(3,); rotation vector from the cursor to the hand at t_b, measured by the guard, frame D."""
     t_a_ns: int
     t_b_ns: int
     """Camera times of the two frames."""
     drawn_shift_m: Mapping[Eye, Float64] = field(
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
-    """each (3,); the φ that each eye's cursor was drawn with at t_b; zero for the offline
-    calibration."""
+    """each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration."""
 
     def __post_init__(self) -> None:
         freeze(self, "cursor_m", np.float64, None, 3)
@@ -190,7 +189,7 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeShift:
-    """A solved eye shift φ from C0 to C1, in E's axes, and how far to trust it."""
+    """A solved eye shift φ from C0 to C1, in E's axes, with its uncertainty and residuals."""
 
     shift_m: Float64
     """(3,); φ1, φ2, φ3."""
@@ -201,7 +200,7 @@ class EyeShift:
     residuals_m: Float64
     """(M,); distance of each hand point to its partner after registration; NaN for an outlier."""
     inlier_ratio: float
-    """Inlier pairs over hand points."""
+    """Number of inlier pairs over number of hand points."""
     iterations: int
     converged: bool
     stop_reason: str
@@ -219,7 +218,7 @@ class EyeShift:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a solved eye shift may be used, and why."""
+    """The decision whether a solved eye shift may be used, with its reason."""
 
     name: VerdictName
     reason: str
@@ -227,7 +226,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projection:
-    """What one eye of the headset renders with."""
+    """One eye's projection, as the headset renders with it."""
 
     eye: Eye
     P: Float64
@@ -242,7 +241,7 @@ class Projection:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """The user test's target, drawn for one eye and resting before its display."""
+    """The target of the user test: drawn for one eye, fixed relative to its display."""
 
     eye: Eye
     corners_V_m: Float64
@@ -278,23 +277,23 @@ class EyeDisplay:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Origin:
-    """How a part of a rig was calibrated, and how far to trust it."""
+    """The origin of one part of a rig: its method, date, data and uncertainty."""
 
     method: str
     """One line."""
     made: str
-    """When: ISO 8601."""
+    """Date and time, ISO 8601."""
     views: int
-    """Images, or pairs of images, that were used."""
+    """Number of images, or pairs of images, used."""
     rms_px: float
     """Root mean square of the reprojection error."""
     verdict: str
     reason: str
     """One line each."""
     parameters: tuple[str, ...]
-    """What the covariance is of, with units."""
+    """Names of the covariance's parameters, with units."""
     covariance: Float64
-    """(n, n); of the n `parameters`."""
+    """(n, n); covariance of the n `parameters`."""
 
     def __post_init__(self) -> None:
         freeze(self, "covariance", np.float64, len(self.parameters), len(self.parameters))
@@ -302,7 +301,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """The offline calibration: both eye displays and where the depth camera sits."""
+    """The offline calibration: both eye displays and the pose of the depth camera."""
 
     name: str
     eyes: Mapping[Eye, EyeDisplay]
@@ -310,7 +309,7 @@ class Rig:
     """(4, 4); from the depth camera to the headset rig."""
     depth_intrinsics: Intrinsics
     origins: Mapping[RigPart, Origin] = field(default_factory=dict)
-    """How each of `RIG_PARTS` was calibrated, as far as that is known."""
+    """Origin of each of `RIG_PARTS`, where it is known."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_D", np.float64, 4, 4)

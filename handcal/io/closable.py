@@ -1,4 +1,4 @@
-"""What is closed by leaving its ``with``."""
+"""Base class of context managers with a `close` method."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Self
 
 
 class Closable(ABC):
-    """Base of what holds a resource: ``with`` gives the object itself and closes it at the end."""
+    """Base class of objects that hold a resource; leaving ``with`` closes them."""
 
     __slots__ = ()
 

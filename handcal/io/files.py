@@ -1,4 +1,4 @@
-"""Reading files that may be hostile, and writing files that are never half there."""
+"""Bounded reading of untrusted files; atomic writing."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from handcal.errors import FileError
 from handcal.types import UInt8
 
 MAX_JSON_BYTES = 16 * 2**20
-_MOST_DIGITS = 20  # 64 bits and a sign: what neither NumPy nor a float overflows at
+_MOST_DIGITS = 20  # 64 bits and a sign: neither NumPy nor a float overflows
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
 
 def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Write `data` so that `path` holds either its old content or all of the new.
+    """Write `data` so that `path` always holds either the old content or all of the new.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
 
 
 def require_suffix(path: Path, suffix: str) -> None:
-    """Raise FileError unless a file to be written is called as what it will be: ``.png``."""
+    """Raise FileError unless a file to be written has the suffix of its format, as ``.png``."""
     if path.suffix.lower() != suffix:
-        raise FileError(f"{path} must end in {suffix}, as that is what is written")
+        raise FileError(f"{path} must end in {suffix}, the format that is written")
 
 
 def read_limited(path: Path, max_bytes: int) -> bytes:
@@ -107,7 +107,7 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         value = json.loads(data, parse_int=_whole_number)
     except UnicodeDecodeError as error:
-        raise FileError(f"{path} is not valid JSON: it is no text") from error
+        raise FileError(f"{path} is not valid JSON: not a text file") from error
     except (ValueError, RecursionError) as error:
         raise FileError(f"{path} is not valid JSON: {error}") from error
     if not isinstance(value, dict):
@@ -127,7 +127,7 @@ def write_ply(
     colors: UInt8 | None = None,
     properties: Mapping[str, NDArray[Any]] | None = None,
 ) -> None:
-    """Write (N, 3) points in metres as binary PLY, in the precision they are given in.
+    """Write (N, 3) points in metres as binary PLY, in their own precision.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def write_ply(
     colors : (N, 3) uint8, optional
         RGB.
     properties : mapping of name to (N,) float32, float64 or uint8, optional
-        What else there is to say of each point; floats may be NaN.
+        Further values of each point; floats may be NaN.
     """
     columns: dict[str, NDArray[Any]] = {axis: points_m[:, i] for i, axis in enumerate("xyz")}
     if colors is not None:

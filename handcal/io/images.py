@@ -1,4 +1,4 @@
-"""Image files: read though they may be hostile, their size known before any memory is given."""
+"""Image files: untrusted ones are read with their size checked before decoding."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def write_png(path: Path, image: UInt8) -> None:
 
 
 def _image_size(data: bytes, path: Path) -> tuple[int, int]:
-    """Return the size that an image says it has, before any memory is given to it."""
+    """Return the size in an image's header, without decoding it."""
     if data.startswith(_PNG) and len(data) >= 24:
         return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
     if data.startswith(_JPEG):

@@ -1,7 +1,7 @@
-"""A lock on a file that one program at a time can hold.
+"""A file lock that one program at a time can hold.
 
-The system releases it when its holder ends, however it ends, so a lock cannot go stale; the
-process id in the file only tells a person who holds it.
+The system releases it when its holder ends for any reason, so a lock cannot go stale; the
+process id in the file is only for people to read.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from handcal.errors import FileError
 if sys.platform == "win32":
     import msvcrt
 
-    # Windows locks bytes, and nobody else can read them: lock one far beyond the process id.
+    # Windows locks bytes against reading too: lock one far beyond the process id.
     _LOCKED_BYTE = 2**30
 
     def _try_lock(file: BinaryIO) -> None:
@@ -59,5 +59,5 @@ class FileLock:
         self._file = file
 
     def release(self) -> None:
-        """Give the lock back; safe to call twice."""
+        """Release the lock; safe to call twice."""
         self._file.close()

@@ -1,4 +1,4 @@
-"""Where the files that ship with handcal lie, in a checkout and in an installed wheel."""
+"""Paths of the files shipped with handcal, in a checkout and in an installed wheel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def resource_path(name: str) -> Path:
     Raises
     ------
     FileError
-        If it is missing: the installation is damaged.
+        If it is missing, because the installation is damaged.
     """
     package = Path(__file__).parents[1]
     for folder in (package / "_resources", package.parent / "resources"):

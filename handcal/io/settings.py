@@ -1,4 +1,4 @@
-"""Settings to JSON and back: every stage's settings are a frozen dataclass of plain values."""
+"""Settings as JSON: the settings of each stage are a frozen dataclass of plain values."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Settings = TypeVar("Settings")
 
 
 def settings_json(settings: Any) -> dict[str, Any]:
-    """Return a settings dataclass, nested ones included, as JSON-able values."""
+    """Return a settings dataclass, with nested ones, as values for JSON."""
     return asdict(settings)
 
 
 def read_settings(kind: type[Settings], data: object, where: str = "settings") -> Settings:
-    """Return settings of a kind from JSON values; what is absent takes its default.
+    """Return settings of a kind from JSON values; absent fields take their defaults.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
     data : object
         As `json.loads` gives it.
     where : str
-        What to call `data` in an error.
+        Name of `data` in error messages.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
 
 
 def _convert(kind: Any, value: object, where: str) -> Any:
-    """Return a JSON value as the type that a field is declared with."""
+    """Convert a JSON value to the declared type of a field."""
     origin, choices = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         if value is None and type(None) in choices:

@@ -25,25 +25,25 @@ _POSES_PER_DATAGRAM = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadsetState:
-    """What the PC wants shown."""
+    """The state that the PC wants the headset to show."""
 
     cursor_W_m: Float64 | None = None
     cursor_id: int = 0
     live_W_m: Float64 | None = None
-    """(N, 3); the frozen and the live hand, frame W; None where there is none."""
+    """(N, 3); the frozen and the live hand, frame W; None if not shown."""
     live_red: bool = False
-    """Whether the live hand is drawn red, turned too far."""
+    """True if the live hand is drawn red because it is rotated too far."""
     prompt: str = ""
     eyes: tuple[Eye, ...] = EYES
     """The eyes to keep open."""
     projections: Mapping[Eye, Projection] = field(default_factory=dict)
-    """What each eye renders with, where the PC has said so."""
+    """The projection of each eye, once the PC has sent it."""
     target: Target | None = None
-    """The user test's target; None where there is none."""
+    """The user test's target; None if not shown."""
 
 
 class HeadsetClient(Endpoint):
-    """Finds the PC, tells it poses and confirmations, and holds what it wants shown.
+    """Connects to the PC, sends poses and confirmations, and holds the state to show.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class HeadsetClient(Endpoint):
         The headset's clock, ns.
     settings : LinkSettings
     impairment : Impairment
-        What happens to the datagrams of both directions.
+        Impairments of the datagrams in both directions.
 
     Raises
     ------
@@ -102,7 +102,7 @@ class HeadsetClient(Endpoint):
             self._send(messages.poses(self._recent_poses))
 
     def confirm(self, T_E_W: Mapping[Eye, Float64], t_headset_ns: int, cursor_id: int) -> Outgoing:
-        """Tell reliably that the hand covers the cursor, with E0 of both eyes at that time.
+        """Confirm reliably that the hand covers the cursor, with E0 of both eyes at that time.
 
         Raises
         ------
@@ -112,7 +112,7 @@ class HeadsetClient(Endpoint):
         return self._send_reliably(Slot.CONFIRM, messages.confirm(T_E_W, t_headset_ns, cursor_id))
 
     def state(self) -> HeadsetState:
-        """Return what the PC wants shown now.
+        """Return the state that the PC wants shown.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class HeadsetClient(Endpoint):
         is_mine = welcome.nonce == self._nonce and address == self._server
         if self._channel is None and is_mine:
             self._channel = Channel(welcome.session, address)
-            self._nonce = secrets.randbits(64)  # used up, so that no old welcome is ever taken
+            self._nonce = secrets.randbits(64)  # used once, so that no old welcome is accepted
             self._dismissed = False
             self._joined_s = time.monotonic()
             self._next_hello_s = 0.0
@@ -200,5 +200,5 @@ class HeadsetClient(Endpoint):
         if channel is None:
             self._send_greeting(pb.Envelope(hello=pb.Hello(nonce=self._nonce)), self._server)
         else:
-            # The first one opens the session at the PC, the others keep it alive.
+            # The first opens the session on the PC; the others keep it alive.
             self._send(messages.ack())

@@ -1,4 +1,4 @@
-"""The headset's clock against the host's, from pings."""
+"""Offset and drift of the headset's clock, estimated from pings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from handcal.errors import PosePendingError
 
 DRIFT_PRIOR = 50e-6
-"""Standard deviation of a crystal's drift before anything is measured, s/s."""
+"""Prior standard deviation of a crystal's drift, s/s."""
 
 MIN_SAMPLES = 5
 
@@ -23,17 +23,17 @@ class ClockFit:
     offset_ns: float
     drift: float
     round_trip_ns: float
-    """Median over the pings kept."""
+    """Median of the stored pings."""
     uncertainty_ns: float
-    """Half the shortest round trip, beyond which no asymmetry of the way can push the offset, plus
-    the standard error of the fit."""
+    """Half the shortest round trip, which bounds the effect of asymmetric delays, plus the standard
+    error of the fit."""
 
 
 class ClockEstimator:
-    """Estimates offset and drift from the four times of each ping, as NTP does (RFC 5905, 8).
+    """Estimates offset and drift from the four timestamps of each ping, as NTP does (RFC 5905, 8).
 
-    A ping that waited somewhere tells little: one of round trip r bounds the offset to ±r/2, so
-    the line fit weighs each by its delay beyond the shortest.
+    A ping with round trip r bounds the offset to ±r/2, so the line fit weights each ping by its
+    delay beyond the shortest.
     """
 
     def __init__(self, samples: int = 300) -> None:
@@ -47,7 +47,7 @@ class ClockEstimator:
         sent_headset_ns: int,
         received_host_ns: int,
     ) -> None:
-        """Take the times of one ping; one whose round trip is negative is ignored."""
+        """Add the timestamps of one ping; a negative round trip is ignored."""
         round_trip = (received_host_ns - sent_host_ns) - (sent_headset_ns - received_headset_ns)
         if round_trip < 0:
             return
@@ -62,7 +62,7 @@ class ClockEstimator:
         Raises
         ------
         PosePendingError
-            If too few pings have come back yet.
+            If too few pings have been answered.
         """
         fit = self._ready()
         elapsed = host_ns - fit.reference_host_ns
@@ -74,7 +74,7 @@ class ClockEstimator:
         Raises
         ------
         PosePendingError
-            If too few pings have come back yet.
+            If too few pings have been answered.
         """
         fit = self._ready()
         elapsed = headset_ns - fit.reference_host_ns - round(fit.offset_ns)
@@ -88,12 +88,12 @@ class ClockEstimator:
 
 def _fit(samples: deque[tuple[int, int, int]]) -> ClockFit:
     reference_host, reference_offset, _ = samples[-1]
-    # Small differences of large integers first: a float64 holds only 53 bits.
+    # Subtract large integers before converting: a float64 holds only 53 bits.
     elapsed, offset, round_trip = np.array(
         [(t - reference_host, o - reference_offset, r) for t, o, r in samples], dtype=np.float64
     ).T
     shortest = round_trip.min()
-    # A microsecond for the clock's own grain, and half of what the ping lost on its way.
+    # One microsecond for the clock's resolution, and half of the ping's extra delay.
     sigma = 1e3 + 0.5 * (round_trip - shortest)
     A = np.column_stack([np.ones_like(elapsed), elapsed / 1e9]) / sigma[:, None]
     prior = np.diag([0.0, 1 / (DRIFT_PRIOR * 1e9) ** 2])

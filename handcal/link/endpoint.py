@@ -1,4 +1,4 @@
-"""What both ends of the link share: the thread, the session, reliable delivery and counters."""
+"""Common part of both ends of the link: thread, session, reliable delivery and counters."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Endpoint(Closable):
     """One end of the link; its thread runs from `_start` to `close`.
 
     Every method is safe to call from any thread. Names with an underscore are for the two
-    subclasses, which hold `_changed` where they touch what the thread touches.
+    subclasses, which hold `_changed` while they use state shared with the thread.
     """
 
     def __init__(
@@ -67,34 +67,34 @@ class Endpoint(Closable):
 
     @property
     def address(self) -> Address:
-        """Where this end listens."""
+        """The address on which this end listens."""
         return self._transport.address
 
     @property
     def connected(self) -> bool:
-        """Whether the other end was heard lately."""
+        """True while datagrams from the other end arrive."""
         with self._changed:
             return self._channel is not None and not self._is_silent(self._channel)
 
     @property
     def dismissed(self) -> bool:
-        """Whether the other end has said good-bye and not come back."""
+        """True if the other end has said good-bye and has not reconnected."""
         with self._changed:
             return self._dismissed
 
     def wait_connected(self, timeout_s: float) -> None:
-        """Wait for the other end.
+        """Wait until the other end connects.
 
         Raises
         ------
         LinkError
-            If it has not come within `timeout_s`.
+            If it does not within `timeout_s`.
         """
         with self._changed:
             self._wait_for(lambda: self.connected, timeout_s)
             if not self.connected:
                 raise LinkError(
-                    f"nobody with this pairing key answered within {timeout_s:g} s; "
+                    f"no device with this pairing key answered within {timeout_s:g} s; "
                     "check the address, the key and the firewall"
                 )
 
@@ -104,7 +104,7 @@ class Endpoint(Closable):
         Raises
         ------
         LinkError
-            If it has not within `timeout_s`, was given up, or a newer message replaced it.
+            If it does not within `timeout_s`, delivery failed, or a newer message replaced it.
         """
         with self._changed:
             self._wait_for(lambda: message.state is not Delivery.PENDING, timeout_s)
@@ -112,7 +112,9 @@ class Endpoint(Closable):
             if message.state is Delivery.SUPERSEDED:
                 raise LinkError(f"the {name} was replaced by a newer one before it arrived")
             if message.state is not Delivery.ACKED:
-                raise LinkError(f"the {name} was not acknowledged; is the other end still there?")
+                raise LinkError(
+                    f"the {name} was not acknowledged; check that the other end is still running"
+                )
 
     def close(self) -> None:
         """Say good-bye, stop the thread and release the socket; safe to call twice."""
@@ -136,7 +138,7 @@ class Endpoint(Closable):
 
     @abstractmethod
     def _tick(self, now_s: float) -> None:
-        """Do what is due; called at least every `idle_wait_s`."""
+        """Do periodic work; called at least every `idle_wait_s`."""
 
     def _start(self) -> None:
         self._thread.start()
@@ -147,7 +149,7 @@ class Endpoint(Closable):
                 arrived = self._transport.receive(self._wait_s())
                 with self._changed:
                     if self._closing.is_set():
-                        return  # lest a hello that answers the good-bye be welcomed
+                        return  # a hello that answers the good-bye must not be welcomed
                     for datagram, address in arrived:
                         self._take(datagram, address)
                     self._work(time.monotonic())
@@ -217,10 +219,10 @@ class Endpoint(Closable):
                 self._handle(envelope)
 
     def _work(self, now_s: float) -> None:
-        # Before anybody has come it is no news: whoever comes is sent the newest of each slot.
+        # No warning before the first connection: a new peer is sent the newest of each slot.
         level = logging.INFO if self._channel is None else logging.WARNING
         for message in self._outbox.expire(now_s):
-            _LOG.log(level, "gave up sending the %s", message.slot.name.lower())
+            _LOG.log(level, "delivery of the %s failed", message.slot.name.lower())
         if self._channel is not None:
             receipts = self._channel.inbox.take_receipts()
             if receipts:
@@ -247,7 +249,7 @@ class Endpoint(Closable):
             return self._outbox.send(slot, envelope.SerializeToString(), time.monotonic())
 
     def _send(self, envelope: pb.Envelope) -> None:
-        """Send within the session, if there is one, without delivery guarantee."""
+        """Send within the session, if there is one; delivery is not guaranteed."""
         self._send_packet(Packet(envelope.SerializeToString()))
 
     def _send_packet(self, packet: Packet) -> None:

@@ -1,4 +1,4 @@
-"""A bad network in front of a good one: loss, duplication, delay and reordering, by seed."""
+"""A simulated bad network: loss, duplication, delay and reordering, by seed."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from handcal.link.transport import Address, Transport
 
 @dataclass(frozen=True, slots=True)
 class Impairment:
-    """What happens to datagrams, in each direction."""
+    """Impairments of the datagrams, in each direction."""
 
     loss: float = 0.0
     duplicate: float = 0.0
     reorder: float = 0.0
     """Probabilities, 0 to 1."""
     delay_s: float = 0.0
-    """For every datagram."""
+    """Delay of every datagram."""
     reorder_delay_s: float = 0.01
-    """More, for one that is reordered."""
+    """Additional delay of a reordered datagram."""
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -47,12 +47,12 @@ class ImpairedTransport:
         self.address = transport.address
 
     def send(self, datagram: bytes, address: Address) -> None:
-        """Send, lose, double or delay a datagram; a delayed one leaves during `receive`."""
+        """Send, drop, duplicate or delay a datagram; a delayed one is sent during `receive`."""
         self._outward.put(datagram, address)
         self._release()
 
     def receive(self, timeout_s: float) -> list[tuple[bytes, Address]]:
-        """Return what has arrived and is due."""
+        """Return the datagrams that have arrived and are due."""
         self._release()
         for datagram, address in self._transport.receive(timeout_s):
             self._inward.put(datagram, address)
@@ -60,7 +60,7 @@ class ImpairedTransport:
         return self._inward.take()
 
     def close(self) -> None:
-        """Release the socket; what is still delayed is lost."""
+        """Release the socket; delayed datagrams are lost."""
         self._transport.close()
 
     def _release(self) -> None:

@@ -1,7 +1,7 @@
-"""Messages as arrays and values: the schema's envelopes made, read and checked.
+"""Conversion between messages of the schema and arrays; incoming messages are checked.
 
-What comes in is bounded by the datagrams, but may still be nonsense: every reader raises
-`MalformedError` for it.
+The size of incoming messages is bounded by the datagrams, but their content may be nonsense: every
+reader raises `MalformedError` for it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _REACH_M = 1e3
 
 
 class MalformedError(Exception):
-    """A message that no honest peer sends."""
+    """A message that no correct peer sends."""
 
 
 def parse(payload: bytes) -> pb.Envelope:
@@ -47,7 +47,7 @@ def parse(payload: bytes) -> pb.Envelope:
 
 
 def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
-    """Make the cursor of (N, 3) points of frame W; no points take it away.
+    """Make the cursor of (N, 3) points of frame W; no points remove it.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
 
 
 def live_hand(points_W_m: ArrayLike, red: bool, frame: int) -> list[pb.Envelope]:
-    """Make the chunks of a live hand, each thinned evenly so that a lost one leaves no hole.
+    """Make the chunks of a live hand, interleaved so that a lost chunk leaves no hole.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def read_points(message: pb.Points) -> Float64:
 
 
 def _quantise(points_m: ArrayLike) -> tuple[list[float], NDArray[np.int16]]:
-    """Return the middle of the points' box, and each point's offset from it in quanta."""
+    """Return the centre of the points' bounding box, and each point's offset from it in quanta."""
     points = np.asarray(points_m, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise ValueError("points must be an (N, 3) array of finite metres")
@@ -155,7 +155,7 @@ def read_projection(message: pb.Projection) -> Projection:
 
 
 def target(value: Target | None) -> pb.Envelope:
-    """Make the user test's target; None takes it away.
+    """Make the user test's target; None removes it.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def target(value: Target | None) -> pb.Envelope:
 
 
 def read_target(message: pb.Target) -> Target | None:
-    """Read a target; None where it is taken away."""
+    """Read a target; None if it is removed."""
     if not message.corners_V_m:
         return None
     return Target(_eye(message.eye), _numbers(message.corners_V_m, 12).reshape(4, 3))

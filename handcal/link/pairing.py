@@ -1,4 +1,4 @@
-"""The key that PC and headset share."""
+"""The pairing key that PC and headset share."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _MAX_KEY_BYTES = 1024
 
 
 def new_pairing_key() -> str:
-    """Return a fresh key of 192 bits, as text."""
+    """Return a new random key of 192 bits, as text."""
     return secrets.token_urlsafe(24)
 
 
 def read_pairing_key(path: Path | None = None) -> bytes:
-    """Return the key in `path`, or in the environment; never an argument, which others can see.
+    """Return the key from `path` or the environment; arguments are visible to other users.
 
     Raises
     ------
     LinkError
-        If there is none, or it is too short.
+        If no key is given, or it is too short.
     FileError
         If the file cannot be read.
     """
@@ -37,13 +37,13 @@ def read_pairing_key(path: Path | None = None) -> bytes:
         raise LinkError(f"no pairing key: set {KEY_VARIABLE} or give a file that holds it")
     if len(key) < MIN_PAIRING_KEY_BYTES:
         raise LinkError(
-            f"the pairing key has {len(key)} bytes; take one of at least {MIN_PAIRING_KEY_BYTES}"
+            f"the pairing key has {len(key)} bytes; use at least {MIN_PAIRING_KEY_BYTES}"
         )
     return key
 
 
 def write_pairing_key(path: Path) -> str:
-    """Put a fresh key where only this user can read it, and return it.
+    """Write a new key to a file that only this user can read, and return the key.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The headset's recent poses, and its pose at a time between them."""
+"""Buffer of the headset's recent poses, with interpolation between them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from handcal.types import Float64
 
 
 class PoseBuffer:
-    """Poses ``T_W_H`` by headset time, in order however they arrive.
+    """Poses ``T_W_H`` by headset time, sorted whatever the order of arrival.
 
     Parameters
     ----------
     capacity : int
-        Poses kept.
+        Number of poses stored.
     max_gap_s : float
-        Poses farther apart are not interpolated between.
+        Longest gap between two poses that is interpolated.
     """
 
     def __init__(self, capacity: int = 1000, max_gap_s: float = 0.05) -> None:
@@ -27,7 +27,7 @@ class PoseBuffer:
         self._poses: list[Float64] = []
 
     def add(self, t_headset_ns: int, T_W_H: Float64) -> None:
-        """Take a pose; one already known is ignored."""
+        """Add a pose; one already known is ignored."""
         index = bisect.bisect_left(self._times_ns, t_headset_ns)
         if index < len(self._times_ns) and self._times_ns[index] == t_headset_ns:
             return
@@ -48,7 +48,7 @@ class PoseBuffer:
         PosePendingError
             If the time lies after the newest pose.
         PoseError
-            If it lies before the oldest, or in too wide a gap.
+            If it lies before the oldest pose, or in too long a gap.
         """
         times = self._times_ns
         if not times or t_headset_ns > times[-1]:

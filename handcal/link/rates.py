@@ -1,4 +1,4 @@
-"""How the link did over a while, from its counters at both ends of it."""
+"""Traffic and losses of the link over an interval, from two readings of its counters."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from handcal.link.server import LinkStatistics
 
 @dataclass(frozen=True, slots=True)
 class LinkRates:
-    """What passed between PC and headset, each way, over a while."""
+    """Traffic between PC and headset in each direction over an interval."""
 
     lost: float | None
     lost_inbound: float | None
-    """Share of the datagrams to the headset and from it that did not arrive, 0 to 1; None if there
-    were none. Those to the headset are counted by its reports, a moment late."""
+    """Share of the datagrams to and from the headset that did not arrive, 0 to 1; None if there were
+    none. Losses to the headset are known from its reports, which arrive a moment later."""
     sent_bytes_s: float
     received_bytes_s: float
 
@@ -22,7 +22,7 @@ class LinkRates:
 def link_rates(before: LinkStatistics, after: LinkStatistics, elapsed_s: float) -> LinkRates:
     """Return the rates between two readings of one server's counters.
 
-    A headset that connected anew in between begins to count its losses at zero.
+    A headset that reconnected in between counts its losses from zero.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Reliable delivery of the newest message of each slot. No sockets; time is an argument.
 
 The sender keeps one message per slot: a newer one replaces it, acknowledged or not. The receiver
-acknowledges fragments by bitmap, so only missing ones are sent again, and delivers each message
+acknowledges fragments by bitmap, so only missing ones are retransmitted, and delivers each message
 once and never after a newer one of its slot. Holding one message per slot bounds the memory.
 """
 
@@ -19,7 +19,7 @@ RECEIPT_COPIES = 3
 
 
 class Delivery(Enum):
-    """Where a reliable message stands."""
+    """The delivery state of a reliable message."""
 
     PENDING = auto()
     ACKED = auto()
@@ -29,7 +29,7 @@ class Delivery(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Receipt:
-    """Fragments of a message that have arrived: bit i of `fragments` is fragment i."""
+    """The fragments of a message that have arrived: bit i of `fragments` is fragment i."""
 
     slot: int
     message_id: int
@@ -38,7 +38,7 @@ class Receipt:
 
 @dataclass(slots=True, eq=False)
 class Outgoing:
-    """A reliable message on its way, and the handle to wait for it with."""
+    """A reliable message in transit; the handle to wait for its acknowledgement."""
 
     slot: Slot
     message_id: int
@@ -61,9 +61,9 @@ class Outbox:
     Attributes
     ----------
     resent : int
-        Fragments sent again.
+        Fragments retransmitted.
     acked, failed : int
-        Messages acknowledged, and given up.
+        Messages acknowledged, and messages whose delivery failed.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
@@ -76,12 +76,12 @@ class Outbox:
 
     @property
     def unacked(self) -> int:
-        """Messages still waiting for their acknowledgement."""
+        """Number of messages not yet acknowledged."""
         return len(self._pending())
 
     @property
     def has_queued(self) -> bool:
-        """Whether fragments wait for nothing but their turn."""
+        """True if fragments are ready to be sent."""
         return any(message.queue for message in self._pending())
 
     def send(self, slot: Slot, payload: bytes, now_s: float) -> Outgoing:
@@ -138,7 +138,7 @@ class Outbox:
         )
 
     def acknowledge(self, receipt: Receipt) -> None:
-        """Take note of what the receiver has; a receipt of no pending message does nothing."""
+        """Process a receipt; one for no pending message is ignored."""
         for message in self._pending():
             if (message.slot, message.message_id) != (receipt.slot, receipt.message_id):
                 continue
@@ -151,7 +151,7 @@ class Outbox:
                 self.acked += 1
 
     def expire(self, now_s: float) -> list[Outgoing]:
-        """Give up the messages whose time is over and return them."""
+        """Mark the messages whose time is over as failed and return them."""
         expired = [message for message in self._pending() if now_s >= message.deadline_s]
         for message in expired:
             message.state = Delivery.FAILED
@@ -182,7 +182,7 @@ class Inbox:
         self._owed: dict[Slot, int] = {}
 
     def receive(self, packet: Packet) -> bytes | None:
-        """Take a fragment; return its message if that completes it."""
+        """Add a fragment; return its message if that completes it."""
         message = self._newest.get(packet.slot)
         if message is None or packet.message_id > message.message_id:
             message = _Incoming(packet.message_id, packet.fragment_count)
@@ -204,7 +204,7 @@ class Inbox:
         return complete
 
     def take_receipts(self) -> list[Receipt]:
-        """Return what to acknowledge now; each receipt comes up a few times, lest it be lost."""
+        """Return the receipts to send now; each is repeated a few times in case one is lost."""
         receipts = [self._newest[slot].receipt(slot) for slot in self._owed]
         self._owed = {slot: copies - 1 for slot, copies in self._owed.items() if copies > 1}
         return receipts

@@ -31,7 +31,7 @@ _MAX_CONFIRMATIONS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Confirmation:
-    """The wearer says that the hand covers the cursor."""
+    """The wearer's confirmation that the hand covers the cursor."""
 
     t_headset_ns: int
     t_host_ns: int
@@ -43,47 +43,47 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class LinkStatistics:
-    """How the link does."""
+    """Counters and estimates of the link."""
 
     connected: bool
     sent: int
     received: int
-    """Datagrams; of the received, the accepted ones."""
+    """Datagrams sent, and datagrams received and accepted."""
     lost: int
     lost_inbound: int
-    """Of this session's datagrams to the headset by its last report, and from it by gaps."""
+    """Datagrams lost in this session: to the headset by its last report, from it by gaps."""
     resent: int
-    """Fragments sent again."""
+    """Fragments retransmitted."""
     acked: int
     unacked: int
     failed: int
-    """Reliable messages acknowledged, waiting, and given up."""
+    """Reliable messages acknowledged, waiting, and failed."""
     rejected: Mapping[str, int]
     """Datagrams dropped, by reason (`wire.Rejection`)."""
     pose_rate_hz: float
-    """Distinct poses over the newest second of them."""
+    """Rate of distinct poses over the newest second."""
     latency_ms: float | None
     """Half the median round trip."""
     clock_offset_ms: float | None
     clock_drift_ppm: float | None
     clock_uncertainty_ms: float | None
-    """Headset's clock less the host's; None before it is known."""
+    """Headset's clock minus the host's; None until it is known."""
     bytes_sent: int
     bytes_received: int
 
 
 class HeadsetServer(Endpoint):
-    """Waits for the headset, streams to it, and knows its pose.
+    """Waits for the headset, streams to it, and stores its poses.
 
-    A headset that connects anew is sent the newest cursor, prompt, projections and target
-    again. One headset at a time: the newest to connect is served.
+    A headset that reconnects is sent the newest cursor, prompt, projections and target again. One
+    headset is served at a time: the one that connected last.
 
     Parameters
     ----------
     pairing_key : bytes
         Shared with the headset; at least 16 bytes.
     bind : (host, port)
-        Loopback, any port, unless told otherwise.
+        Default: loopback, any free port.
     settings : LinkSettings
 
     Raises
@@ -115,7 +115,7 @@ class HeadsetServer(Endpoint):
         self._start()
 
     def send_cursor(self, points_W_m: ArrayLike, cursor_id: int) -> Outgoing:
-        """Send the frozen hand, (N, 3) of frame W, reliably; no points take it away.
+        """Send the frozen hand, (N, 3) of frame W, reliably; no points remove it.
 
         Raises
         ------
@@ -127,9 +127,9 @@ class HeadsetServer(Endpoint):
         return self._send_reliably(Slot.CURSOR, messages.cursor(points_W_m, cursor_id))
 
     def send_live_hand(self, points_W_m: ArrayLike, red: bool) -> None:
-        """Send the live hand, (N, 3) of frame W, thinned evenly to what every frame can carry.
+        """Send the live hand, (N, 3) of frame W, thinned evenly to the limit of one frame.
 
-        The newest replaces what has not left yet.
+        It replaces any hand that has not been sent yet.
 
         Raises
         ------
@@ -159,7 +159,7 @@ class HeadsetServer(Endpoint):
         return self._send_reliably(Slot.PROMPT, messages.prompt(text, eyes))
 
     def send_projection(self, projection: Projection) -> Outgoing:
-        """Send what an eye renders with, reliably.
+        """Send an eye's projection, reliably.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class HeadsetServer(Endpoint):
         return self._send_reliably(slot, messages.projection(projection))
 
     def send_target(self, target: Target | None) -> Outgoing:
-        """Send the user test's target, reliably; None takes it away.
+        """Send the user test's target, reliably; None removes it.
 
         Raises
         ------
@@ -213,9 +213,9 @@ class HeadsetServer(Endpoint):
         Raises
         ------
         PosePendingError
-            If the pose, or the headset's clock, is not known yet.
+            If the pose or the headset's clock is not yet known.
         PoseError
-            If it lies before the oldest pose kept, or in too wide a gap.
+            If it lies before the oldest stored pose, or in too long a gap.
         LinkError
             If the link is closed.
         """
@@ -224,7 +224,7 @@ class HeadsetServer(Endpoint):
             return self._poses.at(self._clock.to_headset_ns(t_host_ns))
 
     def statistics(self) -> LinkStatistics:
-        """Return how the link does."""
+        """Return the link's counters and estimates."""
         with self._changed:
             channel, fit = self._channel, self._clock.fit
             return LinkStatistics(
@@ -250,7 +250,7 @@ class HeadsetServer(Endpoint):
     def _greet(self, envelope: pb.Envelope, address: Address) -> None:
         if envelope.WhichOneof("body") != "hello":
             raise messages.MalformedError("a session begins with a hello")
-        # An old hello sent again wins only an offer, of a session nobody has ever signed for.
+        # A replayed hello gets only an offer, for a session that has never been confirmed.
         session = secrets.randbits(64) | 1
         self._offers[session] = address
         if len(self._offers) > _MAX_OFFERS:

@@ -1,4 +1,4 @@
-"""Where datagrams go out and come in."""
+"""UDP sockets behind a small interface that tests can replace."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal.link.wire import MAX_DATAGRAM_BYTES
 Address: TypeAlias = tuple[str, int]
 
 _MAX_BATCH = 256
-_ANYWHERE: Address = ("192.0.2.1", 9)  # an address for documentation; nothing is sent there
+_ANYWHERE: Address = ("192.0.2.1", 9)  # reserved for documentation; nothing is sent to it
 
 
 class Transport(Protocol):
@@ -21,11 +21,11 @@ class Transport(Protocol):
     address: Address
 
     def send(self, datagram: bytes, address: Address) -> None:
-        """Send, or lose, a datagram."""
+        """Send a datagram; it may be lost."""
         ...
 
     def receive(self, timeout_s: float) -> list[tuple[bytes, Address]]:
-        """Return what has arrived, waiting at most `timeout_s` for the first."""
+        """Return the datagrams that have arrived; wait at most `timeout_s` for the first."""
         ...
 
     def close(self) -> None:
@@ -54,24 +54,24 @@ class UdpTransport:
         self.address: Address = self._socket.getsockname()
 
     def send(self, datagram: bytes, address: Address) -> None:
-        """Send a datagram; one that the system refuses is lost, as any may be."""
+        """Send a datagram; one that the system refuses is lost."""
         try:
             self._socket.sendto(datagram, address)
         except OSError:
             return
 
     def receive(self, timeout_s: float) -> list[tuple[bytes, Address]]:
-        """Return what has arrived, waiting at most `timeout_s` for the first."""
+        """Return the datagrams that have arrived; wait at most `timeout_s` for the first."""
         select.select([self._socket], [], [], timeout_s)
         arrived: list[tuple[bytes, Address]] = []
         for _ in range(_MAX_BATCH):
             try:
-                # One byte more than allowed, so that an oversized one shows.
+                # One byte more than allowed, so that an oversized datagram is noticed.
                 arrived.append(self._socket.recvfrom(MAX_DATAGRAM_BYTES + 1))
             except BlockingIOError:
                 break
             except OSError:
-                # Windows reports here that an earlier datagram found nobody, or one too large.
+                # Windows reports here that an earlier datagram was refused, or one is too large.
                 continue
         return arrived
 
@@ -81,7 +81,7 @@ class UdpTransport:
 
 
 def local_address(server: Address) -> Address:
-    """Return the address, any port, that this machine reaches `server` from.
+    """Return the address, with any port, from which this machine reaches `server`.
 
     Raises
     ------
@@ -90,19 +90,19 @@ def local_address(server: Address) -> Address:
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(server)  # chooses a way; sends nothing
+            probe.connect(server)  # selects a route; sends nothing
         except OSError as error:
             raise LinkError(f"cannot reach {server[0]}:{server[1]}: {error.strerror}") from error
         return probe.getsockname()[0], 0
 
 
 def reachable_address(bound: Address) -> Address:
-    """Return where others reach a socket: on all networks, the address of the default one.
+    """Return the address at which others reach a socket bound to one network or to all.
 
     Raises
     ------
     LinkError
-        If it is bound on all networks, but there is none.
+        If it is bound to all networks, but there is none.
     """
     host, port = bound
     return (local_address(_ANYWHERE)[0], port) if host == "0.0.0.0" else bound  # noqa: S104
@@ -118,5 +118,5 @@ def resolve(host: str, port: int) -> Address:
     """
     try:
         return socket.gethostbyname(host), port
-    except (OSError, UnicodeError) as error:  # UnicodeError: not even a name
-        raise LinkError(f"unknown host {host!r}; check its name, or give its address") from error
+    except (OSError, UnicodeError) as error:  # UnicodeError: not a valid name
+        raise LinkError(f"unknown host {host!r}; check its name or use its address") from error

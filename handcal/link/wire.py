@@ -25,7 +25,7 @@ REPLAY_WINDOW = 1024
 
 
 class Slot(IntEnum):
-    """What a reliable message replaces: each slot holds one value, and the newest wins."""
+    """The slot of a reliable message: each holds one value, and the newest wins."""
 
     UNRELIABLE = 0
     CURSOR = 1
@@ -37,7 +37,7 @@ class Slot(IntEnum):
 
 
 class Rejection(StrEnum):
-    """Why a datagram was dropped."""
+    """Reasons for dropping a datagram."""
 
     UNPAIRED = "unpaired"
     CORRUPT = "corrupt"
@@ -49,7 +49,7 @@ class Rejection(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """One datagram without its MAC. Session 0 is the handshake's."""
+    """One datagram without its MAC. Session 0 is the handshake."""
 
     payload: bytes
     session: int = 0
@@ -62,7 +62,7 @@ class Packet:
 
 @dataclass(frozen=True, slots=True)
 class Keys:
-    """The MAC keys of the two directions, so that a datagram thrown back fails."""
+    """The MAC keys of the two directions; they differ, so that a reflected datagram fails."""
 
     to_headset: bytes
     to_pc: bytes
@@ -93,7 +93,7 @@ def seal(key: bytes, packet: Packet) -> bytes:
     Raises
     ------
     ValueError
-        If its payload does not fit.
+        If its payload is too large.
     """
     if len(packet.payload) > MAX_PAYLOAD_BYTES:
         raise ValueError(
@@ -115,7 +115,7 @@ def seal(key: bytes, packet: Packet) -> bytes:
 
 
 def unseal(key: bytes, datagram: bytes) -> Packet | Rejection:
-    """Return the packet in `datagram`, or why there is none; any bytes are allowed."""
+    """Return the packet in `datagram`, or the reason for dropping it; any bytes are allowed."""
     if len(datagram) > MAX_DATAGRAM_BYTES:
         return Rejection.OVERSIZED
     if len(datagram) < HEADER.size + MAC_BYTES or not datagram.startswith(MAGIC):
@@ -139,7 +139,7 @@ def _mac(key: bytes, body: bytes) -> bytes:
 
 
 def split(message: bytes) -> list[bytes]:
-    """Cut a message into the payloads of its fragments.
+    """Split a message into the payloads of its fragments.
 
     Raises
     ------
@@ -162,7 +162,7 @@ class ReplayWindow:
     highest : int
         The highest sequence number accepted; they start at 1.
     accepted : int
-        How many were accepted.
+        Number of accepted datagrams.
     """
 
     def __init__(self) -> None:
@@ -172,7 +172,7 @@ class ReplayWindow:
 
     @property
     def lost(self) -> int:
-        """How many are missing up to the highest: lost, or still on their way."""
+        """Number of datagrams missing up to the highest: lost, or delayed."""
         return self.highest - self.accepted
 
     def accept(self, sequence: int) -> bool:

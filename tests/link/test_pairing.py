@@ -35,7 +35,7 @@ def test_no_key_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(FileError):
         read_pairing_key(tmp_path / "absent")
     monkeypatch.setenv(KEY_VARIABLE, "short")
-    with pytest.raises(LinkError, match="5 bytes; take one of at least 16"):
+    with pytest.raises(LinkError, match="5 bytes; use at least 16"):
         read_pairing_key()
 
 

@@ -205,7 +205,7 @@ def test_giving_up_is_told(pairing_key: bytes, caplog: pytest.LogCaptureFixture)
         with pytest.raises(LinkError, match="prompt was not acknowledged"):
             server.wait_acked(message, 3.0)
         assert server.statistics().failed == 1
-    assert "gave up sending the prompt" in caplog.text
+    assert "delivery of the prompt failed" in caplog.text
 
 
 def test_a_replaced_message_says_so(server: HeadsetServer) -> None:
