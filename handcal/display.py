@@ -163,7 +163,8 @@ def reprojection_arcmin(
 ) -> float:
     """Return the mean reprojection error seen by the true eyes, in arcmin.
 
-    Evaluated at the corners of the user test's target at its three distances, tracked by the depth camera.
+    Evaluated at the corners of the user test's target at its three distances, as tracked by the
+    depth camera.
 
     Parameters
     ----------

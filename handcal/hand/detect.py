@@ -1,4 +1,4 @@
-"""Find hands in a colour image: a network run by onnxruntime, and what its output means."""
+"""Find hands in a colour image with a network run by onnxruntime."""
 
 from __future__ import annotations
 
@@ -13,43 +13,44 @@ from handcal.errors import FileError
 from handcal.types import Float32, Float64, UInt8, freeze
 
 STRIDES = (8, 16, 32)
-"""Pixels between the network's points on its three levels."""
+"""Strides of the network's three levels, in pixels."""
 
 CANDIDATE_SCORE_MIN = 0.02
-"""What the network is less sure of has no say in where hands are."""
+"""Candidates with a lower score are ignored."""
 
 _ENDS = [("image", "tensor(uint8)"), ("raw", "tensor(float)")]
-_GRAY = 127  # what the network's zero padding looks like
-# Of the largest scale. For 16:9 it saves an eighth of the canvas, much of it gray.
+_GRAY = 127  # value of the network's zero padding
+# Share of the largest scale. For 16:9 it saves an eighth of the canvas, much of it gray.
 _LARGE_ENOUGH = 0.95
 
 
 @dataclass(frozen=True, slots=True)
 class DetectSettings:
-    """How hands are detected."""
+    """Settings of the detector."""
 
     pixels: int = 110_592
-    """The network sees the image shrunk or grown to at most so many pixels."""
+    """Largest number of pixels of the network's input; the image is scaled to it."""
     score_min: float = 0.3
-    """Hands with a lower score are not returned; `CANDIDATE_SCORE_MIN` at least."""
+    """Lowest score of a returned hand; at least `CANDIDATE_SCORE_MIN`."""
     overlap_max: float = 0.4
-    """Of two candidates whose intersection over union is larger, the one with the lower score is
+    """Largest intersection over union of two hands; above it the one with the lower score is
     dropped."""
     agreement_min: float = 0.6
-    """A hand's box is the mean of the candidates, weighted by score, whose intersection over union
-    with the best is as large (box voting, Gidaris & Komodakis 2015), whatever `score_min` is."""
+    """Least intersection over union with the best candidate for a vote: a hand's box is the mean of
+    those candidates, weighted by score, regardless of `score_min` (box voting, Gidaris & Komodakis
+    2015)."""
     hands: int = 100
-    """At most so many hands are returned, as in COCO's average precision."""
+    """Largest number of hands returned, as in COCO's average precision."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
-    """Hands found in an image, the surest first."""
+    """Hands found in an image, highest score first."""
 
     boxes_px: Float64
     """(N, 4); x0, y0, x1, y1 from the image's upper left corner."""
     scores: Float64
-    """(N,); 0 to 1: the overlap with the true box that the network expects."""
+    """(N,); overlap with the true box as predicted by the network, 0 to 1."""
 
     def __post_init__(self) -> None:
         freeze(self, "boxes_px", np.float64, None, 4)
@@ -101,7 +102,7 @@ class HandDetector:
         color : (H, W, 3) uint8
             RGB.
         pixels : int, optional
-            In place of the settings' `pixels`; at least 1024.
+            Overrides the settings' `pixels`; at least 1024.
         """
         canvas, scale = letterbox(color, pixels or self._settings.pixels)
         [raw] = self._session.run(["raw"], {"image": canvas[None]})
@@ -116,14 +117,14 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
     ----------
     color : (h, w, 3) uint8
     pixels : int
-        At most so many has the canvas: the smallest that shows the image nearly as large as any.
+        Upper limit of the canvas, which is the smallest with nearly the largest image scale.
 
     Returns
     -------
     canvas : (H, W, 3) uint8
-        Gray beside the image.
+        The rest is gray.
     scale : float
-        Of the image in the canvas.
+        Scale of the image in the canvas.
     """
     scale, size, canvas_shape = _fit(*color.shape[:2], pixels)
     canvas = np.full((*canvas_shape, 3), _GRAY, np.uint8)
@@ -156,13 +157,13 @@ def _fit(height: int, width: int, pixels: int) -> tuple[float, tuple[int, int], 
 
 def _halved(color: UInt8) -> UInt8:
     height, width = (side // 2 for side in color.shape[:2])
-    even = color[: 2 * height, : 2 * width]  # or OpenCV takes ten times as long
+    even = color[: 2 * height, : 2 * width]  # OpenCV is ten times slower with odd sizes
     return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 @lru_cache
 def points(height: int, width: int) -> tuple[Float32, Float32]:
-    """Return the network's points for a canvas: x and y in pixels (N, 2), and strides (N,).
+    """Return the network's anchor points for a canvas, (N, 2) in pixels, and strides (N,).
 
     Both arrays are read-only.
     """
@@ -182,7 +183,7 @@ def decode(
 ) -> tuple[Float64, Float64]:
     """Return the boxes (N, 4) in the canvas and scores (N,) of raw predictions (5, P).
 
-    Sorted by score, the best first, after non-maximum suppression and box voting.
+    Sorted by descending score, after non-maximum suppression and box voting.
     """
     logit_min = np.log(CANDIDATE_SCORE_MIN / (1.0 - CANDIDATE_SCORE_MIN))
     kept = np.flatnonzero(raw[0] > logit_min)
@@ -209,7 +210,7 @@ def overlaps(boxes: Float64, others: Float64) -> Float64:
 
 
 def _suppress(boxes: Float64, overlap_max: float, most: int) -> list[int]:
-    """Return the indices of boxes, best first, that overlap no better one."""
+    """Return the indices of boxes, sorted best first, that overlap no better one."""
     chosen: list[int] = []
     remaining = np.arange(len(boxes))
     while len(remaining) and len(chosen) < most:

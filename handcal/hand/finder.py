@@ -1,4 +1,4 @@
-"""The wearer's hand in frame after frame, segmented where a detector sees it."""
+"""Segmentation of the wearer's hand in successive frames, guided by a detector."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
 from handcal.types import Frame, HandCloud, Intrinsics
 
-_EDGE_PX = 3  # a hand that comes so close to its window's side may go on beyond it
+_EDGE_PX = 3  # a hand this close to a side of its window may continue beyond it
 
 
 class HandFinder:
     """Segments the hand in each frame of a camera.
 
-    The detector only says where to look first. Where it sees no hand, or the hand does not lie
-    wholly about there, the nearest hand-sized thing in the depth image is taken.
+    The detector only selects where to look first. If it sees no hand, or the hand extends beyond
+    that region, the nearest hand-sized object in the depth image is used.
 
     Parameters
     ----------
     settings : SegmentSettings
     detector : Detector, optional
-        Without it the depth image alone decides.
+        Without it only the depth image is used.
     """
 
     def __init__(self, settings: SegmentSettings, detector: Detector | None = None) -> None:
@@ -39,7 +39,7 @@ class HandFinder:
         Raises
         ------
         HandError
-            As `segment_hand`.
+            See `segment_hand`.
         """
         roi_px = self._roi.find(frame) if self._roi else None
         if roi_px is not None:
@@ -52,7 +52,7 @@ class HandFinder:
 
 
 def _is_within(box: Box, window: Box, camera: Intrinsics) -> bool:
-    """Tell whether a box keeps off those sides of a window that are not the image's own."""
+    """Return whether a box keeps clear of a window's sides, other than the image's border."""
     gaps_px = np.subtract(box, window) * (1, 1, -1, -1)
     at_end = np.equal(window, (0, 0, camera.width, camera.height))
     return bool(((gaps_px > _EDGE_PX) | at_end).all())

@@ -1,8 +1,8 @@
-"""Find the hand in a coarse depth image: which surface it is, its palm, and where the arm begins.
+"""Locate the hand in a coarse depth image: its surface, its palm, and the start of the arm.
 
-The palm is the largest inscribed circle near the end of a limb. A ball about its centre, which
-depends neither on the limb's direction nor on how much forearm is visible, separates the hand
-from the arm, so that two frames of one hand are cut at the same place.
+The palm is the largest inscribed circle near the end of a limb. A ball about its centre separates
+the hand from the arm. It depends neither on the limb's direction nor on the visible length of the
+forearm, so two frames of one hand are cut at the same place.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from handcal.hand.surface import (
 from handcal.hand.view import DepthView, between, crop_view, deproject
 from handcal.types import Bool, Float32, Float64
 
-# Sizes of adult hands, with room to spare (Gordon et al., 2012 Anthropometric Survey of U.S. Army
+# Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
 # Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed
 # circle of a palm is about 20 mm in radius.
 _PALM_RADIUS_M = (0.018, 0.065)
@@ -35,8 +35,9 @@ _PALM_TO_ARM_M = 0.03
 _PALM_TO_WRIST_MAX_M = 0.11
 _HAND_REACH_M = 0.20
 _AREA_MIN_M2 = 0.004
-# Where the inscribed radius has fallen this close to its minimum, in shells of this thickness about
-# the palm and in this cone about the arm, averaged over so many shells; from there to the wrist.
+# The fall of the inscribed radius ends this close to its minimum, measured in shells of this
+# thickness about the palm, in this cone about the arm, averaged over this many shells; the last
+# value is the distance from there to the wrist.
 _WRIST_NARROW = 1.1
 _SHELL_M = 0.0025
 _SMOOTH_SHELLS = 9
@@ -46,18 +47,18 @@ _WRIST_BEYOND_M = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocatedHand:
-    """Where the hand is."""
+    """The place of the hand in a coarse depth image."""
 
     view: DepthView
-    """The part of the image with the surface that the hand is on."""
+    """The part of the image that holds the hand's surface."""
     hand: Bool
     arm: Bool
-    """(h, w); the hand, and the arm that goes on from it, in `view`."""
+    """(h, w); the hand and the adjoining arm, in `view`."""
     palm_m: Float64
     """(3,); centre of the visible palm or back of the hand, camera frame."""
     palm_radius_m: float
     limit_m: float
-    """Distance from `palm_m` at which the arm begins."""
+    """Distance from `palm_m` to the start of the arm."""
 
 
 def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
@@ -66,13 +67,13 @@ def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
     Parameters
     ----------
     view : DepthView
-        About 2 mm between the pixels of a hand.
+        With a pitch of about 2 mm on a hand.
     settings : SegmentSettings
 
     Raises
     ------
     HandError
-        If there is none.
+        If no such surface is found.
     """
     jump = round(settings.edge_jump_m / view.scale_m)
     solid = solid_surface(view.depth, jump)
@@ -91,7 +92,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
             found = located
     if found is None:
         raise HandError(
-            f"no hand-sized thing between {settings.depth_min_m:.2f} and "
+            f"no hand-sized object between {settings.depth_min_m:.2f} and "
             f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
         )
     return found
@@ -106,7 +107,7 @@ def _is_plausible(located: LocatedHand, pitch: float) -> bool:
 def _locate_on(
     view: DepthView, surface: Bool, ends: Bool, radius_m: Float32, forearm_m: float
 ) -> LocatedHand:
-    """Find palm and wrist on one surface, which runs on out of sight where `ends` is set."""
+    """Find palm and wrist on one surface, which continues out of view where `ends` is set."""
     rows, columns = np.ogrid[: surface.shape[0], : surface.shape[1]]
     points_m = deproject(view, rows, columns)
     arm_end = _arm_end(surface, ends, points_m, radius_m)
@@ -126,9 +127,9 @@ def _locate_on(
 
 
 def _arm_end(surface: Bool, ends: Bool, points_m: Float32, radius_m: Float32) -> Bool:
-    """Return where the arm leaves: the widest place that runs on out of sight.
+    """Return where the arm leaves the view: the widest place at which the surface continues.
 
-    Where none does, it is the thicker of the two tips of the surface: fingers are thin.
+    If it continues nowhere, this is the thicker of the surface's two tips, as fingers are thin.
     """
     places = components(surface & ends)
     if places:
@@ -152,7 +153,7 @@ def _palm(near_tip: Bool, points_m: Float32, radius_m: Float32) -> tuple[Float32
     inscribed_m = np.where(near_tip, radius_m, 0)
     best = np.unravel_index(np.argmax(inscribed_m), inscribed_m.shape)
     palm_radius_m = float(inscribed_m[best])
-    # Averaged over the top of the distance map: one pixel of it is too coarse to cut by.
+    # Averaged over the top of the distance map: a single pixel is too coarse for the cut.
     top = (inscribed_m > 0.95 * palm_radius_m) & (
         _distance(points_m, points_m[:, best[0], best[1]]) < palm_radius_m
     )
@@ -170,27 +171,27 @@ def _palm_to_wrist(
     """Return the distance from the palm's centre to the wrist, along the arm.
 
     In shells about the palm the inscribed radius falls to that of the wrist, then grows along the
-    forearm. The wrist is placed by where the fall ends: the minimum itself is too flat to be
-    found twice at one place.
+    forearm. The wrist is placed where the fall ends, because the minimum itself is too flat to be
+    located repeatably.
     """
     near_palm = surface & (from_palm_m < _PALM_TO_WRIST_MAX_M)
     near_arm = arm & near_palm
     if not near_arm.any():
         return _PALM_TO_WRIST_MAX_M
-    weight = radius_m[near_arm] ** 2  # a thumb that leaves with the arm is thin
+    weight = radius_m[near_arm] ** 2  # a thumb next to the arm is thin
     axis = (points_m[:, near_arm] - palm_m[:, None]) @ weight
     axis /= np.linalg.norm(axis)
     along_axis_m = np.tensordot(axis, points_m, 1) - axis @ palm_m
     armward = near_palm & (along_axis_m > _ARMWARD_COS * from_palm_m)
     shell = (from_palm_m[armward] / _SHELL_M).astype(int)
-    # Of radius_m's type, or ufunc.at takes thirty times as long.
+    # Same type as radius_m: ufunc.at is thirty times slower otherwise.
     profile_m = np.zeros(1 + int(_PALM_TO_WRIST_MAX_M / _SHELL_M), radius_m.dtype)
     np.maximum.at(profile_m, shell, radius_m[armward])
     return _end_of_fall(profile_m.astype(np.float64)) * _SHELL_M + _WRIST_BEYOND_M
 
 
 def _end_of_fall(profile_m: Float64) -> float:
-    """Return where, in shells, the smoothed profile falls nearly to its minimum."""
+    """Return the shell at which the smoothed profile has nearly fallen to its minimum."""
     kernel = np.ones(_SMOOTH_SHELLS)
     seen = np.convolve(profile_m > 0, kernel, "same")
     smooth_m = np.convolve(profile_m, kernel, "same") / np.maximum(seen, 1)
@@ -210,7 +211,7 @@ def _inscribed_radius_px(measured: Bool, solid: Bool) -> Float32:
     closed = cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS)
     closed[measured & ~solid] = 0
     distance_px = cv2.distanceTransform(closed, cv2.DIST_L2, 5)
-    return np.minimum(distance_px, np.float32(max(solid.shape)))  # without an edge it is endless
+    return np.minimum(distance_px, np.float32(max(solid.shape)))  # infinite without an edge
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:

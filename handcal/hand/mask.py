@@ -1,4 +1,4 @@
-"""The located hand at full resolution: which pixels it covers, its outline, and where it is cut."""
+"""The located hand at full resolution: its pixels, its outline and its cut edges."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from handcal.hand.view import (
 )
 from handcal.types import Bool, Frame, UInt8
 
-# The hand's outline may touch the image border this much.
+# Share of the hand's outline that may touch the image border.
 _BORDER_CONTACT_M = 0.01
 
 
@@ -39,10 +39,10 @@ class HandMask:
     outline: Pixels
     """The outer contour, in order."""
     cut: Bool
-    """(h, w); where the hand ends but the arm, the region of interest or the gate's surface goes
-    on."""
+    """(h, w); cut edges, beyond which the arm, the region of interest or the surface behind the
+    depth gate continues."""
     pitch_m: float
-    """About the distance between neighbouring pixels on the hand."""
+    """Approximate distance between neighbouring pixels on the hand."""
 
 
 def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> HandMask:
@@ -51,7 +51,7 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     Raises
     ------
     HandError
-        If the image does not show all of it.
+        If the image does not show the whole hand.
     """
     view, may_be_hand, may_be_arm = _full_resolution(located, frame)
     jump = round(settings.edge_jump_m / view.scale_m)
@@ -72,7 +72,7 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
 
 
 def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool]:
-    """Return the image around the hand, and where in it the hand and the arm may be."""
+    """Return the image around the hand, with the candidate pixels of hand and arm."""
     coarse, place = crop_view(located.view, located.hand, margin=3)
     view = view_depth(frame, coarse.box)
     hand, arm = (
@@ -82,7 +82,7 @@ def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Boo
 
 
 def _enlarged(mask: Bool, step_px: int, view: DepthView) -> Bool:
-    """Widen a coarse mask by two pixels and bring it to the resolution and size of a view."""
+    """Dilate a coarse mask by two pixels and resample it to the size of a view."""
     wider = cv2.dilate(mask.astype(np.uint8), NEIGHBOURS, iterations=2)
     height, width = view.depth.shape
     size = step_px * mask.shape[1], step_px * mask.shape[0]
@@ -92,7 +92,7 @@ def _enlarged(mask: Bool, step_px: int, view: DepthView) -> Bool:
 def _outline(within: Bool, hole_area_px: float) -> tuple[Pixels, UInt8]:
     """Return the outer contour of the largest part, and that part with small holes closed.
 
-    Borders are followed as in Suzuki & Abe, "Topological structural analysis of digitized binary
+    Border following as in Suzuki & Abe, "Topological structural analysis of digitized binary
     images by border following", 1985.
     """
     mask = np.where(within, np.uint8(255), np.uint8(0))

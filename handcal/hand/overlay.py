@@ -1,4 +1,4 @@
-"""Where a segmented hand lies in its frame's images, for whoever draws it over them."""
+"""Projection of a segmented hand into its frame's images, for drawing it over them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def contour_px(cloud: HandCloud, frame: Frame) -> tuple[Float64, Float64 | None]
     ----------
     cloud : HandCloud
     frame : Frame
-        The one that it came from, or a later one of the same camera.
+        The frame of the cloud, or a later one of the same camera.
 
     Returns
     -------

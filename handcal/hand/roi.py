@@ -1,4 +1,4 @@
-"""Where to look for the wearer's hand: a detector's box, followed through the depth images."""
+"""The region of interest: a detector's box, tracked through the depth images."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from handcal.hand.settings import Roi, SegmentSettings
 from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
 from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 
-_STEP_PX = 8  # of the depth image: fine enough to tell where a hand is
+_STEP_PX = 8  # of the depth image: fine enough to locate a hand
 _PIXELS_MIN = 6
-_DEPTH_SPREAD_M = 0.10  # of one hand
+_DEPTH_SPREAD_M = 0.10  # within one hand
 _SAME_OVERLAP = 0.3
 _SHIFTS, _STILL_PX = 3, 1.0
 
@@ -25,41 +25,41 @@ class Detector(Protocol):
     """Finds hands in a colour image."""
 
     def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
-        """Return the hands in an (H, W, 3) RGB image, looked at with about so many pixels."""
+        """Return the hands in an (H, W, 3) RGB image, scaled to about this many pixels."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class RoiSettings:
-    """How the hand is chosen and followed.
+    """Settings of choosing and tracking the hand.
 
-    Times are kept to the nearest frame.
+    Times are rounded to frames.
     """
 
     sure_min: float = 0.7
-    """Hands whose score is below this share of the surest one's are not considered."""
+    """Least score of a hand, as a share of the highest score."""
     check_s: float = 0.19
-    """The detector looks again at a hand that has been followed for so long,"""
+    """Time after which the detector checks a tracked hand again."""
     check_margin: float = 0.5
-    """at its surroundings only, so many times its box's longer side on each side,"""
+    """Margin of that check around the hand's box, as a multiple of its longer side."""
     check_pixels: int = 25_600
-    """and with so few pixels, because this goes on all the time."""
+    """Pixels of that check: few, because it is repeated all the time."""
     search_s: float = 0.06
-    """While there is none, the detector looks this often, at the whole image."""
+    """Time between searches of the whole image while no hand is tracked."""
     choose_s: float = 1.0
-    """So it does, no more often than this, at a followed hand that may be the wrong one."""
+    """Least time between searches of the whole image while the tracked hand may be wrong."""
     misses: int = 2
-    """A followed hand that the detector does not see in so many looks in a row is dropped."""
+    """A tracked hand is dropped after this many checks in a row without a detection."""
     filled_min: float = 0.25
-    """Share of a hand's box that is at the hand's depth."""
+    """Least share of a hand's box at the hand's depth."""
     side_min_m: float = 0.05
     side_max_m: float = 0.30
-    """Range of the square root of a hand's box's area, at its depth."""
+    """Range of the square root of the area of a hand's box, at its depth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Track:
-    """A hand in the depth image: its box, its depth, and its mass's place and size in the box."""
+    """A hand in the depth image: box, depth, and the centroid and area of its pixels in the box."""
 
     score: float
     box: Float64
@@ -69,15 +69,15 @@ class _Track:
 
 
 class RoiFinder:
-    """Finds one hand and follows it from frame to frame.
+    """Finds one hand and tracks it from frame to frame.
 
-    Between looks of the detector the box moves with what is in it at the hand's depth.
+    Between detections the box moves with the pixels in it at the hand's depth.
 
     Parameters
     ----------
     detector : Detector
     segmenting : SegmentSettings
-        Its depth gate is where hands are; its `roi` tells which of several is wanted.
+        Its depth gate limits the search; its `roi` selects among several hands.
     settings : RoiSettings, optional
     """
 
@@ -98,12 +98,12 @@ class RoiFinder:
         self._chosen_ns = 0
 
     def find(self, frame: Frame) -> Box | None:
-        """Return the hand's box in the depth image; None if none is in sight or without colour."""
+        """Return the hand's box in the depth image; None if no hand is seen, or without colour."""
         if frame.color is None:
             return None
         now_ns = frame.t_camera_ns
         if self._seen_ns is None or now_ns < self._seen_ns:
-            self._track = self._looked_ns = None  # a recording has begun, or begun again
+            self._track = self._looked_ns = None  # a recording has started or restarted
             self._seen_ns = now_ns
         half_frame_ns, self._seen_ns = (now_ns - self._seen_ns) / 2, now_ns
         cloud = _CoarseCloud(frame, self._gate_m)
@@ -117,7 +117,7 @@ class RoiFinder:
         return None if self._track is None else cloud.clip(self._track.box)
 
     def _look(self, color: UInt8, cloud: _CoarseCloud, now_ns: int) -> None:
-        """Let the detector confirm the track, drop it, or begin one."""
+        """Run the detector to confirm the track, drop it, or start one."""
         confirmed = self._track and self._confirm(self._track, color, cloud)
         if confirmed is not None:
             self._track, self._misses = confirmed, 0
@@ -133,9 +133,9 @@ class RoiFinder:
         self._track = self._choose(color, cloud) or confirmed
 
     def _choose(self, color: UInt8, cloud: _CoarseCloud) -> _Track | None:
-        """Return the wanted one of the hands that the detector sees, near by as well as from far.
+        """Return the wanted hand, if the detector sees it in the whole image and in a crop.
 
-        What it sees only from far it would soon drop, to see it again.
+        A hand seen only in the whole image would soon be dropped and detected again.
         """
         height, width = color.shape[:2]
         hands = self._hands(color, (0, 0, width, height), None, cloud)
@@ -145,7 +145,7 @@ class RoiFinder:
         return next(filter(None, confirmed), None)
 
     def _confirm(self, track: _Track, color: UInt8, cloud: _CoarseCloud) -> _Track | None:
-        """Return the track as the detector sees it, None if it sees no hand there."""
+        """Return the track as updated by the detector; None if it sees no hand there."""
         part = cloud.surroundings(track, self._settings.check_margin)
         hands = self._hands(color, part, self._settings.check_pixels, cloud)
         return next((hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP), None)
@@ -153,7 +153,7 @@ class RoiFinder:
     def _hands(
         self, color: UInt8, part: Box, pixels: int | None, cloud: _CoarseCloud
     ) -> list[_Track]:
-        """Return the plausible hands that the detector sees in a part of the image."""
+        """Return the plausible hands detected in a part of the image."""
         x0, y0, x1, y1 = part
         found = self._detector.detect(color[y0:y1, x0:x1], pixels)
         boxes = found.boxes_px + np.array([x0, y0, x0, y0])
@@ -167,7 +167,7 @@ class RoiFinder:
         return hands
 
     def _is_plausible(self, track: _Track, cloud: _CoarseCloud) -> bool:
-        """Tell whether what is in a box is of a hand's size and fills it as a hand does."""
+        """Return whether the content of a box has a hand's size and fills the box like a hand."""
         settings = self._settings
         side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
         side_m = side_px * track.depth_m / cloud.camera.fx
@@ -198,7 +198,7 @@ class _CoarseCloud:
         self._depth_m = self._view.depth[self._rows, self._columns] * self._view.scale_m
 
     def track(self, color_box: Float64, score: float) -> _Track | None:
-        """Return the nearest thing in a box of the colour image."""
+        """Return the nearest object in a box of the colour image."""
         inside = _inside(self._color_px(), color_box)
         if np.count_nonzero(inside) < _PIXELS_MIN:
             return None
@@ -210,7 +210,7 @@ class _CoarseCloud:
         return _Track(score, box, depth_m, offset, int(np.count_nonzero(inside)))
 
     def follow(self, track: _Track) -> _Track | None:
-        """Move a track's box with the mass in it; None if most of that is gone."""
+        """Move a track's box with the pixels in it; None if most of them are gone."""
         near = np.abs(self._depth_m - track.depth_m) < _DEPTH_SPREAD_M
         px, depth_m = self._px[near], self._depth_m[near]
         box = track.box
@@ -225,7 +225,7 @@ class _CoarseCloud:
         return replace(track, box=box, depth_m=float(np.median(depth_m[inside])))
 
     def may_precede(self, track: _Track, wanted: Roi) -> bool:
-        """Tell whether something is there that, were it a hand, would be wanted rather."""
+        """Return whether there is an object that would be preferred if it were a hand."""
         low, high = track.box[0::2] + np.array([-1, 1]) * (track.box[2] - track.box[0])
         x = self._px[:, 0]
         nearer = self._depth_m < track.depth_m - _DEPTH_SPREAD_M
@@ -233,7 +233,7 @@ class _CoarseCloud:
         return bool(np.count_nonzero(precedes) >= _PIXELS_MIN)
 
     def surroundings(self, track: _Track, margin: float) -> Box:
-        """Return the part of the colour image about a track."""
+        """Return the part of the colour image around a track."""
         box = self._in_color(track.box, track.depth_m)
         wider = margin * (box[2:] - box[:2]).max()
         size = self._color_camera.width, self._color_camera.height
@@ -243,27 +243,27 @@ class _CoarseCloud:
         return x0, y0, x1, y1
 
     def clip(self, box: Float64) -> Box | None:
-        """Return a box in whole pixels within the depth image, None if it is outside."""
+        """Return a box in whole pixels, clipped to the depth image; None if outside."""
         x0, y0 = np.floor(box[:2].clip(0)).astype(int).tolist()
         x1, y1 = np.ceil(box[2:].clip(0)).astype(int).tolist()
         x1, y1 = min(x1, self.camera.width), min(y1, self.camera.height)
         return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
 
     def _color_px(self) -> Float64:
-        """Return where the colour image shows the pixels, (N, 2)."""
+        """Return the pixels' coordinates in the colour image, (N, 2)."""
         if self._aligned:
             return self._px
         points_m = deproject(self._view, self._rows, self._columns).T
         return image_points(transform(self._T_C_D, points_m), self._color_camera)
 
     def _in_depth(self, color_box: Float64, depth_m: float) -> Float64:
-        """Return a box of the colour image in the depth image, for things at a depth."""
+        """Map a box of the colour image to the depth image, for objects at a depth."""
         if self._aligned:
             return color_box
         return _moved(color_box, depth_m, self._color_camera, self.camera, invert(self._T_C_D))
 
     def _in_color(self, box: Float64, depth_m: float) -> Float64:
-        """Return a box of the depth image in the colour image, for things at a depth."""
+        """Map a box of the depth image to the colour image, for objects at a depth."""
         if self._aligned:
             return box
         return _moved(box, depth_m, self.camera, self._color_camera, self._T_C_D)
@@ -272,7 +272,7 @@ class _CoarseCloud:
 def _moved(
     box: Float64, depth_m: float, camera: Intrinsics, other: Intrinsics, T_other_camera: Float64
 ) -> Float64:
-    """Return where another camera shows what is at a depth in a box of a camera's image."""
+    """Map a box of one camera's image to another camera, for objects at a depth."""
     rays = cv2.undistortPoints(
         box.reshape(2, 1, 2), camera_matrix(camera), np.array(camera.distortion)
     )
@@ -292,7 +292,7 @@ def _center(box: Float64) -> Float64:
 
 
 def _on_one_hand(track: _Track, other: _Track) -> bool:
-    """Tell whether one of two boxes holds the other's centre."""
+    """Return whether one of two boxes contains the other's centre."""
     return bool(
         _inside(_center(track.box)[None], other.box).any()
         or _inside(_center(other.box)[None], track.box).any()

@@ -1,4 +1,4 @@
-"""Segment the wearer's bare hand out of a depth image: mask, outer contour and cloud."""
+"""Segmentation of the wearer's bare hand in a depth image: mask, outer contour and cloud."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from handcal.types import Bool, Float32, Frame, HandCloud, Intrinsics, UInt8
 
 __all__ = ["SegmentSettings", "segment_hand", "segmented_window"]
 
-# The hand is located on a grid of about this pitch at this depth.
+# Approximate pitch of the grid on which the hand is located, at this depth.
 _COARSE_PITCH_M = 0.002
 _COARSE_DEPTH_M = 0.5
 
@@ -26,11 +26,11 @@ def segment_hand(frame: Frame, settings: SegmentSettings, roi_px: Box | None = N
     Parameters
     ----------
     frame : Frame
-        Depth and, if there is any, colour: aligned or not, as the camera delivers them.
+        Depth and, optionally, colour, aligned or not.
     settings : SegmentSettings
     roi_px : Box, optional
-        Where a detector saw the hand: x0, y0, x1, y1 in the depth image, x1 and y1 exclusive.
-        Without it the nearest hand-sized thing in the whole image is taken.
+        Detected region of the hand: x0, y0, x1, y1 in the depth image, x1 and y1 exclusive.
+        Without it the nearest hand-sized object in the whole image is used.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def segment_hand(frame: Frame, settings: SegmentSettings, roi_px: Box | None = N
     Raises
     ------
     HandError
-        If there is no hand, or the image does not show all of it.
+        If there is no hand, or the image does not show the whole hand.
     ValueError
         If `roi_px` does not overlap the image.
     """
@@ -51,9 +51,9 @@ def segment_hand(frame: Frame, settings: SegmentSettings, roi_px: Box | None = N
 
 
 def segmented_window(roi_px: Box | None, camera: Intrinsics, settings: SegmentSettings) -> Box:
-    """Return the part of the depth image that `segment_hand` looks at.
+    """Return the part of the depth image that `segment_hand` examines.
 
-    It lies on the coarse grid of the whole image, so that the same hand is found in both.
+    It is aligned with the coarse grid of the whole image, so that both give the same hand.
     """
     if roi_px is None:
         return 0, 0, camera.width, camera.height
@@ -72,7 +72,7 @@ def _coarse_step_px(camera: Intrinsics) -> int:
 
 
 def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud:
-    """Choose points of the masked hand and measure them."""
+    """Select points of the masked hand and compute their coordinates."""
     view = hand.view
     flying_behind = round(settings.flying_m / view.scale_m)
     good = hand.surface & (behind_nearest(view.depth, hand.surface, 5) <= flying_behind)
@@ -101,7 +101,7 @@ def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud
 
 
 def _even_choice(shape: tuple[int, ...], fraction: float) -> Bool:
-    """Choose a fraction of an image's pixels, evenly.
+    """Select an evenly spread fraction of an image's pixels.
 
     Thresholds a rank-1 lattice: Roberts, "The unreasonable effectiveness of quasirandom
     sequences", 2018 (R2), in 16-bit fractions.
@@ -113,7 +113,7 @@ def _even_choice(shape: tuple[int, ...], fraction: float) -> Bool:
 
 
 def _widened(mask: Bool, by_px: int) -> Bool:
-    """Widen a mask by a square of that half side."""
+    """Dilate a mask by a square with the given half side."""
     square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
     return cv2.dilate(mask.astype(np.uint8), square).astype(bool)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-# About: fewer cannot be registered, and more than 50,000 not be sent to the headset.
+# Fewer points cannot be registered; more than 50,000 cannot be sent to the headset.
 _LEAST_POINTS, _MOST_POINTS = 200, 40_000
 
 Roi = Literal["detector", "left", "right", "depth"]
@@ -13,7 +13,7 @@ Roi = Literal["detector", "left", "right", "depth"]
 
 @dataclass(frozen=True, slots=True)
 class SegmentSettings:
-    """How a hand is segmented.
+    """Settings of the segmentation of the hand.
 
     Raises
     ------
@@ -22,27 +22,27 @@ class SegmentSettings:
     """
 
     roi: Roi = "detector"
-    """Where to look: where the hand detector sees a hand in the colour image, if there is one (of
-    several the nearest, the leftmost or the rightmost), or for the nearest hand-sized thing in the
-    whole depth image."""
+    """Region to search: a hand found by the detector in the colour image (of several, the nearest,
+    leftmost or rightmost), or with "depth" the nearest hand-sized object in the whole depth
+    image."""
     depth_min_m: float = 0.35
     depth_max_m: float = 0.70
-    """Depth gate: within arm's reach and the camera's range (paper, section on segmentation)."""
+    """Depth gate, within arm's reach and the camera's range (paper, section on segmentation)."""
     edge_jump_m: float = 0.02
-    """Neighbouring pixels this far apart in depth belong to different surfaces."""
+    """Depth difference at which neighbouring pixels belong to different surfaces."""
     flying_m: float = 0.01
-    """A point this far behind another two pixels away is taken for a flying pixel."""
+    """A point this far behind another one two pixels away counts as a flying pixel."""
     forearm_m: float = 0.02
-    """How much of the forearm beyond the wrist counts as hand."""
+    """Length of forearm beyond the wrist that counts as hand."""
     cut_band_m: float = 0.004
-    """Points this close to a cut edge are marked as cut."""
+    """Distance from a cut edge within which points are marked as cut."""
     hole_area_m2: float = 1e-4
-    """Holes in the hand up to this size are closed in the mask."""
+    """Largest hole in the hand that is closed in the mask."""
     roi_margin: float = 0.4
-    """By how much a given region of interest is widened on each side, as a share of its size: a
-    detector's box ends at the wrist, but the way the arm leaves tells where the hand ends."""
+    """Margin added on each side of a region of interest, as a share of its size: a detector's box
+    ends at the wrist, but part of the arm is needed to locate the wrist."""
     points: int = 5000
-    """About how many points of the surface are kept."""
+    """Approximate number of points of the cloud."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.depth_min_m < self.depth_max_m:

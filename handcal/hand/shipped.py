@@ -1,4 +1,4 @@
-"""The hand detector that ships with handcal, in the form that this processor runs faster."""
+"""The hand detector shipped with handcal, in the variant that this processor runs faster."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from handcal.io.resources import resource_path
 FLOAT_MODEL, INTEGER_MODEL = "hand_detector.onnx", "hand_detector_int8.onnx"
 
 _RUNS = 5
-_GAIN_MIN = 1.2  # less is not worth the integers' rounding
+_GAIN_MIN = 1.2  # a smaller gain is not worth the rounding of integers
 _IMAGE = np.zeros((720, 1280, 3), np.uint8)
 
 
 def make_finder(settings: SegmentSettings) -> HandFinder:
-    """Return what finds the hand in a camera's frames, as the settings say.
+    """Return a finder of the hand in a camera's frames.
 
-    With the depth image alone where the detector cannot be loaded; ``handcal doctor`` tells why.
+    It uses the depth image alone if the detector cannot be loaded; ``handcal doctor`` says why.
     """
     if settings.roi == "depth":
         return HandFinder(settings)
@@ -35,15 +35,15 @@ def make_finder(settings: SegmentSettings) -> HandFinder:
 
 @cache
 def _shipped() -> HandDetector:
-    """Load the detector once; it remembers no image."""
+    """Load the detector once; it has no state."""
     return load_detector()
 
 
 def load_detector(settings: DetectSettings | None = None) -> HandDetector:
-    """Return the detector in 8-bit integers where that pays, otherwise in 32-bit floats.
+    """Return the detector with 8-bit integers where that is faster, otherwise with 32-bit floats.
 
     Only some processors multiply 8-bit integers faster (x86 with VNNI, recent Arm), so both are
-    tried, which takes half a second.
+    timed, which takes half a second.
 
     Raises
     ------
@@ -53,8 +53,8 @@ def load_detector(settings: DetectSettings | None = None) -> HandDetector:
     floats, integers = (
         HandDetector(resource_path(name), settings) for name in (FLOAT_MODEL, INTEGER_MODEL)
     )
-    # By turns and in processor time, lest other programs decide; the first turn is cold. Sums, as
-    # some systems count that time in steps of 16 ms.
+    # Alternately and in processor time, so that other programs do not decide; the first run is
+    # cold. Sums, because some systems count processor time in steps of 16 ms.
     times_s = [(_seconds(floats), _seconds(integers)) for _ in range(1 + _RUNS)]
     float_s, integer_s = np.sum(times_s[1:], axis=0)
     return integers if float_s > _GAIN_MIN * integer_s else floats

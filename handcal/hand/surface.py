@@ -1,4 +1,4 @@
-"""Depth images as surfaces that end where the depth jumps."""
+"""Surfaces in depth images, separated by depth jumps."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _UNMEASURED = np.uint16(65535)
 def solid_surface(depth: UInt16, jump: int) -> Bool:
     """Mark the measured pixels that are not on the far side of a depth jump.
 
-    Of two neighbouring pixels of the surface neither is more than `jump` behind the other, so
-    surfaces at different depths never touch. Flying pixels, which hang between a silhouette and
-    what is behind it, are on its far side.
+    Of two neighbouring pixels of a surface neither is more than `jump` behind the other, so
+    surfaces at different depths never touch. Flying pixels, between a silhouette and its
+    background, are on the far side.
 
     Parameters
     ----------
@@ -34,16 +34,16 @@ def solid_surface(depth: UInt16, jump: int) -> Bool:
 
 
 def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
-    """Return how far each pixel of `surface` is behind the nearest one around it.
+    """Return the distance of each pixel of `surface` behind the nearest one around it.
 
-    Beside the surface the result means nothing.
+    The result is undefined outside the surface.
 
     Parameters
     ----------
     depth : (h, w) uint16
     surface : (h, w) bool
     size_px : int
-        Side of the square looked at around a pixel, odd.
+        Side of the square around each pixel, odd.
     """
     on_surface = _only(depth, surface)
     around = np.ones((size_px, size_px), np.uint8)
@@ -51,7 +51,7 @@ def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
 
 
 def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
-    """Mark the pixels of `surface` beside which `other` goes on: touches it, or hides it.
+    """Mark the pixels of `surface` at which `other` continues: adjoins or occludes it.
 
     Parameters
     ----------
@@ -66,13 +66,13 @@ def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
     (h, w) bool
     """
     nearest_other = cv2.erode(_only(depth, other), NEIGHBOURS)
-    not_behind = cv2.subtract(nearest_other, depth) <= jump  # saturates at 0 for what is nearer
+    not_behind = cv2.subtract(nearest_other, depth) <= jump  # saturates at 0 for nearer pixels
     beside: Bool = surface & not_behind & (nearest_other != _UNMEASURED)
     return beside
 
 
 def _only(depth: UInt16, mask: Bool) -> UInt16:
-    """Return the depth on a mask and _UNMEASURED beside it; np.where takes five times as long."""
+    """Return the depth on a mask, _UNMEASURED elsewhere; five times faster than np.where."""
     return depth | (mask.astype(np.uint16) - np.uint16(1))
 
 
@@ -84,7 +84,7 @@ def on_border(mask: Bool) -> Bool:
 
 
 def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
-    """Return the 8-connected parts of `mask` of at least that area, the largest first."""
+    """Return the 8-connected components of `mask` of at least that area, largest first."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest_first = np.argsort(-areas, kind="stable")
@@ -92,7 +92,7 @@ def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
 
 
 def component_of(mask: Bool, seed: Bool) -> Bool:
-    """Return the 8-connected part of `mask` that a set of neighbouring pixels lies on, if any."""
+    """Return the 8-connected component of `mask` that holds given neighbouring pixels, if any."""
     _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     at_seed = labels[mask & seed]
     part: Bool = labels == at_seed[0] if at_seed.size else np.zeros_like(mask)

@@ -13,8 +13,8 @@ class LinkRates:
 
     lost: float | None
     lost_inbound: float | None
-    """Share of the datagrams to and from the headset that did not arrive, 0 to 1; None if there were
-    none. Losses to the headset are known from its reports, which arrive a moment later."""
+    """Share of the datagrams to and from the headset that did not arrive, 0 to 1; None if none
+    were sent. Losses to the headset are known from its reports, which arrive a moment later."""
     sent_bytes_s: float
     received_bytes_s: float
 

@@ -1,8 +1,8 @@
 """The default solver: register the hand rigidly to get pairs, then fit φ to the pairs.
 
-A hand that comes back turned is a nuisance about the hand, not about the eye. So is a change of
-its apparent size: bones do not grow between two moments, and the prior says so, but where pairs
-are exact the data may overrule it (the paper's own simulated data shrink the hand by 1 - φ3φ4).
+A rotation of the hand between the two moments is a nuisance parameter of the hand, not of the eye.
+So is a change of its apparent size: bones do not grow, and the prior says so, but exact pairs may
+overrule it (the paper's own simulated data shrink the hand by 1 - φ3φ4).
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from handcal.register.rigid import RigidResult, RigidSettings, register_rigid
 from handcal.register.surface import describe_surface, near_cut_edge, nearest
 from handcal.types import Bool, EyeShift, Float64
 
-# One standard deviation of the hand's apparent change of size between cursor and alignment.
+# Standard deviation of the hand's apparent change of size between cursor and alignment.
 _SIZE_SIGMA = 3e-4
-# Pairs are as good as this many independent ones: neighbours share the sensor's error.
+# Effective number of independent pairs: neighbours share the sensor's error.
 _INDEPENDENT_PAIRS = 100.0
 # A pair farther apart than this many medians is an outlier, unless it is within a point spacing.
 _OUTLIER_MEDIANS = 3.0
-# Pairs are sought anew while that lowers their mean square by more than this; on measured clouds
-# once, on exact ones until every point has found its own.
+# Pairs are searched again while that lowers their mean square by more than this: once on measured
+# clouds, on exact ones until every point has found its counterpart.
 _GAIN = 0.01
-# The registration's residuals are not independent; found over 200 simulated alignments.
+# The registration's residuals are not independent; fitted to 200 simulated alignments.
 _REGISTRATION_FACTOR = 4.5
-# No registration is better than this, whatever its residuals say, and of what a turn moves the
-# hand, this share goes astray in every direction.
+# Lower bound of a registration's error, whatever its residuals say, and the share of the hand's
+# movement by a rotation that becomes an error in every direction.
 _LEAST_SIGMA_M = 5e-5
 _TURNED_SHARE = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandMatch:
-    """Cursor and hand registered rigidly, whichever the eye."""
+    """Cursor and hand registered rigidly; the same for both eyes."""
 
     cursor_m: Float64
     hand_m: Float64
@@ -49,7 +49,7 @@ class HandMatch:
     spacing_m: float
     """Distance between neighbours in the thinned cursor."""
     tree: cKDTree
-    """Of the cursor."""
+    """Surface of the cursor."""
     rigid: RigidResult
     """Its target is the cursor, its source the hand."""
 
@@ -87,7 +87,7 @@ def fit_match(
     distance_m : float
         z(C0→S).
     T_drawn : (4, 4) float64, optional
-        Where the cursor was drawn in E if not with the offline calibration: see `model.drawn`.
+        Map to the cursor as drawn, if not with the offline calibration; see `model.drawn`.
     """
     T_cursor = T_E if T_drawn is None else T_drawn @ T_E
     T_back = np.asarray(np.linalg.inv(T_cursor))
@@ -149,11 +149,11 @@ def _covariance(
     hand_m: Float64,
     distance_m: float,
 ) -> Float64:
-    """Covariance of φ from what is uncertain about the hand's displacement at its centroid.
+    """Return the covariance of φ from the uncertainty of the hand's displacement at its centroid.
 
-    Two parts: the registration's own, and, where the hand came back turned by R, the unknown
-    point it turned about, which may be any of the hand's: it moves the centroid by (I - R) times
-    its distance.
+    It has two parts: the registration's own, and, if the hand returned rotated by R, the unknown
+    centre of that rotation, which may be any point of the hand and moves the centroid by (I - R)
+    times its distance.
     """
     rigid_fit = match.rigid
     scatter = np.linalg.inv(rigid_fit.information)[3:, 3:]

@@ -1,4 +1,4 @@
-"""The rotation guard: how far the live hand is turned against the cursor, at camera rate."""
+"""The rotation guard: the rotation from the cursor to the live hand, at camera rate."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 # Mean error with 1.5 mm of noise 0.7° in a few milliseconds, and 0.4° in twice the time.
 _LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
 _ONCE = RigidSettings(max_points=800, max_interior=400, tolerance_m=3e-4)
-# Begun near its end a registration may stop sooner: mean error 0.55° instead of 0.52°.
+# A registration that starts near its end may stop sooner: mean error 0.55° instead of 0.52°.
 _FOLLOWED_TOLERANCE_M = 1e-3
-# A hand that fits this much worse than the last one found from scratch may have been lost.
+# A hand that fits this much worse than after the last full registration may have been lost.
 _LOST = 2.0
 
-# What turns a hand back: about each of D's axes, in the positive and in the negative sense. It is
-# held up before the wearer, who looks as the camera does: x right, y down, z away.
+# Advice for turning the hand back about each of D's axes, in the positive and negative sense. The
+# wearer looks the same way as the camera: x right, y down, z away.
 _ADVICE: dict[Axis, tuple[str, str]] = {
     "x": ("Tip your fingers toward you", "Tip your fingers away from you"),
     "y": (
@@ -40,7 +40,7 @@ _ADVICE: dict[Axis, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class GuardSettings:
-    """When an alignment is refused."""
+    """Limit beyond which an alignment is refused."""
 
     limit_rad: float = float(np.radians(9.0))
     """Largest rotation; 9° in the paper, for its 4 mm line."""
@@ -54,7 +54,7 @@ class RotationGuard:
     cursor_m : (N, 3) float64
     cursor_cut : (N,) bool or None
     settings : RigidSettings
-        The default is quick enough for every frame.
+        The default is fast enough for every frame.
     """
 
     def __init__(
@@ -71,20 +71,20 @@ class RotationGuard:
     def rotation(self, hand_m: Float64, hand_cut: Bool | None = None) -> Float64:
         """Return the rotation vector from the cursor to the hand, (3,), rad.
 
-        Both clouds in the same frame, in whose axes the vector is.
+        Both clouds must be in the same frame; the vector is about its axes.
 
         Raises
         ------
         HandError
-            If hardly a point lies off the cut edges.
+            If nearly all points lie beside cut edges.
         """
         return _rotation(self._register(self._describe(hand_m, hand_cut)))
 
     def follow(self, hand_m: Float64, hand_cut: Bool | None = None) -> Float64:
-        """Return the same of a hand followed from frame to frame, in half the time.
+        """Return the rotation of a hand tracked between frames, in half the time of `rotation`.
 
-        The registration begins where the last hand was, moved as its mean has moved; where that
-        does not fit, from scratch. Raises as `rotation`.
+        The registration starts from the last hand's, moved with its mean; if that does not fit, it
+        starts from scratch. Raises as `rotation`.
         """
         hand = self._describe(hand_m, hand_cut)
         middle_m = hand.points_m.mean(axis=0)
@@ -113,7 +113,7 @@ def _rotation(fit: RigidResult) -> Float64:
 
 
 def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
-    """Return the rotation vector that turns the cursor into the hand.
+    """Return the rotation vector from the cursor to the hand.
 
     Parameters
     ----------
@@ -136,18 +136,18 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
 
 @dataclass(frozen=True, slots=True)
 class TurnAdvice:
-    """How to turn the hand back, about the axis about which it is turned most."""
+    """Advice for turning the hand back about the axis of its largest rotation."""
 
     axis: Axis
-    """Of the depth camera: pitch, yaw, roll of the hand."""
+    """Axis of the depth camera: pitch, yaw, roll of the hand."""
     angle_rad: float
-    """To turn the hand by, right-handed about that axis."""
+    """Rotation to apply, right-handed about that axis."""
     text: str
-    """In words for the wearer, without the angle or a full stop."""
+    """Instruction for the wearer, without the angle or a full stop."""
 
 
 def turn_advice(rotation_rad: ArrayLike) -> TurnAdvice:
-    """Return how to undo a rotation from the cursor to the hand.
+    """Return the advice that undoes a rotation from the cursor to the hand.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The alignment equation in φ: predict the cursor from the hand, and fit φ to given pairs.
+"""The alignment equation in φ: prediction of the cursor from the hand, and fit of φ to pairs.
 
 At alignment the cursor point d and the hand point s, both in E0(t_b), fall on one pixel:
 ``κ d = UQ s``. The paper takes κ = 1 (``exact=False``). A hand does not change its size, so
@@ -19,7 +19,7 @@ from handcal.types import Float64
 
 
 def predict(hand_m: Float64, shift_m: Float64, distance_m: float, *, exact: bool) -> Float64:
-    """Return where the cursor must be for `hand_m` to cover it, (N, 3), all in E0(t_b)."""
+    """Return the cursor points that `hand_m` covers, (N, 3), all in E0(t_b)."""
     update = drawn if exact else update_matrix
     return transform(update(shift_m, distance_m), hand_m)
 
@@ -27,8 +27,8 @@ def predict(hand_m: Float64, shift_m: Float64, distance_m: float, *, exact: bool
 def drawn(shift_m: Float64, distance_m: float) -> Float64:
     """Return the (4, 4) affine map of E that puts a cursor where a projection with φ draws it.
 
-    The equation above is for a cursor drawn with the offline calibration. Drawn with another φ,
-    it looks to the offline calibration like a cursor moved so, of the same size.
+    The equation above is for a cursor drawn with the offline calibration. A cursor drawn with
+    another φ is equivalent to one moved by this map, of the same size.
     """
     T = update_matrix(shift_m, distance_m)
     T[:3] /= 1.0 - shift_m[2] / distance_m
@@ -50,7 +50,7 @@ def design(cursor_m: Float64, hand_m: Float64, distance_m: float, *, exact: bool
 
 
 def fit_shift(cursor_m: Float64, hand_m: Float64, distance_m: float, *, exact: bool) -> Float64:
-    """Return the least-squares φ, (3,), for known pairs: the floor that no solver can pass.
+    """Return the least-squares φ, (3,), for known pairs: the lower bound of every solver's error.
 
     Parameters
     ----------

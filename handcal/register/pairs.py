@@ -1,4 +1,4 @@
-"""Which points of cursor and hand belong together, quickly enough to be drawn live."""
+"""Pairs of cursor and hand points, found fast enough for a live display."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def matched_pairs(
     cursor_is_cut: Bool,
     count: int = 300,
 ) -> Pairs:
-    """Pair points of the hand with those of the cursor that they lie on once laid over it.
+    """Pair points of the hand with their nearest cursor points after a registration.
 
-    The guard has found the rotation, so only the translation is sought: a coarse registration for
-    the eye. What is solved from has its own (`handcal.register.consistent`).
+    The rotation is known from the guard, so only the translation is estimated: a coarse
+    registration for display. The solver has its own (`handcal.register.consistent`).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def matched_pairs(
     cursor_is_cut : (N,) bool
         Points beside a cut edge; pairs that end there are left out, as are outliers.
     count : int
-        Points of the hand that a partner is sought for.
+        Number of hand points to pair.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Rotation-constrained ICP as published, and its three-row form; and plain ICP, the baseline.
+"""Rotation-constrained ICP as published, its three-row form, and plain ICP as the baseline.
 
-All three pair each hand point with its nearest cursor point, start with the means on one
-another, and know nothing of cuts, outliers or a rotated hand. They are here to be compared with.
+All three pair each hand point with its nearest cursor point, start from coinciding means, and
+ignore cuts, outliers and rotations of the hand. They serve for comparison.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from handcal.types import Float64
 
 Checkpoint: TypeAlias = Callable[[], object]
 MAX_ITERATIONS = 800
-# The paper stops when the error falls by less than this factor from one iteration to the next.
+# The paper stops when the ratio of successive errors exceeds this value.
 PAPER_RATIO = 0.9999
-# Where pairs coincide to a nanometre the error is rounding, whose ratio tells nothing.
+# Pairs that coincide to a nanometre leave only rounding errors, whose ratio is meaningless.
 _EXACT_M2 = 1e-18
-# The three-row form and ICP reach the state where no pair changes any more.
+# The three-row form and ICP stop when no pair changes any more.
 TOLERANCE_M = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Iterated:
-    """What an iteration ended with: φ, the moved hand, its partners, and why it stopped."""
+    """The end of an iteration: φ, the moved hand, its partners and the reason for stopping."""
 
     shift_m: Float64
     moved_m: Float64
@@ -52,7 +52,7 @@ def solve_paper(
     distance_m : float
         z(C0→S).
     checkpoint : callable
-        Called before each iteration; whatever it raises ends the solving.
+        Called before each iteration; any exception it raises ends the solving.
     """
     phi_4 = 1.0 / distance_m
     tree = cKDTree(cursor_m)
@@ -86,7 +86,7 @@ def solve_paper(
 def solve_linear(
     cursor_m: Float64, hand_m: Float64, distance_m: float, checkpoint: Checkpoint = lambda: None
 ) -> Iterated:
-    """Solve the paper's model with all three rows of each pair; arguments as `solve_paper`."""
+    """Solve the paper's model with all three rows of each pair; parameters as in `solve_paper`."""
     tree = cKDTree(cursor_m)
     shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
     moved = hand_m - shift_m
@@ -107,9 +107,10 @@ def solve_linear(
 def solve_icp(
     cursor_m: Float64, hand_m: Float64, checkpoint: Checkpoint = lambda: None
 ) -> Iterated:
-    """Solve rigidly, point to point (Besl & McKay 1992), and read φ off the translation.
+    """Register rigidly, point to point (Besl & McKay 1992), and read φ from the translation.
 
-    UQ's translation is -φ at E's origin; the paper compares with this. Arguments as `solve_paper`.
+    UQ's translation is -φ at E's origin. This is the paper's baseline. Parameters as in
+    `solve_paper`.
     """
     tree = cKDTree(cursor_m)
     T = rigid(translation_m=cursor_m.mean(axis=0) - hand_m.mean(axis=0))

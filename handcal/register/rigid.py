@@ -1,11 +1,11 @@
 """Rigid registration of two hand clouds that are cut and sampled differently.
 
-A hand seen from one side is a sheet. Inside it, nearest neighbours tell only how far the sheets
-lie apart along their normals; how far they have slid over one another shows at the outline alone.
-So interior pairs are weighed along the normal and outline pairs in full, which converges in about
-ten Gauss-Newton steps where point-to-point ICP needs a hundred (see docs/registration.md).
-Pairs are sought from both sides, so that the inward pull of nearest neighbours at an outline
-cancels, and pairs that end on a cut edge are dropped: there the hand goes on.
+A hand seen from one side is a sheet. In its interior, nearest neighbours measure only the distance
+of the sheets along their normals; sliding shows only at the outline. So interior pairs count along
+the normal and outline pairs in full, which converges in about ten Gauss-Newton steps where
+point-to-point ICP needs a hundred (see docs/registration.md). Pairs are searched from both clouds,
+so that the inward bias of nearest neighbours at an outline cancels, and pairs that end on a cut
+edge are dropped, because the hand continues there.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from handcal.types import Float64
 
 @dataclass(frozen=True, slots=True)
 class RigidSettings:
-    """How to register rigidly."""
+    """Settings of the rigid registration."""
 
     max_points: int = 1500
-    """Each cloud is thinned to this many."""
+    """Number of points to which each cloud is thinned."""
     max_interior: int = 500
-    """Points off the outline used from each side at every step."""
+    """Interior points used from each cloud in every step."""
     max_iterations: int = 40
     tolerance_m: float = 3e-5
-    """Stop when a step moves no point of the hand by more than this."""
+    """The iteration stops when a step moves no point of the hand by more than this."""
     outlier_m: float = 0.004
-    """Distance at which an outline pair counts a quarter (Geman-McClure), once most pairs lie
-    closer than a third of it."""
+    """Distance at which an outline pair has a weight of one quarter (Geman-McClure), once most
+    pairs are closer than a third of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class RigidResult:
     T_target_source: Float64
     """(4, 4)."""
     information: Float64
-    """(6, 6); gauss-Newton matrix at the end, for a rotation (rad) about the source's centroid and
+    """(6, 6); final Gauss-Newton matrix for a rotation (rad) about the source's centroid and
     a translation (m), for residuals of unit variance."""
     history_m2: Float64
     """(iterations,); weighted mean squared residual at each iteration."""
@@ -65,7 +65,7 @@ def register_rigid(
         From `describe_surface`.
     settings : RigidSettings
     T_start : (4, 4) float64, optional
-        T_target_source to begin with; by default their means lie on one another.
+        Initial T_target_source; by default the means coincide.
     """
     offset_m = target.points_m.mean(axis=0) - source.points_m.mean(axis=0)
     T_target_source = rigid(translation_m=offset_m) if T_start is None else T_start
@@ -93,7 +93,7 @@ def register_rigid(
 def _step(
     source: Surface, target: Surface, T_target_source: Float64, settings: RigidSettings
 ) -> tuple[Float64, Float64, float, Float64]:
-    """One Gauss-Newton step: the new transform, its information, mean squared residual, step."""
+    """Take one Gauss-Newton step; return transform, information, mean squared residual, step."""
     R = T_target_source[:3, :3]
     moved = transform(T_target_source, source.points_m)
     outward = source.outward @ R.T
@@ -131,7 +131,7 @@ def _outline_pairs(
     outward: Float64,
     settings: RigidSettings,
 ) -> tuple[Indices, Indices, Float64, Float64]:
-    """Pairs of outline points sought from both sides: both indices, mean outward, weights."""
+    """Return pairs of outline points found from both clouds: indices, mean outward, weights."""
     if not (len(source.outline) and len(target.outline)):
         none = np.empty(0, dtype=np.intp)
         return none, none, np.empty((0, 3)), np.empty(0)
@@ -158,7 +158,7 @@ def _interior_pairs(
     R: Float64,
     settings: RigidSettings,
 ) -> tuple[Indices, Indices, Float64]:
-    """Pairs of any points sought from both sides: source and target indices, target normals."""
+    """Return pairs found from both clouds: source and target indices, target normals."""
     count = settings.max_interior
     _, i_1 = nearest(target.tree, moved[:count])
     keep_1 = ~target.near_cut[i_1]

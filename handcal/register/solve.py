@@ -1,4 +1,4 @@
-"""One call for every solver: two clouds in, an eye shift out."""
+"""The solvers behind one interface: two clouds in, an eye shift out."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def solve_eye_shift(
         World to E at t_b.
     method : {"consistent", "paper", "linear", "icp"}
         ``paper``: Hu et al. 2021 as published. ``linear``: its model, all three rows of each
-        pair. ``consistent``: exact factor, and robust to cuts, sampling and a turned hand.
-        ``icp``: rigid, the paper's baseline. ``consistent`` also knows the eye box, as a wide
-        prior, which matters only where the alignment says little, as with a much turned hand.
+        pair. ``consistent``: exact factor, robust to cuts, sampling and a rotated hand.
+        ``icp``: rigid, the paper's baseline. ``consistent`` also has the eye box as a wide
+        prior, which matters only for weak alignments, as with a strongly rotated hand.
     cursor_cut, hand_cut : (N,), (M,) array_like of bool, optional
-        Points beside a cut edge, where the hand or arm goes on beyond the cloud. Only
-        ``consistent`` uses them.
+        Points beside a cut edge, where the hand or arm continues beyond the cloud. Used only by
+        ``consistent``.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def solve_eye_shift(
         For an unknown method, wrong shapes, fewer than 100 points, NaN or infinity, points on
         one line, or a distance that is not positive.
     HandError
-        If hardly a point lies off the cut edges.
+        If nearly all points lie beside cut edges.
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
@@ -82,16 +82,16 @@ def solve_alignment(
 ) -> Mapping[Eye, EyeShift]:
     """Solve every eye that took part in an alignment.
 
-    ``consistent`` registers the hand once for both eyes: its motion is the same for either. It
-    adds no prior: that is `fuse_alignments`'. The other methods may take seconds, and call
-    `checkpoint` before each iteration: whatever it raises ends the solving.
+    ``consistent`` registers the hand once for both eyes, as its motion is the same for either. It
+    adds no prior; `fuse_alignments` does. The other methods may take seconds and call `checkpoint`
+    before each iteration; any exception it raises ends the solving.
 
     Raises
     ------
     ValueError
-        For a cloud or pose that `solve_eye_shift` would refuse, or no eye.
+        For a cloud or pose that `solve_eye_shift` refuses, or no eye.
     HandError
-        If hardly a point lies off the cut edges.
+        If nearly all points lie beside cut edges.
     """
     check_cloud("cursor_m", alignment.cursor_m)
     check_cloud("hand_m", alignment.hand_m)
@@ -117,7 +117,7 @@ def solve_alignment(
 
 
 def check_cloud(name: str, points_m: ArrayLike) -> Float64:
-    """Return `points_m` as (N, 3) float64, or raise ValueError that names what is wrong."""
+    """Return `points_m` as (N, 3) float64; ValueError names the fault."""
     cloud = np.asarray(points_m, dtype=np.float64)
     if cloud.ndim != 2 or cloud.shape[1] != 3:
         raise ValueError(f"{name} must have shape (N, 3), got {cloud.shape}")
@@ -155,10 +155,10 @@ def _solve_baseline(
     method: Method,
     checkpoint: Checkpoint = lambda: None,
 ) -> EyeShift:
-    """Solve by one of the published ways, in E0(t_b).
+    """Solve by one of the published methods, in E0(t_b).
 
-    The covariance is plain least squares with independent pairs, which is optimistic, as it is
-    for every ICP (Censi 2007): only ``consistent`` claims more.
+    The covariance is that of least squares with independent pairs, which is optimistic for every
+    ICP (Censi 2007); only ``consistent`` does better.
     """
     if method == "icp":
         ended = solve_icp(cursor_m, hand_m, checkpoint)

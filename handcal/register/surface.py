@@ -1,4 +1,4 @@
-"""What registration needs to know of a hand cloud: normals, outline and cut edges."""
+"""Local shape of a hand cloud for registration: normals, outline and cut edges."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _EDGE_NONE, _EDGE_FULL = 0.45, 0.75
 _CUT_BAND_SPACINGS = 1.5
 # The 4th neighbour lies one spacing off on a grid and 1.09 in a random cloud.
 _SPACING_NEIGHBOUR = 4
-# Points off the cut edges, without which there is nothing to register.
+# Least number of points away from cut edges for a registration.
 _LEAST_FREE = 10
 
 
@@ -35,13 +35,13 @@ class Surface:
     normals: Float64
     """(N, 3); unit normals, sign undefined."""
     outward: Float64
-    """(N, 3); unit tangent away from the neighbours: on the outline, out of the hand."""
+    """(N, 3); unit tangent away from the neighbours; on the outline it points out of the hand."""
     near_cut: Bool
     """(N,); within a few point spacings of a cut edge."""
     outline: Indices
     """(M,); indices of the points on the silhouette, cut edges excluded."""
     outline_weight: Float64
-    """(M,); 0..1, how surely each lies on the silhouette."""
+    """(M,); confidence that each lies on the silhouette, 0 to 1."""
     tree: cKDTree
     outline_tree: cKDTree
     """Of `points_m` and of its outline."""
@@ -56,14 +56,14 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
     ----------
     points_m : (N, 3) float64
     is_cut : (N,) bool or None
-        True beside a cut edge; None if nothing is known of cuts.
+        True beside a cut edge; None if cuts are unknown.
     max_points : int
         The thinning is random with a fixed seed, so that equal input gives equal output.
 
     Raises
     ------
     HandError
-        If hardly a point lies off the cut edges.
+        If nearly all points lie beside cut edges.
     """
     order = np.random.default_rng(0).permutation(len(points_m))
     thinned = points_m[order[:max_points]]
@@ -102,7 +102,7 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
 def near_cut_edge(
     points_m: Float64, cloud_m: Float64, is_cut: Bool | None, spacing_m: float
 ) -> Bool:
-    """Tell which of (N, 3) points lie so near a cut edge of a cloud that pairs would be false.
+    """Return which of (N, 3) points are too near a cut edge of a cloud for valid pairs.
 
     Parameters
     ----------

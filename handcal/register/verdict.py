@@ -1,4 +1,4 @@
-"""Whether a solved eye shift may be used: accept, repeat the alignment, or implausible."""
+"""The verdict on a solved eye shift: accept, repeat the alignment, or implausible."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Float64, Rig, Verdict
 
 @dataclass(frozen=True, slots=True)
 class VerdictSettings:
-    """Limits."""
+    """Limits of the verdict."""
 
     eye_box_m: float = 0.020
     """Longest plausible φ."""
@@ -22,8 +22,8 @@ class VerdictSettings:
     eye_distance_max_m: float = 0.080
     """Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm)."""
     error_max_arcmin: float = 15.0
-    """Largest error to expect in the display. Published methods leave medians of 10 to 17′ (paper,
-    its table of reprojection errors)."""
+    """Largest expected error in the display. Published methods have medians of 10 to 17′ (paper,
+    table of reprojection errors)."""
     rms_max_m: float = 0.005
     inlier_ratio_min: float = 0.6
 
@@ -49,9 +49,9 @@ def judge(
 
 
 def expected_error_arcmin(display: EyeDisplay, shift: EyeShift) -> float:
-    """Return the root mean square error to expect from φ's covariance, in arcmin.
+    """Return the root mean square error expected from φ's covariance, in arcmin.
 
-    At the corners of the user test's target at half a metre.
+    Evaluated at the corners of the user test's target at half a metre.
     """
     corners_m = target_corners_m(0.5)
 

@@ -37,7 +37,7 @@ _ROI_HELP = (
     "How the hand is found.\n"
     "Colour and depth: the hand detector says where to look first; of several hands\n"
     "the nearest, or the one leftmost or rightmost in the camera's image.\n"
-    "Depth alone: the nearest hand-sized thing."
+    "Depth alone: the nearest hand-sized object."
 )
 _GATE_M = 0.05
 

@@ -76,5 +76,5 @@ def test_without_a_detector_or_colour_depth_decides(frame: Frame) -> None:
 
 def test_says_that_there_is_no_hand(frame: Frame) -> None:
     empty = replace(frame, depth=np.full_like(frame.depth, 1500))
-    with pytest.raises(HandError, match="no hand-sized thing"):
+    with pytest.raises(HandError, match="no hand-sized object"):
         HandFinder(SETTINGS, Eyes((100, 100, 300, 300))).find(empty)

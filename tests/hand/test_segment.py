@@ -170,7 +170,7 @@ def test_hand_at_the_border_is_refused() -> None:
 
 
 def test_nothing_within_the_gate_is_refused(shot: Shot) -> None:
-    with pytest.raises(HandError, match=r"no hand-sized thing between 0\.35 and 0\.70 m"):
+    with pytest.raises(HandError, match=r"no hand-sized object between 0\.35 and 0\.70 m"):
         segment_hand(shoot(at_m=(0.0, 0.02, 0.9)).frame, SETTINGS)
     with pytest.raises(HandError, match="no hand-sized"):
         segment_hand(with_depth(shot.frame, np.zeros_like(shot.frame.depth)), SETTINGS)
