@@ -1,4 +1,4 @@
-"""The interface that every camera offers."""
+"""The interface of all cameras."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Camera(Protocol):
         Raises
         ------
         CameraTimeoutError
-            If none arrived within `timeout_s`; reading again is allowed.
+            If none arrived within `timeout_s`; `read` may be called again.
         CameraEndError
             If a recording has ended.
         CameraError

@@ -1,4 +1,4 @@
-"""When a frame was exposed, on the host's clock."""
+"""Exposure times of frames on the host's clock."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _WINDOW = 300
 class FrameClock:
     """Maps the camera's clock to the host's.
 
-    A frame arrives some time after its exposure, and how long varies with the load. The least
-    delay among the last 300 frames is taken for the camera's own latency. A camera whose time goes
-    back has started anew.
+    A frame arrives after its exposure with a delay that varies with the load. The shortest delay
+    of the last 300 frames is taken as the camera's own latency. A camera whose time runs backward
+    has restarted.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The colour images of a camera with depth, such as a RealSense seeing a calibration board."""
+"""Colour images of a depth camera, such as a RealSense in front of a calibration board."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from handcal.errors import CameraError
 from handcal.types import Frame, UInt8
 
 _MOST_WITHOUT = 30
-"""Frames without colour in a row; cameras pair their first images badly."""
+"""Most consecutive frames without colour; cameras pair their first images badly."""
 
 
 class ColorCamera(ViewpointCamera):
-    """Gives the colour of a camera with depth, and closes that.
+    """Reads the colour images of a depth camera; closing it closes the camera.
 
     Parameters
     ----------
     camera : Camera
-        Open; its images' times are the camera's own.
+        An open camera, on whose clock the images' times are.
     tell : callable
-        Given the first frame with colour, which says where the depth imager is.
+        Called with the first frame with colour, which gives the pose of the depth imager.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class ColorCamera(ViewpointCamera):
         self._tell: Callable[[Frame], object] | None = tell
 
     def read(self) -> tuple[UInt8, int]:
-        """Return the next colour image and its time; CameraTimeoutError if none came soon."""
+        """Return the next colour image and its time; CameraTimeoutError if none arrives in time."""
         for _ in range(_MOST_WITHOUT):
             frame = self._camera.read()
             if frame.color is not None:
@@ -40,7 +40,7 @@ class ColorCamera(ViewpointCamera):
                     self._tell(frame)
                     self._tell = None
                 return frame.color, frame.t_camera_ns
-        raise CameraError(f"{self.name} gives no colour, which boards are seen by")
+        raise CameraError(f"{self.name} delivers no colour images, in which boards are found")
 
     def close(self) -> None:
         """Close the camera."""

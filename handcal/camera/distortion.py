@@ -1,4 +1,4 @@
-"""The lens models of librealsense as OpenCV's coefficients."""
+"""Conversion of librealsense's lens models to OpenCV's coefficients."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _LARGEST_ERROR_PX = 0.25
 
 
 def opencv_distortion(camera: Any) -> tuple[float, ...]:
-    """Return k1, k2, p1, p2, k3 of OpenCV for the intrinsics of an SDK stream; empty without any.
+    """Return OpenCV's k1, k2, p1, p2, k3 for an SDK stream; empty without distortion.
 
-    Only Brown-Conrady is OpenCV's own model. RealSense colour is labelled "inverse Brown-Conrady"
-    and described as undistorting, but what librealsense computes with it, and aligns depth to
-    colour by, is a distortion. So the coefficients are fitted to librealsense's own projection,
-    linearly, at rays all over the image.
+    Only Brown-Conrady is a model of OpenCV. RealSense colour is labelled "inverse Brown-Conrady"
+    and documented as undistorting, but librealsense uses it as a distortion, also to align depth to
+    colour. So the coefficients are fitted to librealsense's own projection, linearly, at rays
+    across the image.
 
     Raises
     ------
     CameraError
-        If no coefficients come within 0.25 px of librealsense's projection.
+        If no coefficients agree with librealsense's projection within 0.25 px.
     """
     if not any(camera.coeffs):
         return ()
@@ -36,17 +36,17 @@ def opencv_distortion(camera: Any) -> tuple[float, ...]:
     coefficients, error_px = _fit(camera.model, pinhole, tuple(camera.coeffs))
     if error_px > _LARGEST_ERROR_PX:
         raise CameraError(
-            f"this camera's lens model, {camera.model.name}, is not one that OpenCV has: "
-            f"the nearest is {error_px:.1f} px off; choose another camera"
+            f"this camera's lens model, {camera.model.name}, is unknown to OpenCV: "
+            f"the best fit is {error_px:.1f} px off; choose another camera"
         )
     return coefficients
 
 
-@lru_cache(maxsize=16)  # every frame asks again
+@lru_cache(maxsize=16)  # called for every frame
 def _fit(
     model: Any, pinhole: tuple[int, int, float, float, float, float], coeffs: tuple[float, ...]
 ) -> tuple[tuple[float, ...], float]:
-    """Return the coefficients nearest to a lens model, and their largest error in pixels."""
+    """Return the best-fitting coefficients of a lens model, and their largest error in pixels."""
     rs = librealsense()
     camera = rs.intrinsics()
     camera.width, camera.height, camera.fx, camera.fy, camera.ppx, camera.ppy = pinhole
@@ -66,7 +66,7 @@ def _fit(
 
 
 def _displacements(rays: Float64) -> Float64:
-    """Return how far each coefficient moves (N, 2) rays in the image plane: (2N, 5), x before y."""
+    """Return the derivatives of (N, 2) rays by the coefficients: (2N, 5), x before y."""
     x, y = rays.T
     r2 = x * x + y * y
     along_x = [x * r2, x * r2**2, 2 * x * y, r2 + 2 * x * x, x * r2**3]

@@ -1,4 +1,4 @@
-"""Frames from a camera that may be unplugged and come back."""
+"""Frames from a camera that may be unplugged and plugged in again."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ _RATE_WINDOW_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class CameraStatus:
-    """How the camera does."""
+    """The state of a camera feed."""
 
     name: str
     problem: str = ""
-    """Why no frames come, and what to do; empty while they come."""
+    """Reason for missing frames, and what to do; empty while frames arrive."""
     rate_hz: float = 0.0
-    """Frames over the last second."""
+    """Number of frames in the last second."""
     dropped: int = 0
-    """Frames missing in the camera's own count since it was opened."""
+    """Frames missing from the camera's own count since it was opened."""
 
 
 @dataclass(frozen=True, slots=True)
 class FeedSettings:
-    """How patient a feed is."""
+    """Timeouts and retry intervals of a camera feed."""
 
     read_s: float = 0.2
-    """Longest time that `CameraFeed.read` takes."""
+    """Longest duration of `CameraFeed.read`."""
     silent_s: float = 1.0
-    """A camera silent for so long has a problem."""
+    """Time without a frame after which a problem is reported."""
     reopen_s: float = 1.0
     """Time between attempts to open a camera that failed."""
 
 
 class CameraFeed(Closable):
-    """Reads a camera, opening it again when it fails, until a recording ends.
+    """Reads a camera and reopens it when it fails, until a recording ends.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class CameraFeed(Closable):
 
     @property
     def status(self) -> CameraStatus:
-        """How the camera does."""
+        """The present state of the feed."""
         oldest_s = time.monotonic() - _RATE_WINDOW_S
         while self._arrived_s and self._arrived_s[0] < oldest_s:
             self._arrived_s.popleft()
@@ -75,7 +75,7 @@ class CameraFeed(Closable):
         return CameraStatus(self._name, self._problem, rate_hz, self._dropped)
 
     def read(self) -> Frame | None:
-        """Return the next frame, or None if none came soon; `status` says why."""
+        """Return the next frame, or None if none arrives in time; `status` says why."""
         try:
             if self._camera is None:
                 self._open()
@@ -98,7 +98,7 @@ class CameraFeed(Closable):
         return frame
 
     def close(self) -> None:
-        """Close the camera; reading opens it again, unless it has ended."""
+        """Close the camera; `read` opens it again, unless a recording has ended."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None

@@ -1,6 +1,6 @@
-"""Recordings as a folder that any program can read: PNG images, and JSON and CSV beside them.
+"""Recordings as folders that any program can read: PNG images with JSON and CSV files.
 
-A folder is whole at any time: a frame is listed once its images are written.
+A folder is complete at any time, because a frame is listed after its images are written.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _MAX_LIST_BYTES = 8 * 2**20
 _REACH_M = 1.0
 _WRITERS = min(4, os.cpu_count() or 1)
 _MOST_WAITING = 8
-# Little compression: it takes most of the time as it is.
+# Low compression, as compressing takes most of the time.
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
@@ -57,13 +57,13 @@ class FolderCamera(PlayedCamera):
     Parameters
     ----------
     folder : Path
-        As `record_folder` writes it.
+        A folder written by `record_folder`.
     settings : PlaybackSettings
 
     Raises
     ------
     CameraError
-        If it is no such folder, or of an unknown version.
+        If it is not such a folder, or its version is unknown.
     """
 
     def __init__(self, folder: Path, settings: PlaybackSettings | None = None) -> None:
@@ -72,7 +72,7 @@ class FolderCamera(PlayedCamera):
         self._folder = folder
         self._place = 0
         if not (folder / DESCRIPTION).is_file():
-            raise CameraError(f"{folder} is no recording: there is no {DESCRIPTION} in it")
+            raise CameraError(f"{folder} is not a recording: it has no {DESCRIPTION}")
         try:
             self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
             self._frames = _read_list(folder / LIST)
@@ -81,7 +81,7 @@ class FolderCamera(PlayedCamera):
 
     def _describe(self, values: dict[str, Any], path: Path) -> None:
         if values.get("handcal_recording") != _VERSION:
-            raise FileError(f"{path} is no handcal recording of version {_VERSION}")
+            raise FileError(f"{path} is not a handcal recording of version {_VERSION}")
         depth, color = values.get("depth"), values.get("color")
         if not isinstance(depth, dict) or not isinstance(color, dict | None):
             raise FileError(f"{path} must describe depth and, unless it is null, color")
@@ -123,27 +123,27 @@ def record_folder(folder: Path, frames: Iterable[Frame]) -> int:
     Parameters
     ----------
     folder : Path
-        Created; it must not hold anything yet.
+        Created if needed; it must be empty.
     frames : iterable of Frame
-        All of one camera: the same intrinsics, depth scale and extrinsics. If the first has
+        Frames of one camera, with the same intrinsics, depth scale and extrinsics. If the first has
         colour, later ones may lack it.
 
     Returns
     -------
     int
-        How many frames were recorded.
+        Number of frames recorded.
 
     Raises
     ------
     FileError
-        If the folder holds something, or cannot be written; what is listed in it is whole.
+        If the folder is not empty or cannot be written; the listed frames are complete.
     ValueError
         If there is no frame, or frames differ in camera.
     """
     first, frames = of_one_camera(frames)
     make_folder(folder)
     if any(folder.iterdir()):
-        raise FileError(f"{folder} is not empty; give a new folder")
+        raise FileError(f"{folder} is not empty; choose a new folder")
     write_json(
         folder / DESCRIPTION,
         {
@@ -161,7 +161,7 @@ def record_folder(folder: Path, frames: Iterable[Frame]) -> int:
 
 
 def _write_frames(folder: Path, frames: Iterable[Frame]) -> int:
-    """Write images in several threads, as compressing them takes longer than a frame lasts."""
+    """Write images in several threads, as compression takes longer than a frame lasts."""
     number = 0
     waiting: deque[tuple[Frame, Future[None]]] = deque()
     with (folder / LIST).open("x", encoding="ascii") as file, ThreadPoolExecutor(_WRITERS) as pool:
@@ -195,12 +195,12 @@ def _png(image: NDArray[Any]) -> bytes:
 
 
 def _image_paths(folder: Path, number: int) -> tuple[Path, Path]:
-    """Return where depth and colour of the frame on a line of the list are, from 1."""
+    """Return the paths of depth and colour for a line of the list, counted from 1."""
     return folder / f"depth-{number:06}.png", folder / f"color-{number:06}.png"
 
 
 def _read_list(path: Path) -> list[_Listed]:
-    """Read the list of frames; an unfinished last line, as after a crash, is left out."""
+    """Read the list of frames; an incomplete last line, as after a crash, is ignored."""
     text = read_limited(path, _MAX_LIST_BYTES).decode("ascii", errors="replace")
     columns, *lines = text.split("\n")[:-1] or [""]
     if columns != _COLUMNS:
@@ -208,7 +208,7 @@ def _read_list(path: Path) -> list[_Listed]:
     try:
         return [_listed(*map(int, line.split(","))) for line in lines]
     except (TypeError, ValueError) as error:
-        raise FileError(f"{path} must hold three whole numbers a line, of 64 bits") from error
+        raise FileError(f"{path} must hold three 64-bit whole numbers on each line") from error
 
 
 def _listed(index: int, t_camera_ns: int, has_color: int) -> _Listed:

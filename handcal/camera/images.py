@@ -1,4 +1,4 @@
-"""Frames from image files, with the camera's intrinsics as JSON."""
+"""Frames read from image files, with the camera's intrinsics as JSON."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from handcal.io.images import MAX_SIDE_PX, read_image
 from handcal.types import Frame, Intrinsics, UInt8, UInt16
 
 DEPTH_SCALES_M = 1e-6, 0.1
-"""Least and largest metres per unit of depth that make sense."""
+"""Least and largest plausible depth scale, metres per unit."""
 DISTORTION_COUNTS = 0, 4, 5, 8, 12, 14
-"""How many coefficients OpenCV's lens models have."""
+"""Numbers of coefficients of OpenCV's lens models."""
 
 
 def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
@@ -29,7 +29,7 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
     color : Path
         PNG or JPEG, 8 bits per channel.
     depth : Path
-        16-bit grey PNG of the same size, 0 where there is no measurement.
+        16-bit grey PNG of the same size; 0 where there is no measurement.
     intrinsics : Path
         JSON with ``width``, ``height``, ``fx``, ``fy``, ``cx``, ``cy`` in pixels and
         ``depth_scale`` in metres per unit of depth.
@@ -37,7 +37,7 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
     Raises
     ------
     FileError
-        If a file is missing, malformed, too large, or they do not belong together.
+        If a file is missing, malformed or too large, or if the files do not match.
     """
     values = read_json(intrinsics)
     camera = intrinsics_from(values, intrinsics)
@@ -57,12 +57,12 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
 
 
 def intrinsics_from(values: dict[str, Any], path: Path) -> Intrinsics:
-    """Return a camera from JSON values: width, height, fx, fy, cx, cy, and distortion if any.
+    """Return intrinsics from JSON values: width, height, fx, fy, cx, cy, optionally distortion.
 
     Raises
     ------
     FileError
-        If one is missing or nonsense; it names `path`, where they come from.
+        If a value is missing or implausible; the message names `path`.
     """
     width, height = (number_from(values, path, key, 1, MAX_SIDE_PX) for key in ("width", "height"))
     if width != int(width) or height != int(height):
@@ -86,7 +86,7 @@ def intrinsics_from(values: dict[str, Any], path: Path) -> Intrinsics:
 
 
 def number_from(values: dict[str, Any], path: Path, key: str, low: float, high: float) -> float:
-    """Return one of JSON values as a number from `low` to `high`; FileError otherwise."""
+    """Return a JSON value as a number from `low` to `high`; FileError otherwise."""
     value = values.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise FileError(f"{path} must give {key} as a number")

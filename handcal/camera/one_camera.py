@@ -1,4 +1,4 @@
-"""Frames to record must all come from one camera, which a recording describes once."""
+"""Check that frames to record come from one camera, as a recording describes only one."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from handcal.types import Frame
 
 
 def of_one_camera(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:
-    """Return the first frame, and an iterator over all of them that checks each.
+    """Return the first frame, and an iterator over all frames that checks each.
 
-    A frame may lack colour that the first has.
+    Later frames may lack colour.
 
     Raises
     ------
     ValueError
-        If there is no frame; from the iterator, if one differs in camera from the first.
+        If there is no frame; from the iterator, if a frame is from another camera.
     """
     remaining = iter(frames)
     first = next(remaining, None)

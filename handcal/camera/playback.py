@@ -1,4 +1,4 @@
-"""What all recordings have in common: their pace, seeking, and starting over."""
+"""Common part of all recordings: pace, seeking and looping."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ _LATE_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class PlaybackSettings:
-    """How a recording is played."""
+    """Settings of playback."""
 
     real_time: bool = False
-    """At the pace it was recorded at, dropping what is read too late; otherwise every frame, as
-    fast as it is read."""
+    """Play at the recorded pace and drop frames that are read too late; otherwise deliver every
+    frame as fast as it is read."""
     loop: bool = False
-    """Begin again at the end; index and time of the frames then go back."""
+    """Restart at the end; index and time of the frames then jump back."""
 
 
 class PlayedCamera(Closable):
-    """Base of cameras that play a recording; implements `Camera.read`.
+    """Base class of cameras that play a recording; implements `Camera.read`.
 
-    A subclass reads the frames one after the other, and goes to one of them by its time.
+    A subclass reads successive frames and seeks to a time.
     """
 
     name: str
@@ -58,9 +58,9 @@ class PlayedCamera(Closable):
         return replace(frame, t_host_ns=time.monotonic_ns())
 
     def seek(self, position_s: float) -> None:
-        """Make the first frame at or after a time since the recording's first frame the next one.
+        """Seek to the first frame at or after a time since the recording's first frame.
 
-        Beyond the end there is none.
+        Beyond the end there is no next frame.
         """
         if not self._is_open:
             raise CameraError(f"{self.name} is closed; open it again")
@@ -81,10 +81,10 @@ class PlayedCamera(Closable):
 
     @abstractmethod
     def _go_to(self, t_camera_ns: int) -> None:
-        """Make the first frame at or after a time the next one."""
+        """Seek to the first frame at or after a time."""
 
     def _take(self, timeout_s: float) -> Frame:
-        """Return the frame kept waiting, or the next, which may be the first again."""
+        """Return the waiting frame or the next, which may be the first again."""
         frame, self._waiting = self._waiting, None
         try:
             frame = frame or self._next(timeout_s)
@@ -99,7 +99,7 @@ class PlayedCamera(Closable):
         return frame
 
     def _early_s(self, frame: Frame) -> float:
-        """Return how long it is until a frame is due, from the first one read at this pace."""
+        """Return the time until a frame is due, counted from the first one read at this pace."""
         now_ns = time.monotonic_ns()
         if self._host_less_camera_ns is None:
             self._host_less_camera_ns = now_ns - frame.t_camera_ns

@@ -32,14 +32,14 @@ _SIZES = ("1280x720", "848x480")
 _RATE_HZ = 30
 _QUEUE_FRAMES = 2
 _Stream: TypeAlias = tuple[Any, Any]
-"""A sensor of the SDK, and the profile of it to run."""
+"""A sensor of the SDK, and the profile to run."""
 
 
 class RealSenseCamera(Closable):
     """Live depth with colour of the same size, at 30 Hz; implements `Camera`.
 
-    Depth is given as measured, not aligned to colour. Written after the SDK's documentation and
-    tested with its software device: it has not been run on a camera.
+    Depth is delivered as measured, not aligned to colour. Written from the SDK's documentation and
+    tested with its software device; not yet run on a camera.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class RealSenseCamera(Closable):
     Raises
     ------
     CameraError
-        If the SDK or the device is missing, in use, or does not offer what the settings say.
+        If the SDK or the device is missing, in use, or does not support the settings.
     """
 
     def __init__(self, settings: RealSenseSettings | None = None) -> None:
@@ -103,7 +103,7 @@ class RealSenseCamera(Closable):
             sensor.start(self._syncer)
 
     def _wait(self, timeout_s: float) -> tuple[Any, Any]:
-        """Return the next depth frame, and the colour frame that the SDK paired with it, if any."""
+        """Return the next depth frame and the colour frame paired with it, if any."""
         deadline_s = time.monotonic() + timeout_s
         while (left_s := deadline_s - time.monotonic()) > 0:
             try:
@@ -118,7 +118,7 @@ class RealSenseCamera(Closable):
 
 
 def _choose_streams(handle: Any, device: Device, wanted: Profile) -> tuple[_Stream, _Stream]:
-    """Return depth and colour, of the largest size wanted that the device offers for both."""
+    """Return depth and colour of the largest requested size that the device offers for both."""
     rs = librealsense()
     offered = {
         (profile.stream_type(), profile.format(), f"{profile.width()}x{profile.height()}"): (
@@ -145,5 +145,5 @@ def _choose_streams(handle: Any, device: Device, wanted: Profile) -> tuple[_Stre
 
 
 def _video(profile: Any) -> Any:
-    """Return a profile as that of images; None for one of motion or pose."""
+    """Return a profile as a video profile; None for motion or pose streams."""
     return profile.as_video_stream_profile() if profile.is_video_stream_profile() else None

@@ -1,4 +1,4 @@
-"""Recordings in librealsense's files, played back by it."""
+"""Playback of librealsense's recordings through librealsense."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _POLL_MS = 100
 _COLOR_TIMEOUT_S = 1.0
 _SKIP_TIMEOUT_S = 10.0
 _SETTLE_S = 0.2
-_ROUNDING_MS = 1e-3  # of the SDK's times, kept as floating-point numbers
+_ROUNDING_MS = 1e-3  # of the SDK's times, which are floating-point numbers
 
 
 def check_recording(path: Path) -> None:
-    """Raise CameraError unless a file begins as librealsense's recordings do."""
+    """Raise CameraError unless a file has the signature of a librealsense recording."""
     if not path.is_file():
         raise CameraError(f"there is no recording {path}")
     try:
@@ -37,16 +37,16 @@ def check_recording(path: Path) -> None:
     except OSError as error:
         raise CameraError(f"cannot read {path}: {error.strerror or error}") from error
     if not begin.startswith(_BEGINNINGS):
-        raise CameraError(f"{path} is no recording; take a .db3 or .bag file of a RealSense")
+        raise CameraError(f"{path} is not a recording; choose a .db3 or .bag file of a RealSense")
 
 
 class RecordingCamera(PlayedCamera):
-    """Plays a recording back, depth with colour if it has any; implements `Camera`.
+    """Plays a recording, depth with colour if it has any; implements `Camera`.
 
-    Depth is given as it was recorded, not aligned to colour, with the colour nearest in time.
-    librealsense keeps the times at which a file was written, not those of the frames, and its own
-    seeking leaves frames queued: so pace and place go by the frames' times, and going back reads
-    from the beginning.
+    Depth is delivered as recorded, not aligned to colour, with the colour nearest in time.
+    librealsense stores the times of writing, not those of the frames, and its own seeking leaves
+    frames queued. So pace and position follow the frames' times, and seeking backward reads from
+    the beginning.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class RecordingCamera(PlayedCamera):
 
 
 class _Playback:
-    """One stream of a recording: librealsense's pairing of several loses frames under load."""
+    """One stream of a recording; librealsense loses frames under load when it pairs several."""
 
     def __init__(self, rs: Any, path: Path, stream: Any) -> None:
         self._name = path.name
@@ -123,7 +123,7 @@ class _Playback:
         config.enable_stream(stream)
         self._device = config.resolve(rs.pipeline_wrapper(self._pipeline)).get_device()
         self._playback = self._device.as_playback()
-        self._playback.set_real_time(False)  # before it starts, or the first frames go by
+        self._playback.set_real_time(False)  # before it starts, or the first frames are lost
         self.profile = self._pipeline.start(config).get_stream(stream)
 
     def recorded_profile(self, stream: Any) -> Any | None:
@@ -151,7 +151,7 @@ class _Playback:
                 raise CameraTimeoutError(f"recording {self._name}: no frame for {timeout_s:g} s")
 
     def skip_to(self, t_ms: float) -> None:
-        """Make the first frame at or after a time the next, if there is one."""
+        """Seek to the first frame at or after a time, if there is one."""
         with suppress(CameraEndError):
             while self._waiting is None:
                 frames = self.read(_SKIP_TIMEOUT_S)
@@ -161,12 +161,12 @@ class _Playback:
         """Stop the pipeline."""
         ended = self._playback.current_status() == self._stopped
         self._pipeline.stop()
-        if not ended:  # its reading thread goes on for a moment, and must not outlive its objects
+        if not ended:  # its reading thread runs on for a moment, and must not outlive its objects
             time.sleep(_SETTLE_S)
 
 
 class _ColorTrack:
-    """The colour images of a recording, each found by its time."""
+    """The colour images of a recording, found by time."""
 
     def __init__(self, playback: _Playback, T_C_D: Float64) -> None:
         self.playback = playback

@@ -1,4 +1,4 @@
-"""Recordings of either kind, librealsense's file or handcal's folder, played and made."""
+"""Opening and writing recordings of both kinds: librealsense's files and folders of images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal.camera.sdk_recorder import record_db3
 from handcal.types import Frame
 
 RECORDING_SUFFIXES = (".db3", ".bag")
-"""Of librealsense's recordings."""
+"""Suffixes of librealsense's recordings."""
 
 
 def open_recording(path: Path, settings: PlaybackSettings | None = None) -> PlayedCamera:
@@ -27,7 +27,7 @@ def open_recording(path: Path, settings: PlaybackSettings | None = None) -> Play
 
 
 def record_frames(path: Path, frames: Iterable[Frame]) -> int:
-    """Record frames as `path` says, a ``.db3`` file or else a folder; return how many they were.
+    """Record frames as a ``.db3`` file or a folder, by the suffix of `path`; return their number.
 
     Raises
     ------

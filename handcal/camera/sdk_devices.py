@@ -1,4 +1,4 @@
-"""The RealSense SDK itself, and what it says of the devices plugged in."""
+"""The RealSense SDK, and the devices that it lists."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from handcal.errors import CameraError
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A RealSense device as the SDK lists it; what it does not tell is empty."""
+    """A RealSense device as listed by the SDK; unknown fields are empty."""
 
     name: str
     serial: str
     firmware: str
     usb: str
-    """As in "3.2"."""
+    """USB version, such as "3.2"."""
     recommended_firmware: str = ""
-    """What this version of the SDK is tested with."""
+    """Firmware recommended by this version of the SDK."""
     temperature_c: float | None = None
-    """Of its processor; None if not told."""
+    """Temperature of its processor; None if unknown."""
 
     @property
     def is_slow(self) -> bool:
-        """Whether it is connected by USB 2, too slow for 1280x720 at 30 Hz."""
+        """True if it is connected by USB 2, which is too slow for 1280x720 at 30 Hz."""
         return self.usb.startswith("2")
 
     @property
     def has_old_firmware(self) -> bool:
-        """Whether its firmware is older than the SDK recommends."""
+        """True if its firmware is older than the SDK recommends."""
         installed, recommended = map(_numbers, (self.firmware, self.recommended_firmware))
         return bool(installed) and installed < recommended
 
@@ -56,19 +56,19 @@ def librealsense() -> Any:
 
 
 def sdk_devices() -> list[Any]:
-    """Return the SDK's own handles of the devices plugged in, without opening any.
+    """Return the SDK's handles of the connected devices, without opening any.
 
     Raises
     ------
     CameraError
-        If the SDK is missing or cannot look.
+        If the SDK is missing or cannot list devices.
     """
     try:
         return _query()
     except RuntimeError as error:
         raise CameraError(
             f"the RealSense SDK cannot list devices: {error}; plug the camera into a USB 3 port "
-            "of the computer itself, as others may give too little power"
+            "of the computer itself, as hubs may give too little power"
         ) from error
 
 
@@ -77,23 +77,23 @@ def _query() -> list[Any]:
 
 
 def connected_devices() -> list[Device]:
-    """Return the devices plugged in, without opening any.
+    """Return the connected devices, without opening any.
 
     Raises
     ------
     CameraError
-        If the SDK is missing or cannot look.
+        If the SDK is missing or cannot list devices.
     """
     return [describe_device(device) for device in sdk_devices()]
 
 
 def describe_device(device: Any) -> Device:
-    """Return what a device of the SDK tells of itself, as far as it answers."""
+    """Return the description of a device, as far as the device answers."""
     rs = librealsense()
     info = rs.camera_info
 
     def ask(what: Any) -> str:
-        with suppress(RuntimeError):  # it may be unplugged just now
+        with suppress(RuntimeError):  # it may have just been unplugged
             return str(device.get_info(what)) if device.supports(what) else ""
         return ""
 
@@ -108,12 +108,12 @@ def describe_device(device: Any) -> Device:
 
 
 def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
-    """Return the device with a serial number, or the first.
+    """Return the device with a serial number, or the first one.
 
     Raises
     ------
     CameraError
-        If it is not among them.
+        If it is not connected.
     """
     if not devices:
         raise CameraError(explain_absence())
@@ -131,7 +131,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _temperature_c(rs: Any, device: Any) -> float | None:
-    with suppress(RuntimeError):  # some tell it only while they stream
+    with suppress(RuntimeError):  # some report it only while streaming
         for sensor in device.query_sensors():
             if sensor.supports(rs.option.asic_temperature):
                 return float(sensor.get_option(rs.option.asic_temperature))

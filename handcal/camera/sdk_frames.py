@@ -1,4 +1,4 @@
-"""What librealsense delivers, live or played back, as handcal's values: the one place for both."""
+"""Conversion of librealsense's frames, live or recorded, to handcal's values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from handcal.types import Float64, Frame, Intrinsics, UInt8
 
 
 def frame_of(depth: Any, intrinsics: Intrinsics) -> Frame:
-    """Return a frame without colour from a depth frame that arrives now."""
+    """Return a frame without colour from a depth frame that has just arrived."""
     return Frame(
         index=depth.get_frame_number(),
         t_camera_ns=round(depth.get_timestamp() * 1e6),
@@ -29,7 +29,7 @@ def frame_of(depth: Any, intrinsics: Intrinsics) -> Frame:
 
 
 def with_color(frame: Frame, color: Any, T_C_D: Float64) -> Frame:
-    """Return `frame` with the image of a colour frame, unless its format is not colour."""
+    """Return `frame` with the image of a colour frame; unchanged if the format is not colour."""
     image = _rgb(color)
     if image is None:
         return frame
@@ -37,7 +37,7 @@ def with_color(frame: Frame, color: Any, T_C_D: Float64) -> Frame:
 
 
 def apart_ms(one: Any, other: Any) -> float:
-    """Return how far apart in time two SDK frames are; infinite if their clocks differ."""
+    """Return the time between two SDK frames; infinite if their clocks differ."""
     if one.get_frame_timestamp_domain() != other.get_frame_timestamp_domain():
         return math.inf
     return abs(float(one.get_timestamp() - other.get_timestamp()))
@@ -49,7 +49,7 @@ def intrinsics_of(profile: Any) -> Intrinsics:
     Raises
     ------
     CameraError
-        If OpenCV has no such lens model.
+        If OpenCV has no matching lens model.
     """
     camera = profile.as_video_stream_profile().get_intrinsics()
     return Intrinsics(

@@ -1,4 +1,4 @@
-"""`RealSenseSettings` put into effect: options of the device, and filters of its depth."""
+"""Application of `RealSenseSettings`: options of the device and filters of its depth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from handcal.errors import CameraError
 
 
 def apply_options(device: Any, settings: RealSenseSettings) -> None:
-    """Set what the settings say on a device of the SDK that does not stream yet.
+    """Apply the settings to a device of the SDK that is not streaming yet.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def apply_options(device: Any, settings: RealSenseSettings) -> None:
 
 
 def depth_filter(settings: RealSenseSettings) -> Callable[[Any], Any]:
-    """Return a function from one depth frame of the SDK to the next, as the settings filter it.
+    """Return a function that filters a depth frame of the SDK by the settings.
 
     Spatial and temporal filters work on the disparity, as the SDK recommends.
     """
@@ -66,7 +66,7 @@ def _set(sensor: Any, option: Any, value: float, what: str, unit: str = "") -> N
     limits = sensor.get_option_range(option)
     if not limits.min <= value <= limits.max:
         raise CameraError(
-            f"{what} goes from {limits.min:g} to {limits.max:g} {unit}".rstrip()
+            f"{what} ranges from {limits.min:g} to {limits.max:g} {unit}".rstrip()
             + f", so {value:g} cannot be set"
         )
     sensor.set_option(option, value)

@@ -1,4 +1,4 @@
-"""Any camera's frames recorded as a file that librealsense plays back."""
+"""Recording of any camera's frames as a file that librealsense plays."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ _DISK_TIMEOUT_S = 10.0
 
 
 def record_db3(path: Path, frames: Iterable[Frame]) -> int:
-    """Record frames of one camera as a ``.db3`` file that librealsense plays back.
+    """Record frames of one camera as a ``.db3`` file that librealsense plays.
 
     Parameters
     ----------
     path : Path
         Ends in ``.db3``; written under another name until complete.
     frames : iterable of Frame
-        All of one camera: the same intrinsics, depth scale and extrinsics. If the first has
+        Frames of one camera, with the same intrinsics, depth scale and extrinsics. If the first has
         colour, later ones may lack it.
 
     Returns
     -------
     int
-        How many frames were recorded.
+        Number of frames recorded.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def _record(path: Path, frames: Iterable[Frame]) -> int:
         outlets[0].profile.register_extrinsics_to(
             outlets[1].profile, _rs_extrinsics(rs, first.T_C_D)
         )
-    recorder = rs.recorder(str(path), device, False)  # compressed it would play at 16 Hz
+    recorder = rs.recorder(str(path), device, False)  # compressed, it would play at only 16 Hz
     sensors = recorder.query_sensors()
     for sensor in sensors:
         sensor.open(sensor.get_stream_profiles())
@@ -103,10 +103,10 @@ class _Outlet:
         self.profile = self.sensor.add_video_stream(video)
 
     def push(self, frame: Frame) -> int:
-        """Hand this stream's image of a frame to the recorder; return its size in bytes."""
+        """Pass this stream's image of a frame to the recorder; return its size in bytes."""
         rs = self._rs
         image = np.ascontiguousarray(frame.depth if self._is_depth else frame.color)
-        # Without its rate, in mHz, the syncer never pairs a frame with another stream's.
+        # Without the rate, in mHz, the syncer never pairs frames of two streams.
         self.sensor.set_metadata(rs.frame_metadata_value.actual_fps, 1000 * _RATE_HZ)
         packet = rs.software_video_frame()
         packet.pixels = image
@@ -122,11 +122,13 @@ class _Outlet:
 
 
 def _wait_for_disk(path: Path, written: int) -> None:
-    """Wait until the recorder, which drops frames over some 250 MB behind, has nearly caught up."""
+    """Wait until the recorder has nearly caught up; it drops frames when 250 MB behind."""
     deadline_s = time.monotonic() + _DISK_TIMEOUT_S
     while written - path.stat().st_size > _BACKLOG_BYTES:
         if time.monotonic() > deadline_s:
-            raise CameraError(f"{path.parent} takes no more data; is the disk full?")
+            raise CameraError(
+                f"{path.parent} accepts no more data; check that the disk is not full"
+            )
         time.sleep(0.001)
 
 

@@ -1,4 +1,4 @@
-"""How a RealSense camera is run."""
+"""Settings of a RealSense camera."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ Preset: TypeAlias = Literal["default", "hand", "high_accuracy", "high_density", 
 
 @dataclass(frozen=True, slots=True)
 class RealSenseSettings:
-    """How a RealSense camera is run; what is None stays as the device has it.
+    """Settings of a RealSense camera; None leaves an option as the device has it.
 
-    Depth is never decimated, since its pixels would no longer be those of the rig's calibration.
+    Depth is never decimated, as its pixels would no longer match the rig's calibration.
     """
 
     serial: str = ""
-    """Of the device; empty takes the first."""
+    """Serial number of the device; empty selects the first."""
     profile: Profile = "auto"
-    """Size of depth and colour, at 30 Hz; auto takes the largest that the device offers."""
+    """Size of depth and colour, at 30 Hz; "auto" selects the largest that the device offers."""
     preset: Preset | None = None
-    """The SDK's visual preset for the depth."""
+    """The SDK's visual preset of the depth sensor."""
     exposure_us: float | None = None
-    """Of the depth, in microseconds; None lets the device choose it from frame to frame."""
+    """Exposure of the depth sensor in microseconds; None for automatic exposure."""
     laser_power_mw: float | None = None
-    """Of the projector."""
+    """Power of the projector."""
     spatial_filter: bool = False
     temporal_filter: bool = False
     hole_filling: bool = False
-    """The SDK's filters of the depth image. They smooth and invent, so they are off."""
+    """The SDK's filters of the depth image; off, as they smooth and fill in depth."""

@@ -1,4 +1,4 @@
-"""RealSense devices on the USB that librealsense does not list, and why."""
+"""RealSense devices on the USB that librealsense does not list, with the reason."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ _L500 = ("0b0d", "0b3d", "0b64", "0b68")
 
 
 def explain_absence(devices: Path = _LISTED_BY_LINUX) -> str:
-    """Say in a line why librealsense lists no camera, and what to do.
+    """Return one line: the reason why librealsense lists no camera, and what to do.
 
-    Only Linux tells what is on the USB; elsewhere the camera is taken to be unplugged.
+    Only Linux lists USB devices; elsewhere the camera is assumed to be unplugged.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def explain_absence(devices: Path = _LISTED_BY_LINUX) -> str:
     ]
     if any(product_id in _L500 for product_id in product_ids):
         return (
-            "a RealSense L515 is connected, which librealsense left after version 2.54; "
+            "a RealSense L515 is connected, which librealsense supports only up to version 2.54; "
             "use a camera of the D400 family"
         )
     if product_ids:

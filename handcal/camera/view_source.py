@@ -1,4 +1,4 @@
-"""Whatever can show a calibration board, opened by what a person calls it."""
+"""Image sources for calibration boards, opened by name."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ def open_view_source(
     playback: PlaybackSettings | None = None,
     tell: Callable[[Frame], object] = lambda _frame: None,
 ) -> ViewpointCamera:
-    """Open what shows a board.
+    """Open an image source.
 
     Parameters
     ----------
     source : str
-        ``realsense``, whose colour is taken; the number of a camera of this computer; or the path
-        of a recording, a video or a folder of images.
+        ``realsense`` for its colour images; the number of a camera of this computer; or the path of
+        a recording, a video or a folder of images.
     realsense : RealSenseSettings, optional
     playback : PlaybackSettings, optional
-        How a recording or video is played.
+        Playback of a recording or video.
     tell : callable
-        Given the first frame of what has depth, too: it says where the depth imager is.
+        Called with the first frame of a source with depth, which gives the depth imager's pose.
 
     Raises
     ------
     CameraError
-        If there is nothing of the kind, or it cannot be opened.
+        If the source does not exist or cannot be opened.
     """
     if source == REALSENSE:
         return ColorCamera(RealSenseCamera(realsense), tell)

@@ -1,4 +1,4 @@
-"""The camera put where the wearer's eye will be, for the offline calibration."""
+"""The viewpoint camera, placed at the wearer's eye position for the offline calibration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_CAMERAS = 10
 
 
 class ViewpointCamera(Closable):
-    """Colour images one after the other; opened by `open_viewpoint`.
+    """A sequence of colour images; opened by `open_viewpoint`.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class ViewpointCamera(Closable):
 
     @abstractmethod
     def read(self) -> tuple[UInt8, int]:
-        """Return the next image, and when it was taken.
+        """Return the next image and its time.
 
         Returns
         -------
@@ -41,7 +41,7 @@ class ViewpointCamera(Closable):
             RGB.
         t_ns : int
             The host's monotonic time for a camera and for images from a folder, both when read;
-            for a video its own time from the beginning.
+            for a video the time from its beginning.
 
         Raises
         ------
@@ -63,16 +63,16 @@ def open_viewpoint(
     ----------
     source : int or Path
         A camera's number in the operating system (V4L2, DirectShow, AVFoundation), a folder of
-        PNG and JPEG images, which come by name, or a video file.
+        PNG and JPEG images, in order of their names, or a video file.
     size_px : (int, int), optional
-        Width and height asked of a camera; what it delivers may differ.
+        Width and height requested from a camera, which may deliver others.
     playback : PlaybackSettings, optional
-        How a video is played.
+        Playback of a video.
 
     Raises
     ------
     CameraError
-        If there is nothing of the kind, or it is in use.
+        If the source does not exist or is in use.
     """
     if isinstance(source, int):
         return _Device(source, size_px)
@@ -80,7 +80,7 @@ def open_viewpoint(
 
 
 def list_viewpoints() -> list[int]:
-    """Return the numbers of the cameras that can be opened now; each is opened for a moment."""
+    """Return the numbers of the cameras that can be opened; each is opened briefly."""
     found = []
     for number in range(_MOST_CAMERAS):
         with suppress(CameraError), open_viewpoint(number):
@@ -103,7 +103,7 @@ class _Images(ViewpointCamera):
         if self._remaining is None:
             raise CameraError(f"{self.name}: this camera is closed; open it again")
         if not self._remaining:
-            raise CameraEndError(f"{self.name}: that was the last")
+            raise CameraEndError(f"{self.name}: that was the last image")
         path = self._remaining.pop()
         try:
             image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
@@ -116,7 +116,7 @@ class _Images(ViewpointCamera):
 
 
 class _Capture(ViewpointCamera):
-    """What OpenCV captures."""
+    """An image source that OpenCV captures."""
 
     def __init__(self, name: str, capture: cv2.VideoCapture) -> None:
         self.name = name
@@ -135,7 +135,7 @@ class _Capture(ViewpointCamera):
 class _Device(_Capture):
     def __init__(self, number: int, size_px: tuple[int, int] | None) -> None:
         if not _is_listed(number):
-            raise CameraError(f"there is no camera {number}; plug it in, or give another number")
+            raise CameraError(f"there is no camera {number}; plug it in or choose another number")
         capture = cv2.VideoCapture(number, _BACKENDS.get(sys.platform, cv2.CAP_ANY))
         super().__init__(f"Camera {number}", capture)
         if not capture.isOpened():
@@ -143,12 +143,12 @@ class _Device(_Capture):
         if size_px is not None:
             capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
             capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
-        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # the newest image, not one that waited
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # the newest image, not a queued one
 
     def read(self) -> tuple[UInt8, int]:
         image = self._read()
         if image is None:
-            raise CameraError(f"{self.name} gives no image; plug it in again")
+            raise CameraError(f"{self.name} delivers no image; plug it in again")
         return image, time.monotonic_ns()
 
 
@@ -159,7 +159,7 @@ class _Video(_Capture):
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         super().__init__(f"Video {path.name}", capture)
         if not capture.isOpened():
-            raise CameraError(f"{path} is no video that OpenCV can play")
+            raise CameraError(f"{path} is not a video that OpenCV can play")
         sides = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
         if max(capture.get(side) for side in sides) > MAX_SIDE_PX:
             self.close()
@@ -174,7 +174,7 @@ class _Video(_Capture):
             self._begin_ns = time.monotonic_ns()
             image = self._read()
         if image is None:
-            raise CameraEndError(f"{self.name}: that was the last")
+            raise CameraEndError(f"{self.name}: that was the last image")
         t_ns = round(1e6 * self._capture.get(cv2.CAP_PROP_POS_MSEC))
         if self._playback.real_time:
             time.sleep(max(0.0, 1e-9 * (self._begin_ns + t_ns - time.monotonic_ns())))
@@ -182,5 +182,5 @@ class _Video(_Capture):
 
 
 def _is_listed(number: int) -> bool:
-    """Tell whether Linux lists a camera; asking OpenCV for one that is absent prints warnings."""
+    """Return whether Linux lists a camera; OpenCV prints warnings when asked for an absent one."""
     return sys.platform != "linux" or Path(f"/dev/video{number}").exists()

@@ -49,7 +49,7 @@ def test_a_camera_without_colour_is_named(tmp_path: Path, make_frames: MakeFrame
     playback = PlaybackSettings(loop=True)
     with (
         ColorCamera(open_recording(tmp_path / "gray", playback)) as camera,
-        pytest.raises(CameraError, match="Recording gray gives no colour"),
+        pytest.raises(CameraError, match="Recording gray delivers no colour"),
     ):
         camera.read()
 

@@ -52,5 +52,5 @@ def test_without_coefficients_there_is_no_distortion() -> None:
 
 def test_a_lens_that_opencv_cannot_describe_is_refused() -> None:
     fisheye = sdk_camera(rs.distortion.ftheta, (0.9, 0.0, 0.0, 0.0, 0.0), 300.0)
-    with pytest.raises(CameraError, match=r"ftheta, is not one that OpenCV has: .* px off"):
+    with pytest.raises(CameraError, match=r"ftheta, is unknown to OpenCV: .* px off"):
         opencv_distortion(fisheye)

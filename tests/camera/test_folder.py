@@ -74,7 +74,7 @@ def test_an_unfinished_line_is_left_out(folder: Path) -> None:
 
 def test_nothing_is_written_over(folder: Path, make_frames: MakeFrames) -> None:
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(FileError, match="is not empty; give a new folder"):
+    with pytest.raises(FileError, match="is not empty; choose a new folder"):
         record_folder(folder, make_frames(1))
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
@@ -82,7 +82,7 @@ def test_nothing_is_written_over(folder: Path, make_frames: MakeFrames) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "problem"),
     [
-        ("handcal_recording", 2, "is no handcal recording of version 1"),
+        ("handcal_recording", 2, "is not a handcal recording of version 1"),
         ("depth", None, "must describe depth"),
         ("color", [], "must describe depth and"),
         ("depth_scale", 0, "depth_scale is 0"),
@@ -138,5 +138,5 @@ def test_a_missing_or_foreign_image_is_named(folder: Path) -> None:
 
 
 def test_no_folder_is_no_recording(tmp_path: Path) -> None:
-    with pytest.raises(CameraError, match=r"is no recording: there is no recording\.json"):
+    with pytest.raises(CameraError, match=r"is not a recording: it has no recording\.json"):
         FolderCamera(tmp_path)

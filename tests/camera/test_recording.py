@@ -69,7 +69,7 @@ def test_missing_and_damaged_recordings_are_refused(tmp_path: Path) -> None:
         RecordingCamera(tmp_path / "absent.db3")
     damaged = tmp_path / "damaged.db3"
     damaged.write_bytes(b"not a data base" * 100)
-    with pytest.raises(CameraError, match="is no recording; take"):
+    with pytest.raises(CameraError, match="is not a recording; choose"):
         RecordingCamera(damaged)
     damaged.write_bytes(SQLITE + b"not a data base" * 100)
     with pytest.raises(CameraError, match="cannot be played"):

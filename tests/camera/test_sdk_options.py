@@ -53,5 +53,5 @@ def test_what_the_device_cannot_is_named(plug_in: Callable[..., Any]) -> None:
     with pytest.raises(CameraError, match="this camera has no laser power to set"):
         apply_options(plug_in().device, RealSenseSettings(laser_power_mw=10.0))
     apply_options(plug_in().device, RealSenseSettings())
-    with pytest.raises(CameraError, match=r"laser power goes from 0 to 360 mW, so 500 cannot"):
+    with pytest.raises(CameraError, match=r"laser power ranges from 0 to 360 mW, so 500 cannot"):
         apply_options(plug_in(options=OPTIONS).device, RealSenseSettings(laser_power_mw=500.0))

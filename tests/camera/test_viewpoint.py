@@ -71,7 +71,7 @@ def test_what_is_no_video_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CameraError, match="there is no video"):
         open_viewpoint(tmp_path / "absent.mp4")
     (tmp_path / "bad.mp4").write_bytes(bytes(1000))
-    with pytest.raises(CameraError, match="is no video that OpenCV can play"):
+    with pytest.raises(CameraError, match="is not a video that OpenCV can play"):
         open_viewpoint(tmp_path / "bad.mp4")
 
 
@@ -117,7 +117,7 @@ def test_a_camera_gives_images_until_it_is_unplugged(plugged_in: list[StandIn]) 
             image, t_ns = camera.read()
             np.testing.assert_array_equal(image, flat())
             assert abs(t_ns - time.monotonic_ns()) < 1e9
-        with pytest.raises(CameraError, match="Camera 3 gives no image; plug it in again"):
+        with pytest.raises(CameraError, match="Camera 3 delivers no image; plug it in again"):
             camera.read()
     assert plugged_in[0].asked[cv2.CAP_PROP_FRAME_WIDTH] == 1920
     assert plugged_in[0].asked[cv2.CAP_PROP_FRAME_HEIGHT] == 1080

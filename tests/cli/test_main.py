@@ -186,7 +186,7 @@ def test_record_converts_a_recording_and_tells_what_it_did(
     handcal("replay", tmp_path / "copy")
     assert "3 of 3 frames show a hand." in capsys.readouterr().out
     code, error = fails("record", tmp_path / "copy", "--source", tmp_path / "three")
-    assert (code, "is not empty; give a new folder" in error) == (1, True)
+    assert (code, "is not empty; choose a new folder" in error) == (1, True)
     code, error = fails("record", tmp_path / "copy.bag", "--source", tmp_path / "three")
     assert (code, "records only .db3 files" in error) == (1, True)
 
@@ -289,13 +289,13 @@ def test_misuse_is_one_line_and_exit_code_2(
         ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
         ("solve nowhere", "nowhere is no session"),
         ("replay nowhere.db3", "there is no recording nowhere.db3"),
-        ("replay text.txt", "text.txt is no recording"),
+        ("replay text.txt", "text.txt is not a recording"),
         ("demo --rig nowhere.yaml --output out", "cannot read nowhere.yaml"),
         ("demo --rig text.txt --output out", "text.txt"),
         ("demo --output text.txt", "cannot create the folder text.txt: File exists"),
         ("headset --port 5000", "no pairing key: set HANDCAL_PAIRING_KEY"),
         ("headset --port 5000 --key-file none", "cannot read none"),
-        ("headset --port 5000 --key-file text.txt", "has 6 bytes; take one of"),
+        ("headset --port 5000 --key-file text.txt", "has 6 bytes; use at least"),
     ],
 )
 def test_failure_is_one_line_and_exit_code_1(

@@ -115,7 +115,7 @@ def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) ->
     assert find("camera", with_path).found == f"there is no recording {path}"
     pytest.importorskip("pyrealsense2")
     path.write_bytes(bytes(2**21))
-    assert find("camera", with_path).found.startswith(f"{path} is no recording")
+    assert find("camera", with_path).found.startswith(f"{path} is not a recording")
     path.write_bytes(b"SQLite format 3".ljust(2**21, b"\0"))
     assert find("camera", with_path).found == "2.0 MiB, played over and over"
     assert find("camera", replace(played, recording="\0.db3")).health is Health.BROKEN
