@@ -1,1 +1,1 @@
-"""An honest simulator: hand, room, depth camera, wearer and virtual headset."""
+"""The simulator: hand, room, depth camera, wearer and virtual headset."""

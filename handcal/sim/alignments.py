@@ -1,8 +1,8 @@
-"""Alignments with known truth, made straight from the model: for tests, benchmarks and studies.
+"""Alignments with known truth, generated from the model for tests, benchmarks and studies.
 
-Two ways to make the cursor from the hand: as the paper's simulation does (``exact=False``,
-κ = 1), and as a hand that does not change its size must be (``exact=True``). Alignments made by a
-simulated person who looks through a display are `handcal.sim.wearer`'s.
+The cursor is made from the hand either as in the paper's simulation (``exact=False``, κ = 1), or
+for a hand of constant size (``exact=True``). `handcal.sim.wearer` simulates a person who aligns by
+looking through a display.
 """
 
 from __future__ import annotations
@@ -20,28 +20,29 @@ from handcal.types import Bool, Float64, Intrinsics
 
 @dataclass(frozen=True, slots=True)
 class AlignmentSettings:
-    """What an alignment is made of."""
+    """Settings of simulated alignments."""
 
     count: int = 5000
-    """Points of each cloud."""
+    """Number of points of each cloud."""
     exact: bool = True
-    """False makes the cursor as the paper does."""
+    """True for a hand of constant size; False as in the paper."""
     shift_max_m: float = 0.010
-    """Each component of φ is uniform within ± this."""
+    """Each component of φ is uniform within plus or minus this."""
     display_distance_m: float = 2.0
     """z(C0→S)."""
     resample: bool = False
-    """Sample cursor and hand apart; else both hold the same points in another order."""
+    """Sample cursor and hand independently; otherwise both hold the same points in another
+    order."""
     depth_sigma_m: float = 0.0
     """Standard deviation of each point's depth noise."""
     cursor_forearm_m: float = 0.04
     hand_forearm_m: float = 0.04
-    """How far beyond the wrist each cloud reaches."""
+    """Length of forearm in each cloud."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedAlignment:
-    """Two clouds and the truth about them."""
+    """Two clouds with their true φ and pairs."""
 
     cursor_m: Float64
     hand_m: Float64
@@ -54,10 +55,10 @@ class SimulatedAlignment:
     shift_m: Float64
     """(3,); the true φ."""
     rotation_rad: Float64
-    """(3,); by which the cursor is turned against the hand, in W."""
+    """(3,); rotation vector of the cursor relative to the hand, in W."""
     known_cursor_m: Float64
     known_hand_m: Float64
-    """(K, 3); noise-free true pairs in E0(t_b), of what both clouds show."""
+    """(K, 3); noise-free true pairs in E0(t_b), of the part that both clouds show."""
     display_distance_m: float
 
 
@@ -68,9 +69,9 @@ def simulate_alignment(
     settings: AlignmentSettings,
     intrinsics: Intrinsics = D415,
 ) -> SimulatedAlignment:
-    """Make one alignment as in the paper's simulation, seen by a depth camera.
+    """Return one alignment as in the paper's simulation, seen by a depth camera.
 
-    The cursor is turned about a random axis by `angle_rad`, around a random point of its cloud.
+    The cursor is rotated about a random axis by `angle_rad`, around a random point of its cloud.
     """
     T_E_hand = rigid(
         rng.normal(0.0, 0.15, 3),

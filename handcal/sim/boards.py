@@ -15,12 +15,12 @@ from handcal.types import Float32, Float64, Intrinsics, UInt8
 
 _SQUARE_PX = 64  # of the texture
 BLACK, WHITE, WALL = 30.0, 215.0, 120.0
-"""How much light ink, paper and what is behind send back."""
+"""Reflectance of ink, paper and background."""
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSettings:
-    """How a simulated camera takes pictures."""
+    """Image quality of a simulated camera."""
 
     blur_px: float = 0.7
     """Standard deviation of the lens's blur."""
@@ -31,7 +31,7 @@ class PictureSettings:
 
 
 class BoardPainter:
-    """Paints what a camera sees of a board; sees to the lens once."""
+    """Renders a camera's images of a board; the lens is computed once."""
 
     def __init__(
         self, board: Board, camera: Intrinsics, settings: PictureSettings | None = None
@@ -51,7 +51,7 @@ class BoardPainter:
             reach = -T_B_C[2, 3] / directions[..., 2]
             places_m = T_B_C[:2, 3] + reach[..., None] * directions[..., :2]
         places_m[~(reach > 0)] = -1e3
-        # The texture's pixel centres are at whole numbers; its margin is one square.
+        # The texture's pixel centres are at integers; its margin is one square.
         at = (places_m / self._board.square_m + 1) * _SQUARE_PX - 0.5
         x, y = np.moveaxis(np.clip(at, -1e4, 1e4).astype(np.float32), 2, 0)
         fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=WALL)
@@ -61,7 +61,7 @@ class BoardPainter:
 
 
 def expose(image: Float32, settings: PictureSettings, rng: np.random.Generator) -> UInt8:
-    """Return the picture that a camera takes of light (H, W), 0 to 255: uneven, blurred, noisy."""
+    """Return a camera's image of light (H, W), 0 to 255: uneven, blurred, noisy."""
     height, width = image.shape
     falloff = rng.uniform(-0.15, 0.15, 2)
     light = 1 + np.add.outer(
@@ -77,7 +77,7 @@ def expose(image: Float32, settings: PictureSettings, rng: np.random.Generator) 
 def board_view(
     board: Board, T_C_B: Float64, camera: Intrinsics, rng: np.random.Generator, noise_px: float
 ) -> BoardView:
-    """Return the corners that a detector with Gaussian errors would find, without an image."""
+    """Return the corners that a detector with Gaussian errors finds, without an image."""
     points_m = corners_m(board)
     pixels = image_points(transform(T_C_B, points_m), camera)
     return BoardView(
@@ -98,7 +98,7 @@ def board_poses(
     max_tilt_rad: float = 0.7,
     others: tuple[tuple[Float64, Intrinsics], ...] = (),
 ) -> list[Float64]:
-    """Return poses T_C_B of a board held as one does: all over the image, tilted to every side.
+    """Return poses T_C_B of a hand-held board: all over the image, tilted to every side.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def board_poses(
     rng : Generator
     max_tilt_rad : float
     others : tuple of (T_O_C, Intrinsics)
-        Further cameras that must see all of the board, too.
+        Further cameras that must also see the whole board.
     """
     points_m = corners_m(board)
     middle_m = points_m.mean(axis=0)
@@ -156,5 +156,5 @@ def pixel_rays(camera: Intrinsics, samples: int) -> Float32:
     else:
         plane = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
     rays = np.dstack([plane, np.ones(plane.shape[:2])]).astype(np.float32)
-    rays.flags.writeable = False  # they are kept
+    rays.flags.writeable = False  # cached
     return rays

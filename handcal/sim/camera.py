@@ -25,31 +25,31 @@ _T_C_D = rigid([0.002, -0.003, 0.001], [0.015, 0.0, 0.0])
 
 @dataclass(frozen=True, slots=True)
 class SyntheticSettings:
-    """The simulated camera."""
+    """Settings of the simulated camera."""
 
     rate_hz: float = 30.0
-    """Frames per second at most; fewer where rendering takes longer."""
+    """Highest frame rate; lower if rendering takes longer."""
     aligned: bool = True
-    """Colour rendered in the depth camera's own image, as after the SDK's alignment; otherwise a
-    raw pair from two cameras."""
+    """Render colour in the depth camera's image, as after the SDK's alignment; otherwise a raw pair
+    from two cameras."""
     clock_offset_s: float = 123.456
     clock_drift: float = 20e-6
-    """The camera's clock is ``(1 + clock_drift) t + clock_offset_s`` of the host's t."""
+    """The camera's clock shows ``(1 + clock_drift) t + clock_offset_s`` at host time t."""
     sensor: SensorSettings = field(default_factory=SensorSettings)
 
 
 class SyntheticCamera(Closable):
-    """Renders the world as a D415 would measure it; implements `Camera`.
+    """Renders the world as measured by a D415; implements `Camera`.
 
     Parameters
     ----------
     world : World
     scene : callable
-        Returns the moving part of the world as it is now, or None while there is none.
+        Returns the present state of the moving part of the world, or None if there is none.
     depth_intrinsics : Intrinsics
-        Its distortion is left out.
+        Distortion is ignored.
     seed : int
-        Of the sensor's noise.
+        Seed of the sensor's noise.
     settings : SyntheticSettings
     """
 
@@ -76,7 +76,7 @@ class SyntheticCamera(Closable):
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Render the next frame, at the camera's rate.
 
-        Its host time is that of its arrival, after exposure and rendering, as with a real camera.
+        Its host time is the time of arrival, after exposure and rendering, as with a real camera.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class SyntheticCamera(Closable):
             if state is None and now_s >= deadline_s:
                 raise CameraTimeoutError(
                     f"the simulated camera saw nothing within {timeout_s:g} s: "
-                    "start the virtual headset, which brings the wearer"
+                    "start the virtual headset, which simulates the wearer"
                 )
             if state is None:
                 time.sleep(np.clip(self._next_s - now_s, _POLL_S, deadline_s - now_s + _POLL_S))

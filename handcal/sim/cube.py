@@ -1,4 +1,4 @@
-"""Images of an ArUco cube with known truth: as a camera sees it, and as a headset draws it."""
+"""Images of an ArUco cube with known truth, seen by a camera and drawn by a headset."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEAST_LIGHT = 0.7  # on a face seen edge-on
 
 
 class CubePainter:
-    """Paints what a camera sees of a cube; sees to the lens once."""
+    """Renders a camera's images of a cube; the lens is computed once."""
 
     def __init__(
         self, cube: Cube, camera: Intrinsics, settings: PictureSettings | None = None
@@ -37,7 +37,7 @@ class CubePainter:
 
 
 def draw_cube(cube: Cube, display: EyeDisplay, T_E_T: Float64, shift_m: ArrayLike) -> UInt8:
-    """Return what a display shows, (height_px, width_px), of a cube drawn for an eye at φ.
+    """Return the display's image, (height_px, width_px), of a cube drawn for an eye at φ.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def draw_cube(cube: Cube, display: EyeDisplay, T_E_T: Float64, shift_m: ArrayLik
 def _paint_faces(
     canvas: Float32, rays: Float32, cube: Cube, T: Float64, black: float, white: float
 ) -> None:
-    """Paint the faces that show; rays (h, w, 3) come from the origin of the frame of `T`."""
+    """Draw the visible faces; rays (h, w, 3) start at the origin of the frame of `T`."""
     for marker in cube.ids:
         T_face = T @ face_pose(cube, marker)
         towards_m = T_face[:3, 3]

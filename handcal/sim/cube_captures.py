@@ -1,8 +1,8 @@
-"""The captures of a whole cube test, rendered: as a lab would put them into folders.
+"""Rendered captures of a whole cube test, in the folders of a real one.
 
-A camera stands in for the eye at several places of the eye box (Hu et al. 2021, assessment with
-eye-replacement camera). At each of them the display is calibrated by overlaying a hand that the
-camera sees through it; then a cube is tracked by the depth camera, and captured real and drawn.
+A camera replaces the eye at several positions of the eye box (Hu et al. 2021, assessment with
+eye-replacement camera). At each position the display is calibrated by overlaying a hand seen
+through it. Then a cube is tracked by the depth camera and captured, real and drawn.
 """
 
 from __future__ import annotations
@@ -42,40 +42,40 @@ POSITIONS = {
     "left": (-1.0, 0.0),
     "right": (1.0, 0.0),
 }
-"""Where the camera may be in the eye box: x right, y down."""
+"""Positions of the camera in the eye box: x right, y down."""
 
 _NEAR_M, _FAR_M, _ASIDE_M = 0.4, 0.6, 0.02
 _EDGE_PX = 8.0
 _MOST_TRIES = 300
-# So turned, three faces show.
+# At this rotation three faces are visible.
 _YAW_RAD, _PITCH_RAD, _ROLL_RAD = (0.45, 1.1), (0.3, 0.7), (-0.3, 0.3)
 _VERTICES = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True)
 class CaptureSettings:
-    """How the test is done."""
+    """Settings of a rendered cube test."""
 
     seed: int = 1
     eye: Eye = "left"
     positions: tuple[str, ...] = tuple(POSITIONS)
-    """Of the camera; names in `POSITIONS`."""
+    """Positions of the camera; names in `POSITIONS`."""
     poses: int = 4
-    """Of the cube at each position, 0.4 to 0.6 m away."""
+    """Poses of the cube at each position, 0.4 to 0.6 m away."""
     alignments: int = 1
-    """Of the hand at each position."""
+    """Alignments of the hand at each position."""
     aside_m: float = 0.004
-    """From the middle of the eye box to the other positions."""
+    """Distance from the centre of the eye box to the other positions."""
     place_sigma_m: float = 0.001
-    """How exactly the camera is put there, each axis."""
+    """Standard deviation of the camera's position, each axis."""
     turn_sigma_rad: float = 0.02
-    """How far the camera is turned against the display, about each axis."""
+    """Standard deviation of the camera's rotation relative to the display, about each axis."""
     points: int = 5000
-    """Of the hand's clouds."""
+    """Number of points of the hand's clouds."""
     depth_sigma_m: float = 0.001
-    """Noise of the depth camera's points."""
+    """Standard deviation of the depth camera's points."""
     wearer: WearerSettings = field(default_factory=WearerSettings)
-    """How exactly the hand is overlaid."""
+    """Errors of overlaying the hand."""
     cube: Cube = field(default_factory=Cube)
     camera: Intrinsics = VIEWPOINT_CAMERA
     """The eye-replacement camera."""
@@ -88,15 +88,16 @@ def write_captures(
     """Write the captures of a test, `camera.json`, `cube.json`, and the truth, `truth.json`.
 
     The cube is drawn with the offline calibration (``virtual-offline``), with φ solved from the
-    alignments (``virtual-solved``), and with the true φ (``virtual-true``), which shows what the
-    test itself cannot tell.
+    alignments (``virtual-solved``), and with the true φ (``virtual-true``), which shows the error
+    of the test itself.
 
-    They appear in the folder all at once, so that what was given up is not taken for a whole test.
+    All files appear in the folder together, so that a cancelled test is not taken for a complete
+    one.
 
     Parameters
     ----------
     folder : Path
-        Must be empty, if it exists.
+        Must be empty if it exists.
     rig : Rig
     settings : CaptureSettings
     report : callable
@@ -107,17 +108,17 @@ def write_captures(
     FileError
         If the folder is not empty, or cannot be written.
     CubeError
-        If the cube is too large for display or cameras to show it whole.
+        If the cube is too large to be seen whole on the display and by the cameras.
     """
     if any(make_folder(folder).iterdir()):
-        raise FileError(f"{folder} is not empty: give a new folder")
+        raise FileError(f"{folder} is not empty: choose a new folder")
     with _appearing_in(folder) as rendering:
         _render(rendering, rig, settings, report)
 
 
 @contextmanager
 def _appearing_in(folder: Path) -> Iterator[Path]:
-    """Give a hidden folder to fill; at the end, what is in it is moved up, unless that failed."""
+    """Yield a hidden folder to fill; if that succeeds, its content is moved into `folder`."""
     hidden = make_folder(folder / ".rendering")
     try:
         yield hidden
@@ -156,7 +157,7 @@ def _render(
 
 
 class _Studio:
-    """A headset before a camera, a hand and a cube, and whoever moves them."""
+    """A headset in front of a camera, with a hand and a cube."""
 
     def __init__(self, rig: Rig, settings: CaptureSettings) -> None:
         self._rig, self._settings = rig, settings
@@ -169,7 +170,7 @@ class _Studio:
         self.grid = draw_grid(Grid(self._display.width_px, self._display.height_px))
 
     def calibrate(self, true_m: Float64, rng: np.random.Generator) -> Float64:
-        """Return φ as solved from alignments of the hand with its cursor."""
+        """Return φ solved from alignments of the hand with its cursor."""
         settings = self._settings
         alignments = [
             overlay_by_eye(
@@ -186,7 +187,7 @@ class _Studio:
         return solve_session(alignments, self._rig, SolveSettings()).shifts[settings.eye].shift_m
 
     def capture_display(self, shown: UInt8, T_E_C: Float64, rng: np.random.Generator) -> UInt8:
-        """Return what the camera sees of the display in the dark."""
+        """Return the camera's image of the display in the dark."""
         settings = self._settings
         return photograph_display(
             shown,
@@ -201,7 +202,7 @@ class _Studio:
     def capture_cube(
         self, T_E_C: Float64, shifts_m: Mapping[str, Float64], rng: np.random.Generator
     ) -> Iterator[tuple[str, UInt8]]:
-        """Yield the cube captured at some pose: real, and as drawn with each φ."""
+        """Yield captures of the cube at one pose: real, and drawn with each φ."""
         T_E_T, tracked = self._place_cube(T_E_C, shifts_m.values(), rng)
         yield "real", self._seen_by_eye.paint(invert(T_E_C) @ T_E_T, rng)
         for name, shift_m in shifts_m.items():
@@ -211,7 +212,7 @@ class _Studio:
     def _place_cube(
         self, T_E_C: Float64, shifts_m: Iterable[Float64], rng: np.random.Generator
     ) -> tuple[Float64, Float64]:
-        """Return T_E_T, true and as tracked, of a cube that display and cameras show whole."""
+        """Return T_E_T, true and tracked, of a cube seen whole by display and cameras."""
         settings, depth_camera = self._settings, self._rig.depth_intrinsics
         for _ in range(_MOST_TRIES):
             T_E_T = self._some_pose(rng)
@@ -226,10 +227,12 @@ class _Studio:
                 image = self._seen_by_depth.paint(invert(self._T_E_D) @ T_E_T, rng)
                 T_D_T = cube_pose(find_cube(image, settings.cube), settings.cube, depth_camera)
                 return T_E_T, self._T_E_D @ T_D_T
-        raise CubeError("display and cameras do not show the cube whole: take a smaller one")
+        raise CubeError(
+            "the cube is not seen whole on the display and by the cameras: use a smaller one"
+        )
 
     def _some_pose(self, rng: np.random.Generator) -> Float64:
-        """Return T_E_T of a cube before the display's middle, turned so that three faces show."""
+        """Return T_E_T of a cube in front of the display's centre with three visible faces."""
         middle_px = [(self._display.width_px - 1) / 2, (self._display.height_px - 1) / 2, 1.0]
         ray = np.linalg.solve(eye_projection(self._display)[:, :3], middle_px)
         depth_m = rng.uniform(_NEAR_M, _FAR_M)

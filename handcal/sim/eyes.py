@@ -1,6 +1,6 @@
-"""What the simulated wearer's true eyes see through the displays: the truth, for whoever watches.
+"""The view of the simulated wearer's true eyes through the displays: the truth.
 
-The engine may show these images, and judge by them, but never calibrate from them.
+The engine may show these images and judge by them, but never calibrate from them.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class TrueEyes:
     Parameters
     ----------
     world : World
-        What there is to see.
+        The visible world.
     rig : Rig
-        The headset that is worn.
+        Rig of the worn headset.
     seed : int
-        Of the wearer, as `handcal.sim.wearer.Wearer` takes it.
+        Seed of the wearer, as for `handcal.sim.wearer.Wearer`.
     settings : WearerSettings, optional
 
     Attributes
@@ -48,7 +48,7 @@ class TrueEyes:
         )
 
     def look(self, eye: Eye, T_W_H: Float64, T_W_hand: Float64 | None) -> UInt8:
-        """Return what an eye sees of the world within its display, and nothing drawn over it.
+        """Return an eye's view of the world within its display, without anything drawn.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class TrueEyes:
         Returns
         -------
         (height_px // 2, width_px // 2, 3) uint8
-            RGB; stretched over the display, it lies where the display's pixels do.
+            RGB, covering the display.
         """
         display, shift_m = self._rig.eyes[eye], self.shift_m[eye]
         size = display.width_px // _DISPLAY_PX_PER_PX, display.height_px // _DISPLAY_PX_PER_PX
@@ -81,9 +81,9 @@ def _image_from_display(display: EyeDisplay, size: tuple[int, int]) -> Float64:
 
 
 def _fit_pinhole(K: Float64, size: tuple[int, int]) -> Intrinsics:
-    """Return the upright pinhole of equal size that sees all that a camera with any (3, 3) K does.
+    """Return the upright pinhole camera that covers the view of one with any (3, 3) K.
 
-    With the display's homography H0 in it, K may turn and skew the image.
+    K may rotate and skew the image, as it includes the display's homography H0.
     """
     width, height = size
     corners_px = [[x, y, 1.0] for x in (-0.5, width - 0.5) for y in (-0.5, height - 0.5)]

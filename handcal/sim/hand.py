@@ -1,4 +1,4 @@
-"""A procedural hand: bones of published proportions, skin from a smooth union, a closed mesh.
+"""A procedural hand: bones of published proportions, a smooth union as skin, a closed mesh.
 
 The hand's own frame has its origin at the palm's centre, the fingers along −y, the forearm along
 +y and the palm facing −z, so that a camera looking along +z sees the palm upright. A right hand's
@@ -26,7 +26,7 @@ _PHALANGES_MM = {
     "ring": (41, 26, 21),
     "little": (33, 18, 20),
 }
-# From the palm's centre: the joint where each finger leaves the palm, mm.
+# Position of each finger's first joint relative to the palm's centre, mm.
 _KNUCKLES_MM = {
     "index": (25, -42, -2),
     "middle": (4, -45, 1),
@@ -51,7 +51,7 @@ _SKIN = np.array([[236, 200, 180], [205, 155, 125], [160, 108, 78], [98, 66, 50]
 
 @dataclass(frozen=True, slots=True)
 class HandSettings:
-    """How a hand is drawn from its seed."""
+    """Distributions from which a hand is drawn."""
 
     length_m: float = 0.187
     length_sigma_m: float = 0.010
@@ -59,7 +59,7 @@ class HandSettings:
     forearm_m: float = 0.25
     """Length of forearm below the wrist."""
     grid_m: float = 0.002
-    """Spacing of the grid on which the skin is found."""
+    """Spacing of the grid for the skin."""
     side: Side | None = None
     """None lets the seed choose."""
 
@@ -93,7 +93,7 @@ class HandModel:
 
 @dataclass(frozen=True, slots=True)
 class _Capsule:
-    """A tapered capsule from a to b that melts into what was there, in mm of the mean hand."""
+    """A tapered capsule from a to b, blended with the other ones, in mm of the mean hand."""
 
     a: Float64
     b: Float64
@@ -103,7 +103,7 @@ class _Capsule:
 
 
 def make_hand(seed: int, settings: HandSettings | None = None) -> HandModel:
-    """Make the hand of a seed: its size, spread, curl, wrist, side and skin tone follow from it.
+    """Return the hand of a seed, which determines size, spread, curl, wrist, side and skin tone.
 
     Parameters
     ----------
@@ -133,13 +133,13 @@ def make_hand(seed: int, settings: HandSettings | None = None) -> HandModel:
 
 
 def _direction(spread_rad: float, flexion_rad: float) -> Float64:
-    """Return −y turned toward +x by the spread, then toward the palm's side, −z."""
+    """Return −y rotated toward +x by the spread, then toward the palm's side, −z."""
     cos = np.cos(flexion_rad)
     return np.array([np.sin(spread_rad) * cos, -np.cos(spread_rad) * cos, -np.sin(flexion_rad)])
 
 
 def _forearm(arm_axis: Float64, length: float) -> list[_Capsule]:
-    """Return two capsules side by side, radius and ulna, widening toward the elbow."""
+    """Return two parallel capsules, radius and ulna, widening toward the elbow."""
     elbow = _WRIST_MM + length * arm_axis
     across = np.array([1.0, 0.0, 0.0])
     return [
@@ -165,7 +165,7 @@ def _palm() -> list[_Capsule]:
 
 
 def _fingers(rng: np.random.Generator) -> list[_Capsule]:
-    """Return all phalanges; spread and curl are the hand's, with a little of each finger's own."""
+    """Return all phalanges, with the hand's spread and curl and small deviations per finger."""
     spread = rng.uniform(0.6, 1.5)
     curl_rad = rng.uniform(0.02, 0.22)
     thickness = rng.normal(1.0, 0.04)
@@ -189,9 +189,9 @@ def _chain(
     bends_rad: Float64,
     blend: float,
 ) -> list[_Capsule]:
-    """Return a finger's bones, each turned sideways and bent to the palm against the last."""
+    """Return a finger's bones, each rotated sideways and bent relative to the previous one."""
     ends = np.array(lengths, dtype=np.float64)
-    ends[-1] -= radii[-1]  # the tip's cap belongs to the length
+    ends[-1] -= radii[-1]  # the length includes the tip's cap
     capsules = []
     joint = np.array(start, dtype=np.float64)
     for number, spread_rad, flexion_rad in zip(
@@ -221,7 +221,7 @@ def _skin(
 
 
 def _add(field: Float32, capsule: _Capsule, low: Float64, grid: float) -> None:
-    """Melt a capsule into the distance field by the polynomial smooth minimum (Quilez 2013)."""
+    """Blend a capsule into the distance field by the polynomial smooth minimum (Quilez 2013)."""
     margin = max(capsule.radius_a, capsule.radius_b) + capsule.blend + 2 * grid
     near, far = np.minimum(capsule.a, capsule.b), np.maximum(capsule.a, capsule.b)
     first = np.floor((near - margin - low) / grid).astype(int).clip(0)
@@ -242,7 +242,7 @@ def _add(field: Float32, capsule: _Capsule, low: Float64, grid: float) -> None:
 
 
 def _skin_colors(vertices: Float32, normals: Float32, rng: np.random.Generator) -> UInt8:
-    """Tone by seed, a lighter and redder palm, and soft blotches."""
+    """Return colours: the tone by seed, a lighter and redder palm, and soft blotches."""
     tone = rng.uniform(0.0, len(_SKIN) - 1.0)
     skin = np.array([np.interp(tone, range(len(_SKIN)), channel) for channel in _SKIN.T])
     palm_skin = 0.75 * skin + 0.25 * np.array([240.0, 190.0, 170.0])

@@ -1,7 +1,7 @@
 """The virtual headset: a process of its own that speaks the real datagrams.
 
-It hosts the wearer, shows what the PC sends, and tells poses and confirmations on its own clock,
-as a real headset does. The wearer's true poses leave only as light, for the synthetic camera.
+It hosts the simulated wearer, shows what the PC sends, and reports poses and confirmations on its
+own clock, as a real headset does. The true poses go only to the simulated camera, as light.
 """
 
 from __future__ import annotations
@@ -29,52 +29,52 @@ from handcal.types import EYES, Eye, Float64, Rig
 
 @dataclass(frozen=True, slots=True)
 class HeadsetSettings:
-    """What the virtual headset is, and how badly it is connected."""
+    """Settings of the virtual headset and its connection."""
 
     rig_path: str
-    """The rig that the headset goes by, the PC's."""
+    """The PC's rig, which the headset uses."""
     port: int
-    """Where the PC listens."""
+    """Address of the PC."""
     scene_port: int | None = None
-    """Where the synthetic camera listens, on this machine; None if there is none."""
+    """Port of the simulated camera on this machine; None if there is none."""
     host: str = "127.0.0.1"
     seed: int = 0
-    """Of the wearer, the wearer's hand and the tracking noise."""
+    """Seed of the wearer, the wearer's hand and the tracking noise."""
     worn_rig_path: str = ""
-    """The rig that the wearer really looks through; empty takes `rig_path`."""
+    """The rig of the headset actually worn; empty for `rig_path`."""
     wearer: WearerSettings = field(default_factory=WearerSettings)
     impairment: Impairment = UNIMPAIRED
-    """Of the network, in both directions."""
+    """Impairment of the network, in both directions."""
     rate_hz: float = 90.0
-    """Displayed images, and poses, a second."""
+    """Displayed images, and poses, per second."""
     clock_offset_s: float = 12.345
     clock_drift_ppm: float = 30.0
-    """The headset's clock less the host's, at the start and its growth."""
+    """Headset's clock minus the host's: initial offset and drift."""
     tracking_sigma_m: float = 0.0002
     tracking_sigma_rad: float = 0.0003
-    """Noise of the poses told."""
+    """Noise of the reported poses."""
     patience_s: float = 10.0
-    """Longest time without a PC."""
+    """Longest time without a connection."""
     duration_s: float | None = None
-    """When to end; None goes on until told."""
+    """Time after which to end; None to run until stopped."""
 
 
 def run_headset(
     settings: HeadsetSettings, pairing_key: bytes, is_stopped: Callable[[], bool]
 ) -> None:
-    """Wear the headset until stopped, dismissed by the PC, or the duration is over.
+    """Run the headset until it is stopped, dismissed by the PC, or the duration is over.
 
     Parameters
     ----------
     settings : HeadsetSettings
     pairing_key : bytes
     is_stopped : callable
-        Asked at every image.
+        Called for every image.
 
     Raises
     ------
     LinkError
-        If no PC was heard for `patience_s`.
+        If no PC has answered for `patience_s`.
     FileError
         If the rig cannot be read.
     """
@@ -112,14 +112,14 @@ def run_headset(
             elif now_s - heard_s > settings.patience_s:
                 raise LinkError(
                     f"no PC answered at {settings.host}:{settings.port} for "
-                    f"{settings.patience_s:g} s; check that it runs and shares the pairing key"
+                    f"{settings.patience_s:g} s; check that it runs with the same pairing key"
                 )
             next_s = max(next_s + 1.0 / settings.rate_hz, now_s)
             time.sleep(next_s - now_s)
 
 
 def until_terminated() -> Callable[[], bool]:
-    """Return whether an interrupt or a termination signal came; call from the main thread."""
+    """Return a function that reports termination signals; call from the main thread."""
     received: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _frame: received.append(number))
@@ -139,7 +139,7 @@ def _clock(settings: HeadsetSettings) -> Callable[[int], int]:
 
 
 def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
-    """Return what the displays show; an eye without a new projection shows the rig's."""
+    """Return the displays' content; an eye without a new projection shows the rig's."""
 
     def rendered(eye: Eye) -> Float64:
         projection = state.projections.get(eye)

@@ -1,4 +1,4 @@
-"""Alignments as a person makes them who looks through the displays, one at a time."""
+"""Single alignments by a simulated person who looks through the displays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from handcal.sim.raster import visible_points
 from handcal.types import EYES, Alignment, Bool, Eye, Float64, Rig
 
 _FOREARM_M = 0.04
-# Where the palm is raised and how far that may differ, for all of it to be on both displays.
+# Position of the raised palm and its spread, so that it is on both displays.
 _PALM_H_M = np.array([0.0, 0.088, 0.51])
 _PALM_SPREAD_M = np.array([0.015, 0.006, 0.025])
 _PALM_TURN_RAD = 0.1
@@ -34,7 +34,7 @@ def overlay_by_eye(
     drawn_shift_m: Mapping[Eye, Float64] | None = None,
     worn_rig: Rig | None = None,
 ) -> Alignment:
-    """Let a person overlay the own hand on its cursor.
+    """Return an alignment by a person who overlays the hand on its cursor.
 
     Parameters
     ----------
@@ -44,25 +44,25 @@ def overlay_by_eye(
     true_shift_m : mapping of eye to (3,) float64
         φ of the open eyes.
     points : int
-        Of each cloud, as the depth camera sees it; both are sampled apart.
+        Number of points of each cloud; the two are sampled independently.
     depth_sigma_m : float
         Standard deviation of each point's depth noise.
     slip : Slip
-        By how much the overlay misses.
+        Error of the overlay.
     drawn_shift_m : mapping of eye to (3,) float64, optional
-        φ that the cursor is drawn with; the offline calibration by default.
+        φ with which the cursor is drawn; default: the offline calibration.
     worn_rig : Rig, optional
-        The true one, if it is another than the `rig` that the engine knows.
+        The true rig, if it differs from the `rig` known to the engine.
 
     Returns
     -------
     Alignment
-        In H for W: the head keeps still.
+        With W = H, as the head does not move.
 
     Raises
     ------
     HandcalError
-        If the raised hand's cursor is on no display.
+        If the cursor is on no display.
     """
     worn = worn_rig or rig
 

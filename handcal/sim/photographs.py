@@ -1,4 +1,4 @@
-"""All the photographs of an offline calibration, in folders as a technician would have them."""
+"""Rendered photographs of an offline calibration, in the folders of a real one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from handcal.sim.viewpoint import photograph_display
 from handcal.types import EYES, Intrinsics, Rig, UInt8
 
 BOARD = Board(squares=(8, 6))
-# Small, that it does not take long.
+# Small, to save time.
 DEPTH_CAMERA = Intrinsics(640, 360, 502.0, 502.0, 319.5, 179.5, (0.05, -0.1, 0.001, 0.0, 0.0))
 HEADSET_CAMERA = Intrinsics(640, 360, 520.0, 521.0, 322.0, 176.0, (-0.08, 0.05, 0.0, 0.001, 0.0))
 VIEWPOINT_CAMERA = Intrinsics(
@@ -34,16 +34,16 @@ def write_photographs(
     """Write images of `BOARD` by the three cameras, and of both displays.
 
     Folders ``depth`` and ``headset`` hold pairs, ``viewpoint`` the viewpoint camera's images;
-    ``grid-left``, ``board-left`` and ``tracked-left.json`` what was seen from the left eye's
-    viewpoint, and the board's poses; the same of the right.
+    ``grid-left``, ``board-left`` and ``tracked-left.json`` hold the images from the left eye's
+    viewpoint and the board's poses; likewise for the right.
 
     Parameters
     ----------
     folder : Path
     rig : Rig
-        The truth, but for the depth camera's intrinsics, which are `DEPTH_CAMERA`.
+        The truth, except for the depth camera's intrinsics, which are `DEPTH_CAMERA`.
     views : int
-        For each camera.
+        Number of views for each camera.
     rng : Generator
     samples : int
         Rays along each side of a pixel of the boards' images.

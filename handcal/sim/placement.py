@@ -1,4 +1,4 @@
-"""Where a hand must be so that it overlaps a cursor, for eyes that are where they truly are.
+"""Placement of a hand so that it overlaps a cursor for the true eyes.
 
 The cursor appears on display pixels; the hand is seen through the display along rays. Both meet in
 the pixels of the display: a world point p falls on ``K H0 UQ(φ) E0 p`` for the true eye shift φ.
@@ -21,14 +21,14 @@ from handcal.types import EyeDisplay, Float64
 _MATCH_ITERATIONS = 30
 _OVERLAY_ITERATIONS = 8
 _CONVERGED_M = 1e-6
-# Cursor points farther than this from the hand's surface hardly count, at first and at last.
+# Distance from the hand's surface beyond which cursor points lose weight: first and last.
 _START_M, _OUTLIER_M = 0.03, 0.003
 _FEWEST_POINTS = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CursorMatch:
-    """Which points of the hand a cursor shows."""
+    """The points of the hand that a cursor shows."""
 
     cursor_m: Float64
     """(N, 3); the cursor, W."""
@@ -40,20 +40,20 @@ class CursorMatch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeView:
-    """One open eye."""
+    """The view of one open eye."""
 
     seen: Float64
     """(3, 4); display pixels from world points seen through the display by the true eye."""
     drawn_px: Float64
-    """(N, 2); where the headset draws the cursor's points; NaN outside the display."""
+    """(N, 2); pixels of the cursor's points as drawn; NaN outside the display."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slip:
-    """How a placement misses."""
+    """The error of a placement."""
 
     rotation_rad: Float64
-    """(3,); of the hand against its cursor."""
+    """(3,); rotation of the hand relative to its cursor."""
     lateral_rad: Float64
     """(2,); angles about two axes across the line of sight."""
     depth_ratio: float
@@ -69,7 +69,7 @@ def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> Curso
     cursor_m : (N, 3) float64
         W.
     T_W_hand : (4, 4) float64
-        About where the hand was, within some centimetres.
+        Pose of the hand to within a few centimetres.
     """
     tree = KDTree(hand.vertices_m)
     T_hand_W = invert(T_W_hand)
@@ -100,7 +100,7 @@ def view_through(
     drawn: Float64,
     cursor_m: Float64,
 ) -> EyeView:
-    """Return what one eye sees of the world and of the cursor.
+    """Return one eye's view of the world and of the cursor.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def view_through(
     T_W_H : (4, 4) float64
         The headset's pose.
     drawn : (3, 4) float64
-        What the headset draws with: pixels from points in H.
+        Projection used by the headset: pixels from points in H.
     cursor_m : (N, 3) float64
         W.
     """
@@ -124,17 +124,17 @@ def view_through(
 def overlay_hand(
     surface_m: Float64, T_W_hand: Float64, views: Sequence[EyeView]
 ) -> tuple[Float64, float] | None:
-    """Move a hand, without turning it, until it overlaps the cursor in all open eyes.
+    """Translate a hand until it overlaps the cursor in all open eyes.
 
-    Gauss-Newton on the mean squared distance in pixels between where each cursor point is drawn
-    and where its hand point is seen.
+    Gauss-Newton on the mean squared distance in pixels between each drawn cursor point and the
+    hand point seen.
 
     Parameters
     ----------
     surface_m : (N, 3) float64
         The hand's points that the cursor shows, in the hand's frame.
     T_W_hand : (4, 4) float64
-        Where to start from; its rotation is kept.
+        Initial pose; its rotation is kept.
     views : sequence of EyeView
         The open eyes.
 
@@ -142,9 +142,9 @@ def overlay_hand(
     -------
     T_W_hand : (4, 4) float64
     rms_px : float
-        What remains between the hand and the cursor.
+        Remaining distance between hand and cursor.
     None
-        If hardly anything of the cursor is on the displays.
+        If almost nothing of the cursor is on the displays.
     """
     turned = surface_m @ T_W_hand[:3, :3].T
     if sum(np.isfinite(view.drawn_px[:, 0]).sum() for view in views) < _FEWEST_POINTS:
@@ -173,12 +173,12 @@ def _offsets(view: EyeView, points_m: Float64) -> tuple[Float64, Float64]:
 
 
 def misplace(T_W_hand: Float64, eye_m: Float64, slip: Slip) -> Float64:
-    """Shift a hand as a person would who sees from `eye_m`: across the line of sight, along it.
+    """Apply a placement error to a hand seen from `eye_m`: across and along the line of sight.
 
     Parameters
     ----------
     T_W_hand : (4, 4) float64
-        Turned by the slip already.
+        Already rotated by the error.
     eye_m : (3,) float64
         W.
     slip : Slip

@@ -1,4 +1,4 @@
-"""The virtual headset's process, seen from the program that starts it."""
+"""The virtual headset's process, as controlled by the program that starts it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class VirtualHeadset(Closable):
     Parameters
     ----------
     rig_path, worn_rig_path : Path
-        The rig that the headset goes by, and the one that the wearer really looks through.
+        The rig used by the headset, and the rig of the headset actually worn.
     port, scene_port : int
-        Where the PC's end of the link and the synthetic camera listen, on this machine.
+        Ports of the PC's end of the link and of the simulated camera, on this machine.
     pairing_key : str
     seed : int
-        Of the wearer.
+        Seed of the wearer.
     loss, reorder : float
         Share of the datagrams lost, and reordered, in each direction.
     """
@@ -60,7 +60,7 @@ class VirtualHeadset(Closable):
         )
 
     def require_running(self) -> None:
-        """Raise LinkError, with what the process complained of, if it has ended."""
+        """Raise LinkError with the process's error message if it has ended."""
         if self._process.poll() is None:
             return
         self._errors.seek(0)

@@ -1,4 +1,4 @@
-"""What a pinhole camera sees of a hand."""
+"""Rasterised images of a hand in a pinhole camera."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class HandImage:
     y0: int
     """Its upper left pixel in the whole image."""
     depth_m: Float32
-    """(h, w); z in the camera's frame; infinite beside the hand."""
+    """(h, w); z in the camera's frame; infinite outside the hand."""
     color: Float32
-    """(h, w, 3); the vertices' values, interpolated; 0 beside the hand."""
+    """(h, w, 3); interpolated values of the vertices; 0 outside the hand."""
 
 
 def draw_hand(
@@ -41,7 +41,7 @@ def draw_hand(
 ) -> HandImage:
     """Draw a hand by rasterising its triangles, each pixel sampled at its centre.
 
-    A hand that reaches beside or behind the lens, nearer than 2 cm, is not drawn.
+    A hand with a part nearer than 2 cm to the lens, or behind it, is not drawn.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def draw_hand(
     depth_m = np.full(size, _FAR_M, dtype=np.float32)
     color = np.zeros((*size, 3), dtype=np.float32)
     if depth_m.size:
-        # The rasteriser knows only square pixels and a centred axis: shear the box's centre there.
+        # The rasteriser has square pixels and a centred axis: shear to the box's centre.
         shear = np.eye(4)
         shear[0, :3] = intrinsics.fx, 0.0, intrinsics.cx - (x0 + x1 - 1) / 2
         shear[0] /= intrinsics.fy
@@ -106,7 +106,7 @@ def visible_points(
     forearm_m: float | None = None,
     depth_sigma_m: float = 0.0,
 ) -> tuple[Float64, Bool]:
-    """Sample the surface that a camera sees, as a segmented depth image would give it.
+    """Sample the surface seen by a camera, as from a segmented depth image.
 
     Parameters
     ----------
@@ -114,11 +114,11 @@ def visible_points(
     T_D_hand : (4, 4) float64
         From the hand's frame to the camera's.
     count : int
-        Points wanted; fewer come back if fewer pixels see the hand.
+        Requested number of points; fewer are returned if fewer pixels see the hand.
     rng : numpy.random.Generator
     intrinsics : Intrinsics
     forearm_m : float, optional
-        Drop what lies farther than this from the wrist along the arm.
+        Drop points farther than this from the wrist along the arm.
     depth_sigma_m : float
         Standard deviation of independent noise on each point's z, along its ray.
 

@@ -18,7 +18,7 @@ _AMBIENT, _DIFFUSE = 0.45, 0.65
 
 @dataclass(frozen=True, slots=True, eq=False)
 class World:
-    """All that a simulated camera can see."""
+    """Everything that a simulated camera can see."""
 
     hand: HandModel
     room: Room
@@ -54,13 +54,13 @@ def render(
         _paste(
             draw_hand(world.hand, T_D_hand, intrinsics, _shade(world.hand, light)), depth_m, color
         )
-    # A lens is never sharper than this; it also blends the hand's outline with what is behind.
+    # Sharpness limit of a lens; it also blends the hand's outline with the background.
     cv2.GaussianBlur(color, (3, 3), 0.6, dst=color)
     return depth_m, color
 
 
 def _paste(image: HandImage, depth_m: Float32, color: UInt8) -> None:
-    """Put the hand before what is behind it, in place."""
+    """Draw the hand over the background, in place."""
     height, width = image.depth_m.shape
     if not image.depth_m.size:
         return
@@ -71,7 +71,7 @@ def _paste(image: HandImage, depth_m: Float32, color: UInt8) -> None:
 
 
 def _shade(hand: HandModel, light: Float64) -> Float32:
-    """Lambert's law with an even ambient light; (V, 3) in 0..1."""
+    """Return (V, 3) shades, 0 to 1, by Lambert's law with ambient light."""
     lit = np.clip(hand.normals @ light.astype(np.float32), 0.0, 1.0)
     shade = (_AMBIENT + _DIFFUSE * lit) / 255.0
     return np.minimum(hand.colors * shade[:, None], 1.0, dtype=np.float32)

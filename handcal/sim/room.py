@@ -13,7 +13,7 @@ from handcal.types import Float32, Float64, Intrinsics, UInt8, freeze
 
 @dataclass(frozen=True, slots=True)
 class RoomSettings:
-    """How a room is drawn from its seed."""
+    """Distributions from which a room is drawn."""
 
     nearest_wall_m: float = 1.2
     farthest_wall_m: float = 2.4
@@ -43,7 +43,7 @@ class Room:
 
 
 def make_room(seed: int, settings: RoomSettings | None = None) -> Room:
-    """Make the room of a seed: its walls' distances and textures, and where the light hangs."""
+    """Return the room of a seed: distances and textures of its walls, and the light's direction."""
     settings = settings or RoomSettings()
     rng = np.random.default_rng(seed)
     low_m = -rng.uniform(settings.nearest_wall_m, settings.farthest_wall_m, 3)
@@ -57,7 +57,7 @@ def make_room(seed: int, settings: RoomSettings | None = None) -> Room:
 
 
 def _wallpaper(rng: np.random.Generator, width: int, height: int) -> UInt8:
-    """Grain of several sizes, so that stereo finds texture everywhere, and some pictures on it."""
+    """Return a texture with grain of several sizes, so that stereo works, and some pictures."""
     paint = rng.uniform(90.0, 190.0) + rng.normal(0.0, 15.0, 3)
     grain = np.zeros((height, width), dtype=np.float32)
     for cell, strength in ((64, 14.0), (12, 8.0), (2, 8.0)):
@@ -99,7 +99,7 @@ def draw_room(room: Room, T_W_D: Float64, intrinsics: Intrinsics) -> tuple[Float
     walls = [
         (np.add.outer((b * y + c).astype(np.float32), (a * x).astype(np.float32)), texture, H)
         for (a, b, c), texture, H in _walls(room, T_W_D)
-        # An affine function is largest in a corner.
+        # An affine function has its maximum in a corner.
         if max(a * x[0], a * x[-1]) + max(b * y[0], b * y[-1]) + c > 0.0
     ]
     for wall, _, _ in walls:

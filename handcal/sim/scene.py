@@ -1,8 +1,8 @@
 """Light: how the simulated world reaches the simulated camera in another process.
 
-The virtual headset hosts the wearer, whose head and hand the camera has to see. Their true poses
-travel as datagrams over loopback; only the synthetic camera reads them, to render frames, and
-nothing else of the engine may.
+The virtual headset hosts the wearer, whose head and hand the camera must see. Their true poses are
+sent as datagrams over loopback. Only the simulated camera reads them, to render frames; nothing
+else in the engine may.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class SceneState:
     t_ns: int
     """Host's monotonic time."""
     T_W_D: Float64
-    """(4, 4); True pose of the depth camera."""
+    """(4, 4); true pose of the depth camera."""
     T_W_hand: Float64 | None
-    """(4, 4); True pose of the hand; None while it is out of sight."""
+    """(4, 4); true pose of the hand; None while it is out of sight."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_W_D", np.float64, 4, 4)
@@ -69,7 +69,7 @@ class ScenePublisher(Closable):
         self._socket.connect(("127.0.0.1", port))
 
     def publish(self, state: SceneState) -> None:
-        """Send a state; nobody listening is no error, as with light."""
+        """Send a state; a missing receiver is not an error."""
         with suppress(ConnectionRefusedError):
             self._socket.send(pack(state))
 
@@ -79,12 +79,12 @@ class ScenePublisher(Closable):
 
 
 class SceneReceiver(Closable):
-    """Keeps the newest state that a publisher sent.
+    """Receives states and keeps the newest.
 
     Parameters
     ----------
     port : int
-        0 takes a free one.
+        0 for any free port.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class SceneReceiver(Closable):
         self._newest: SceneState | None = None
 
     def latest(self) -> SceneState | None:
-        """Return the newest state, or None if none came within the last second."""
+        """Return the newest state, or None if none has arrived in the last second."""
         now_ns = time.monotonic_ns()
         while True:
             try:

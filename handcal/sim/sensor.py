@@ -1,4 +1,4 @@
-"""What a stereo depth camera makes of an ideal depth image.
+"""Measurement errors of a stereo depth camera.
 
 Modelled on the Intel RealSense D415: the depth image is that of the left imager, and depth comes
 from the disparity d = f B / z to the right imager, so that σz = z² σd / (f B).
@@ -16,34 +16,34 @@ from handcal.types import Bool, Float32, UInt16
 
 @dataclass(frozen=True, slots=True)
 class SensorSettings:
-    """The depth sensor."""
+    """Settings of the depth sensor."""
 
     baseline_m: float = 0.055
-    """Between the imagers; D415: 55 mm (data sheet)."""
+    """Distance between the imagers; D415: 55 mm (data sheet)."""
     disparity_sigma_px: float = 0.08
     """Subpixel error of the matching."""
     correlation_px: float = 2.0
-    """Neighbours share matching windows and so errors: standard deviation of the Gaussian that
-    correlates them."""
+    """Standard deviation of the Gaussian that correlates the errors of neighbours, which share
+    matching windows."""
     disparity_step_px: float = 1.0 / 32.0
-    """The matcher's resolution; D4xx: 1/32 px."""
+    """Resolution of the matching; D4xx: 1/32 px."""
     edge_px: int = 3
     """Width of the band along a depth edge where the matching window sees both sides."""
     edge_hole_ratio: float = 0.35
     edge_flying_ratio: float = 0.15
-    """Of the pixels in that band, those without a depth, and those with a depth in between."""
+    """Shares of the pixels in that band without depth, and with a depth in between."""
     depth_scale_m: float = 0.0001
     """Metres per unit."""
 
 
-# Disparity that differs by more than this within the band is an edge, not a slope.
+# A disparity difference above this within the band is an edge, not a slope.
 _EDGE_STEP_PX = 4.0
 
 
 def sense_depth(
     depth_m: Float32, focal_px: float, rng: np.random.Generator, settings: SensorSettings
 ) -> UInt16:
-    """Turn an ideal depth image into a measured one.
+    """Return the measurement of an ideal depth image.
 
     Parameters
     ----------
@@ -75,10 +75,10 @@ def sense_depth(
 
 
 def _hidden_from_the_right(disparity: Float32) -> Bool:
-    """Return where a nearer surface hides the point from the right imager.
+    """Return the pixels hidden from the right imager by a nearer surface.
 
-    Pixel u appears at u − d there; whatever lies to its right in the left image and yet lands at
-    or left of it passes in front of it.
+    Pixel u appears at u − d there. A point to its right in the left image that appears at or left
+    of it there occludes it.
     """
     right_px = np.arange(disparity.shape[1], dtype=np.float32) - disparity
     leftmost = np.minimum.accumulate(right_px[:, ::-1], axis=1)[:, ::-1]
@@ -102,7 +102,7 @@ def _blur_edges(disparity: Float32, rng: np.random.Generator, settings: SensorSe
 def _correlated_noise(
     shape: tuple[int, ...], correlation_px: float, rng: np.random.Generator
 ) -> Float32:
-    """Return Gaussian noise of unit variance that neighbours share; drawn at half resolution."""
+    """Return correlated Gaussian noise of unit variance, drawn at half resolution."""
     half = rng.standard_normal((shape[0] // 2 + 1, shape[1] // 2 + 1), dtype=np.float32)
     smooth = cv2.GaussianBlur(half, (0, 0), correlation_px / 2.0)
     noise = np.asarray(cv2.resize(smooth, (shape[1], shape[0])), dtype=np.float32)

@@ -17,14 +17,14 @@ _REMEMBERED = 64
 
 
 class Simulation(Closable):
-    """Starts the virtual headset and receives its light.
+    """Starts the virtual headset and receives its scene.
 
     Parameters
     ----------
     seed : int
-        Of wearer, hand and room.
+        Seed of wearer, hand and room.
     start_headset : callable
-        Starts the process, given the port that the scene is sent to.
+        Starts the process, given the port to which it sends the scene.
 
     Attributes
     ----------
@@ -41,14 +41,14 @@ class Simulation(Closable):
             self._stack = stack.pop_all()
 
     def scene(self) -> SceneState | None:
-        """Return the moving part of the world as it is now; for the synthetic camera."""
+        """Return the present state of the moving part of the world, for the simulated camera."""
         state = self._receiver.latest()
         if state is not None:
             self._recent.append(state)
         return state
 
     def scene_at(self, t_ns: int) -> SceneState | None:
-        """Return what the camera saw nearest to a time of the host's monotonic clock."""
+        """Return the scene seen by the camera nearest to a time of the host's monotonic clock."""
         return min(self._recent, key=lambda state: abs(state.t_ns - t_ns), default=None)
 
     def require_running(self) -> None:
@@ -56,7 +56,7 @@ class Simulation(Closable):
         self._headset.require_running()
 
     def restart(self) -> None:
-        """End the virtual headset, if it runs, and start another."""
+        """End the virtual headset, if it is running, and start another."""
         self._headset.close()
         self._headset = self._start_headset(self._receiver.port)
 

@@ -1,4 +1,4 @@
-"""The viewpoint camera behind a simulated display: what it sees of what is shown there."""
+"""Images of a simulated display, taken by the viewpoint camera behind it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from handcal.display import eye_projection
 from handcal.sim.boards import PictureSettings, pixel_rays
 from handcal.types import EyeDisplay, Float64, Intrinsics, UInt8
 
-_BLACK, _WHITE = 12.0, 190.0  # a display shows light only; the dark is not quite dark
+_BLACK, _WHITE = 12.0, 190.0  # a display only adds light, and black is not quite dark
 
 VIEWPOINT_CAMERA = Intrinsics(
     1280, 720, 1800.0, 1797.0, 644.0, 355.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0)
 )
-"""An eye-replacement camera of 1.9 arcmin a pixel; that of Hu et al. 2021 had 1.28."""
+"""An eye-replacement camera with 1.9 arcmin per pixel; that of Hu et al. 2021 had 1.28."""
 
 
 def photograph_display(
@@ -28,20 +28,20 @@ def photograph_display(
     shift_m: ArrayLike = (0.0, 0.0, 0.0),
     settings: PictureSettings | None = None,
 ) -> UInt8:
-    """Return what a camera near the offline viewpoint sees of a display in the dark.
+    """Return the image of a display in the dark, from near the offline viewpoint.
 
     Parameters
     ----------
     shown : (height_px, width_px) uint8
-        What the display shows.
+        The displayed image.
     display : EyeDisplay
     R_E_C : (3, 3) float64
         From the camera's axes to the display's.
     camera : Intrinsics
-        Lens included.
+        With lens distortion.
     rng : numpy.random.Generator
     shift_m : (3,) array_like
-        Where the camera's centre is from C0, E axes.
+        Position of the camera's centre relative to C0, E axes.
     settings : PictureSettings, optional
 
     Returns
@@ -50,7 +50,7 @@ def photograph_display(
     """
     settings = settings or PictureSettings()
     rays = pixel_rays(camera, settings.samples)
-    # From where a ray of the camera falls onto the display: the model's own rays, from φ.
+    # Intersection of the camera's rays with the display: the model's own rays, from φ.
     P = eye_projection(display, shift_m)[:, :3] @ R_E_C
     homogeneous = rays @ P.T.astype(np.float32)
     x, y = (homogeneous[..., axis] / homogeneous[..., 2] for axis in range(2))

@@ -1,7 +1,7 @@
 """The simulated person who wears the headset.
 
-Knows what a person knows: what the displays show, and the own hand as seen from the own eyes.
-The engine learns nothing from here but what the hand does before the camera, and the button.
+Sees only what a real user would see: the displays, and their own hand through their own eyes. The
+engine receives only the hand in front of the camera and the button.
 """
 
 from __future__ import annotations
@@ -34,38 +34,38 @@ _ARCMIN = np.radians(1.0 / 60.0)
 
 @dataclass(frozen=True, slots=True)
 class WearerSettings:
-    """How the wearer is built and behaves."""
+    """Anatomy and behaviour of the wearer."""
 
     headset_sigma_m: tuple[float, float, float] = (0.002, 0.0015, 0.003)
-    """How the headset sits, common to both eyes, E axes: lateral, vertical, eye relief."""
+    """Placement of the headset, common to both eyes, E axes: lateral, vertical, eye relief."""
     eye_distance_sigma_m: float = 0.002
     """Deviation of the eye distance from the rig's."""
     eye_sigma_m: float = 0.0005
     """Each eye's own deviation along each axis."""
     largest_shift_m: float = 0.010
-    """The eye box: longer shifts are shortened to it."""
+    """Eye box, to which longer shifts are shortened."""
     raise_m: tuple[float, float, float] = (0.0, 0.048, 0.56)
     raise_spread_m: tuple[float, float, float] = (0.015, 0.006, 0.025)
-    """Where the palm is raised, from the middle of the viewpoints C0 in the head's axes, and how
-    far it may differ each time."""
+    """Position of the raised palm relative to the midpoint of the viewpoints C0, in the head's
+    axes, and its variation."""
     raise_turn_rad: float = 0.1
-    """How far the raised palm turns from facing the eyes, standard deviation about each axis."""
+    """Rotation of the raised palm from facing the eyes, standard deviation about each axis."""
     reaction_s: float = 0.4
     movement_s: float = 0.8
     dwell_s: float = 0.6
     patience_s: float = 6.0
-    """From a new cursor to the start of the movement; the movement; holding still before
-    confirming; waiting for an answer before confirming again."""
+    """Times from a new cursor to the start of the movement, of the movement, of holding still
+    before confirming, and of waiting for an answer before confirming again."""
     lateral_sigma_arcmin: float = 3.0
     """Error of the overlay about each of two axes."""
     depth_sigma: float = 0.003
-    """Error of the overlay's size, relative."""
+    """Relative error of the overlay's size."""
     rotation_sigma_rad: float = 0.035
-    """Rotation of the hand against the cursor, about a random axis."""
+    """Rotation of the hand relative to the cursor, about a random axis."""
     novice: bool | None = None
-    """A novice overlays a rotated hand first and confirms it; None lets the seed choose."""
+    """A novice first overlays and confirms a rotated hand; None to choose by the seed."""
     novice_rotation_rad: float = 0.23
-    """By how much."""
+    """Rotation of a novice's first overlay."""
     head_sway_m: float = 0.003
     head_sway_rad: float = 0.005
     hand_sway_m: float = 0.0005
@@ -77,7 +77,7 @@ class WearerSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplayView:
-    """What the headset shows at one instant."""
+    """The content of the headset's displays at one instant."""
 
     t_s: float
     cursor_W_m: Float64 | None
@@ -88,15 +88,15 @@ class DisplayView:
     T_V_H: Mapping[Eye, Float64]
     """each (4, 4)."""
     eyes: tuple[Eye, ...]
-    """The eyes that shall be open."""
+    """The eyes to keep open."""
     guard_red: bool
-    """Whether the live hand is drawn red."""
+    """True if the live hand is drawn red."""
     prompt: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerAction:
-    """What the wearer does at one instant."""
+    """The wearer's action at one instant."""
 
     T_W_H: Float64
     T_W_hand: Float64
@@ -107,9 +107,9 @@ class WearerAction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Move:
-    """A movement of the hand toward a goal, by minimum jerk (Flash & Hogan 1985).
+    """A minimum-jerk movement of the hand toward a goal (Flash & Hogan 1985).
 
-    It may dip on its way, as a relaxing arm does.
+    It may dip on the way, as with a relaxing arm.
     """
 
     T_from: Float64
@@ -149,7 +149,7 @@ class _Sway:
 
 
 def draw_slip(rng: np.random.Generator, settings: WearerSettings, turned_rad: float = 0.0) -> Slip:
-    """Draw the errors of one placement, of a hand turned by about `turned_rad`."""
+    """Draw the error of one placement, of a hand rotated by about `turned_rad`."""
     axis = rng.normal(size=3)
     angle_rad = turned_rad + settings.rotation_sigma_rad * rng.normal()
     return Slip(
@@ -181,15 +181,15 @@ class Wearer:
     ----------
     seed : int
     rig : Rig
-        The headset that is worn.
+        Rig of the worn headset.
     hand : HandModel
-        The own hand.
+        The wearer's hand.
     settings : WearerSettings, optional
 
     Attributes
     ----------
     true_shift_m : mapping of eye to (3,) float64
-        φ of the true eyes from C0, E axes. For judging results only; the engine never learns it.
+        φ of the true eyes from C0, E axes. Only for judging results; hidden from the engine.
     """
 
     def __init__(
@@ -216,12 +216,12 @@ class Wearer:
         self._P_confirmed: Mapping[Eye, Float64] = {}
 
     def step(self, view: DisplayView) -> WearerAction:
-        """Live on until `view.t_s`, looking at what the headset shows.
+        """Advance to `view.t_s`, reacting to the displays.
 
         Parameters
         ----------
         view : DisplayView
-            Its times must not run backward from step to step.
+            Its times must not decrease between steps.
         """
         t_s = view.t_s
         T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s)
@@ -236,7 +236,7 @@ class Wearer:
         return WearerAction(T_W_H, T_W_hand, confirm)
 
     def _notice(self, view: DisplayView, move: _Move) -> None:
-        """Take up a cursor that appears, and relax when it has served."""
+        """Start aligning with a new cursor, and relax after the alignment."""
         task = None if view.cursor_W_m is None else (view.cursor_id, view.eyes)
         if self._phase == "raised":
             wait_s = self._settings.patience_s if task == self._task else 0.0
@@ -274,7 +274,7 @@ class Wearer:
         return any(not np.array_equal(P, view.P[eye]) for eye, P in self._P_confirmed.items())
 
     def _decide(self, view: DisplayView, move: _Move) -> bool:
-        """Return whether to press the button now; correct the hand instead if it is red."""
+        """Return whether to press the button; correct the hand instead if it is red."""
         settings, t_s = self._settings, view.t_s
         if self._phase == "reaching":
             if t_s < move.end_s + settings.dwell_s:
@@ -296,7 +296,7 @@ class Wearer:
         return True
 
     def _overlay(self, view: DisplayView, T_W_H: Float64) -> Float64 | None:
-        """Return where the hand seems to overlap the cursor, or None if too little is drawn."""
+        """Return the pose that seems to overlap the cursor; None if too little is drawn."""
         assert self._match is not None
         views, eyes_m = [], []
         for eye in view.eyes:
