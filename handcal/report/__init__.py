@@ -1,1 +1,1 @@
-"""A report, described once and written as PDF, as HTML, and as its figures with their raw rows."""
+"""Reports: described once, written as PDF, HTML, and figures with their data."""

@@ -1,4 +1,4 @@
-"""Statistics as the texts of a table's cells, which no line break parts."""
+"""Statistics formatted for table cells, without line breaks."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ def mean_sd(summary: Summary) -> str:
 
 
 def median_quartiles(summary: Summary) -> str:
-    """Return the median, and the quartiles in parentheses."""
+    """Return the median with the quartiles in parentheses."""
     return f"{summary.median:.2f}\u00a0({summary.q1:.2f}–{summary.q3:.2f})"
 
 
 def extremes(summary: Summary) -> str:
-    """Return the least and the largest."""
+    """Return the minimum and the maximum."""
     return f"{summary.min:.2f}–{summary.max:.2f}"
 
 
 def interval_ends(interval: MeanInterval | None) -> str:
-    """Return the ends of an interval, or a dash for none."""
+    """Return the limits of an interval, or a dash if there is none."""
     return f"{interval.low:.2f}\u00a0to\u00a0{interval.high:.2f}" if interval else NOTHING

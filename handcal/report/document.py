@@ -1,4 +1,4 @@
-"""What a report says, however it is written."""
+"""The content of a report, independent of its file format."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Row: TypeAlias = Mapping[str, float | int | str | bool | None]
-"""A row of raw numbers, by the names of its columns, with their units."""
+"""A row of numbers by column name; the names include units."""
 
 AXES_LEFT_MM = 13.0
-"""Room for tick labels and title on the left of axes."""
+"""Space for tick labels and title to the left of axes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column of a table; a table whose titles are all empty has no head."""
+    """A column of a table; a table whose titles are all empty has no header."""
 
     title: str = ""
     align: Literal["left", "right"] = "right"
@@ -37,31 +37,31 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A strip of axes beside one another, over a page's width.
+    """A row of axes across the width of a page.
 
     Raises
     ------
     ValueError
-        If the name is none for a file.
+        If the name is not valid for a file.
     """
 
     name: str
-    """Of its files: lower-case letters, digits and hyphens, once in a report."""
+    """Name of its files: lower-case letters, digits and hyphens, unique in a report."""
     caption: str
     draw: Callable[[Sequence[Axes]], None]
-    """Draws into the axes that it is given; called once for each file the figure is in."""
+    """Draws into the given axes; called once for each file that contains the figure."""
     rows: Sequence[Row]
-    """The numbers behind it: the rows of its CSV."""
+    """Its data: the rows of its CSV file."""
     height_mm: float = 60.0
     columns: int = 1
-    """How many axes."""
+    """Number of axes."""
     left_mm: float = AXES_LEFT_MM
-    """Room for tick labels and title on the left of each."""
+    """Space for tick labels and title to the left of each."""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
             raise ValueError(
-                f"a figure is named by lower-case letters, digits and hyphens, not {self.name!r}"
+                f"a figure's name has lower-case letters, digits and hyphens, not {self.name!r}"
             )
 
 
@@ -71,7 +71,7 @@ Item: TypeAlias = str | Table | Figure
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of a report; `title` may be empty."""
+    """A section of a report; `title` may be empty."""
 
     title: str
     items: Sequence[Item]
@@ -80,17 +80,17 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that a report says.
+    """The whole content of a report.
 
     Raises
     ------
     ValueError
-        If two figures have one name.
+        If two figures have the same name.
     """
 
     title: str
     subject: str
-    """What it is of, in one line; on every page."""
+    """Its subject in one line, printed on every page."""
     lead: str
     """The finding in a sentence or two."""
     sections: Sequence[Section]
@@ -110,5 +110,5 @@ class Report:
 
 
 def facts(values: Mapping[str, str], caption: str = "") -> Table:
-    """Return a table without head: names and what there is to say of each."""
+    """Return a table of names and values, without header."""
     return Table([Column(align="left"), Column(align="left")], list(values.items()), caption)

@@ -1,4 +1,4 @@
-"""A report's figures by themselves: pictures, and the raw rows behind them."""
+"""A report's figures as files: images, and their data as CSV."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def write_figures(folder: Path, report: Report, checkpoint: Callable[[float], No
         Created if there is any figure.
     report : Report
     checkpoint : callable
-        Told the share done before each figure; what it raises ends the writing.
+        Called with the share done before each figure; any exception it raises ends the writing.
     """
     for done, figure in enumerate(report.figures):
         checkpoint(done / len(report.figures))
@@ -37,11 +37,11 @@ def write_figures(folder: Path, report: Report, checkpoint: Callable[[float], No
 
 
 def picture(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
-    """Return a figure as a picture, as wide as a page's text."""
+    """Return a figure as an image, as wide as the text of a page."""
     canvas = Canvas(figsize=(CONTENT_MM / MM_PER_INCH, figure.height_mm / MM_PER_INCH))
     figure.draw(add_strip(canvas, (0.0, 0.0), figure))
     stream = io.BytesIO()
     metadata: dict[str, Any] = {"Date": None} if kind == "svg" else {}
-    with rc_context({"svg.hashsalt": "handcal", "svg.fonttype": "path"}):  # the same bytes again
+    with rc_context({"svg.hashsalt": "handcal", "svg.fonttype": "path"}):  # reproducible bytes
         canvas.savefig(stream, format=kind, dpi=_DPI, metadata=metadata)
     return stream.getvalue()

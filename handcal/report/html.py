@@ -1,4 +1,4 @@
-"""A report as one HTML file that needs no other, and no network."""
+"""A report as a self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _NO_BREAK = "\u00a0"
 
 
 def write_html(path: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
-    """Write a report as HTML with its figures and their raw rows in it.
+    """Write a report as HTML with embedded figures and data.
 
     Parameters
     ----------
     path : Path
     report : Report
     checkpoint : callable
-        Told the share done before each figure; what it raises ends the writing.
+        Called with the share done before each figure; any exception it raises ends the writing.
     """
     template = resource_path("report.html.jinja")
     environment = Environment(
@@ -63,7 +63,7 @@ def _data_url(kind: str, content: bytes) -> str:
 
 
 def _printable(value: object) -> object:
-    """Return a text without what no page can show, such as control characters."""
+    """Return a text without characters that cannot be shown, such as control characters."""
     if not isinstance(value, str):
         return value
     return "".join(

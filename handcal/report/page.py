@@ -1,7 +1,7 @@
-"""A4 pages set from top to bottom with matplotlib: headings, wrapped text, tables and axes.
+"""Layout of A4 pages with matplotlib: headings, wrapped text, tables and axes.
 
-Every text is set as it is, never as mathtext, and wrapped by its measured width, so that no name
-or note can spoil a page. Lengths are millimetres from the upper left corner.
+Text is set literally, never as mathtext, and wrapped by its measured width, so that no name or note
+can break a page. Lengths are in millimetres from the upper left corner.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ _TABLE_PT, _TEXT_PT = 7.5, 9.0
 _CELL_PAD_MM = 1.2
 _GREY = "0.45"
 _NO_BREAK = "\u00a0"
-# So many characters of a cell count for its column's width.
+# Number of characters of a cell that count for its column's width.
 _MEASURED = 300
-# So many lines are shown of a cell.
+# Most lines shown of a cell.
 _CELL_LINES = 20
 _CAPTION_MM = 9.0
-# Inside a cell of axes: room for tick labels and titles.
+# Space inside a cell of axes for tick labels and titles.
 _AXES_RIGHT_MM, _AXES_TOP_MM, _AXES_BOTTOM_MM = 3.0, 6.0, 10.0
 
 
 class Document:
-    """Pages that fill from the top; what does not fit goes on the next one.
+    """Pages filled from the top; content that does not fit continues on the next page.
 
     Parameters
     ----------
     footer : str
-        At the foot of every page, left of its number.
+        Printed at the bottom of every page, left of its number.
     """
 
     def __init__(self, footer: str) -> None:
@@ -53,13 +53,13 @@ class Document:
         self.new_page()
 
     def new_page(self) -> None:
-        """Begin a page."""
+        """Start a page."""
         inches = WIDTH_MM / MM_PER_INCH, HEIGHT_MM / MM_PER_INCH
         self._pages.append(Page(figsize=inches))
         self._y_mm = _TOP_MM
 
     def finish(self) -> list[Page]:
-        """Give the pages their numbers and return them."""
+        """Add page numbers and return the pages."""
         y_mm = HEIGHT_MM - 0.6 * _BOTTOM_MM
         footer = _wrap(self._footer, 7.0, "normal", 0.8 * CONTENT_MM)[0]
         for number, page in enumerate(self._pages, 1):
@@ -75,7 +75,7 @@ class Document:
         self.space(2.0)
 
     def heading(self, text: str, room_mm: float = 40.0) -> None:
-        """Set the heading of a section, on the next page unless `room_mm` are left below it."""
+        """Set a section's heading, on the next page unless `room_mm` remain below it."""
         self._need(room_mm)
         if self._y_mm > _TOP_MM:
             self.space(5.0)
@@ -85,23 +85,23 @@ class Document:
     def text(
         self, text: str, points: float = _TEXT_PT, weight: str = "normal", color: str = "black"
     ) -> None:
-        """Set paragraphs of text over the page's width."""
+        """Set paragraphs of text across the page."""
         for line in _wrap(text, points, weight, CONTENT_MM):
             self._need(_line_mm(points))
             _put(self._pages[-1], line, _MARGIN_MM, self._y_mm, points, weight=weight, color=color)
             self._y_mm += _line_mm(points)
 
     def caption(self, text: str) -> None:
-        """Set what a figure or table shows, below it."""
+        """Set the caption below a figure or table."""
         self.text(text, points=_TABLE_PT, color="0.3")
         self.space(2.5)
 
     def space(self, height_mm: float) -> None:
-        """Leave room."""
+        """Leave vertical space."""
         self._y_mm += height_mm
 
     def table(self, columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> None:
-        """Set a table over the page's width; its head is repeated on every page it reaches."""
+        """Set a table across the page; its header is repeated on every page."""
         head = [column.title for column in columns]
         widths_mm = _column_widths_mm(columns, [head, *rows])
 
@@ -109,7 +109,7 @@ class Document:
             if any(head):
                 self._row(columns, widths_mm, head, weight="bold")
 
-        if rows:  # the head is not parted from the first of them
+        if rows:  # the header stays with the first row
             first_mm = _row_height_mm(widths_mm, rows[0])
             self._need(_row_height_mm(widths_mm, head, weight="bold") + first_mm)
         set_head()
@@ -121,7 +121,7 @@ class Document:
         self.space(1.5)
 
     def axes(self, figure: Figure) -> list[Axes]:
-        """Return the axes of a figure, beside one another over the page's width."""
+        """Return the axes of a figure, side by side across the page."""
         self._need(figure.height_mm + _CAPTION_MM)
         found = add_strip(self._pages[-1], (_MARGIN_MM, self._y_mm), figure)
         self._y_mm += figure.height_mm
@@ -160,13 +160,13 @@ class Document:
 
 
 def add_strip(canvas: Page, corner_mm: tuple[float, float], figure: Figure) -> list[Axes]:
-    """Add a figure's axes beside one another, `CONTENT_MM` wide, to a page or canvas.
+    """Add a figure's axes side by side, `CONTENT_MM` wide, to a page or canvas.
 
     Parameters
     ----------
     canvas : matplotlib.figure.Figure
     corner_mm : tuple of float
-        The strip's upper left corner, from that of the canvas.
+        Upper left corner of the axes, relative to the canvas.
     figure : Figure
     """
     canvas_mm = canvas.get_size_inches() * MM_PER_INCH
@@ -189,12 +189,12 @@ def add_strip(canvas: Page, corner_mm: tuple[float, float], figure: Figure) -> l
 
 
 def plain(text: str) -> str:
-    """Return a text without what the report's font lacks, control characters included."""
+    """Return a text without characters that the report's font lacks, or control characters."""
     return "".join(map(_plain_char, text))
 
 
 def _wrap(text: str, points: float, weight: str, width_mm: float) -> list[str]:
-    """Break a text into lines that fit, within words where it must be; at least one line."""
+    """Break a text into lines that fit, within words if necessary; at least one line."""
     lines = [
         line
         for paragraph in text.splitlines()
@@ -225,8 +225,8 @@ def _break(word: str, points: float, weight: str, width_mm: float) -> list[str]:
 
 
 def _column_widths_mm(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> list[float]:
-    """Return widths that fill the page: as the cells need, and between words where too much."""
-    pad_mm = 2 * _CELL_PAD_MM + 0.5  # lest rounding break a line
+    """Return widths that fill the page, by the cells' needs; long cells break between words."""
+    pad_mm = 2 * _CELL_PAD_MM + 0.5  # margin, so that rounding does not break a line
     least_mm, most_mm = [], []
     for cells in zip(*rows, strict=True):
         texts = [plain(cell)[:_MEASURED] for cell in cells]
@@ -261,7 +261,7 @@ def _row_height_mm(
 
 
 def _width_mm(text: str, points: float, weight: str) -> float:
-    """Return the width of a text as it is printed, kerning left out."""
+    """Return the printed width of a text, without kerning."""
     return sum(_char_width_mm(char, weight) for char in text) * points
 
 
@@ -291,7 +291,7 @@ def _line_mm(points: float) -> float:
 
 
 def _put(page: Page, text: str, x_mm: float, y_mm: float, points: float, **style: Any) -> None:
-    """Put one line with its upper edge at `y_mm`."""
+    """Draw one line with its upper edge at `y_mm`."""
     baseline_mm = y_mm + 0.95 * points * MM_PER_INCH / _POINTS_PER_INCH
     page.text(
         x_mm / WIDTH_MM,

@@ -19,35 +19,35 @@ from handcal.report.page import Document, plain
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
-# A heading needs so much room for itself, and so much for what follows it.
+# Space needed by a heading, and by the content that must follow it.
 _HEADING_MM, _PARAGRAPH_MM, _TABLE_MM = 15.0, 12.0, 25.0
 
 
 def write_pdf(path: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
-    """Write a report as PDF, A4, with its fonts.
+    """Write a report as PDF, A4, with embedded fonts.
 
     Parameters
     ----------
     path : Path
     report : Report
     checkpoint : callable
-        Told the share done, many times a second; what it raises ends the writing.
+        Called with the share done, many times a second; any exception it raises ends the writing.
     """
     pages = compose(report, lambda share: checkpoint(0.4 * share))
     stream = _CheckedStream(checkpoint, 0.4)
-    # TrueType rather than Type 3, which publishers refuse; pictures at 200 dots an inch.
+    # TrueType, as publishers refuse Type 3; images at 200 dots per inch.
     with rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
         pdf: Any = PdfPages(stream, metadata=_metadata(report))
         for done, page in enumerate(pages):
             stream.share = 0.4 + 0.5 * done / len(pages)
             pdf.savefig(page)
         stream.share = 0.9
-        pdf.close()  # not after an error: it would go on writing
+        pdf.close()  # not after an error, when it would continue writing
     write_atomic(path, stream.getvalue())
 
 
 def compose(report: Report, checkpoint: Callable[[float], None]) -> list[Page]:
-    """Return the report's pages; arguments as `write_pdf`."""
+    """Return the report's pages; parameters as in `write_pdf`."""
     document = Document(report.subject)
     document.title(report.title)
     document.text(report.lead, points=11.0)
@@ -67,7 +67,7 @@ def compose(report: Report, checkpoint: Callable[[float], None]) -> list[Page]:
 
 
 class _CheckedStream(io.BytesIO):
-    """Bytes whose every writing is a checkpoint: matplotlib works for long between two pages."""
+    """A buffer that calls the checkpoint on every write, as matplotlib is slow between pages."""
 
     def __init__(self, checkpoint: Callable[[float], None], share: float) -> None:
         super().__init__()
@@ -94,7 +94,7 @@ def _set(document: Document, item: Item) -> None:
 
 
 def _room_mm(items: Sequence[Item]) -> float:
-    """Return the room for what a heading must not be parted from: up to a table or figure."""
+    """Return the space for the content that must stay with a heading: up to a table or figure."""
     room_mm = 0.0
     for item in items:
         match item:

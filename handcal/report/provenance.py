@@ -1,4 +1,4 @@
-"""What a report was made with: versions, machine, and settings."""
+"""Provenance of a report: versions, machine and settings."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import numpy as np
 
 from handcal.report.document import Item, facts
 
-# More settings than these are left to the file that holds them.
+# Most settings listed; the file holds the others.
 _MAX_SETTINGS = 120
 _MAX_CHARACTERS = 200
 
 
 def made_with() -> dict[str, str]:
-    """Return what the report is made with, and when, by name."""
+    """Return the software, machine and time with which a report is made."""
     return {
         "Made with": f"handcal {version('handcal')}, Python {platform.python_version()}, "
         f"NumPy {np.__version__}, on {platform.system()} {platform.machine()}",
@@ -27,7 +27,7 @@ def made_with() -> dict[str, str]:
 
 
 def settings_items(settings: Mapping[str, Any], file: str = "settings.json") -> list[Item]:
-    """Return nested settings as a table, and how many more are in `file` if they are too many."""
+    """Return nested settings as a table, with the number of further ones in `file`."""
     rows = _flat(settings)
     items: list[Item] = [facts(dict(rows[:_MAX_SETTINGS]))]
     if len(rows) > _MAX_SETTINGS:

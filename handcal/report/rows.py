@@ -1,4 +1,4 @@
-"""Rows of raw numbers as CSV (RFC 4180, UTF-8)."""
+"""Rows of numbers as CSV (RFC 4180, UTF-8)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
 def rows_csv(rows: Iterable[Mapping[str, Any]], columns: Sequence[str] | None = None) -> bytes:
-    """Return rows as CSV; a text that a spreadsheet would take for a formula gets an apostrophe.
+    """Return rows as CSV; text that a spreadsheet would run as a formula gets an apostrophe.
 
     Parameters
     ----------
     rows : iterable of mapping
-        Cells by column; those that a row lacks, and None, stay empty.
+        Cells by column; missing ones and None stay empty.
     columns : sequence of str, optional
-        By default all that there are, in the order in which they first appear.
+        Default: all, in order of first appearance.
 
     Raises
     ------
     ValueError
-        If a row has a cell of no column.
+        If a row has a cell outside the columns.
     """
     rows = list(rows)
     names = columns or list(dict.fromkeys(name for row in rows for name in row))

@@ -1,4 +1,4 @@
-"""All that a report is: PDF, HTML, and its figures with their raw rows."""
+"""Writing a report in all formats: PDF, HTML, and figures with their data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from handcal.report.pdf import write_pdf
 def write_report(
     folder: Path, report: Report, checkpoint: Callable[[float], None] = lambda _share: None
 ) -> tuple[Path, Path]:
-    """Write report.pdf, report.html, figures/NAME.png and figures/NAME.csv, each at once.
+    """Write report.pdf, report.html, figures/NAME.png and figures/NAME.csv, each atomically.
 
     Parameters
     ----------

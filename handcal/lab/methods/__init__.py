@@ -1,1 +1,1 @@
-"""Calibration methods that handcal is compared with: pure functions on arrays."""
+"""Other calibration methods, for comparison: pure functions on arrays."""

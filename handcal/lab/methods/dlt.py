@@ -1,8 +1,8 @@
 """The direct linear transform: a projective map from pairs of points, by one SVD.
 
-Equations as in Abdel-Aziz & Karara 1971; both sides are first moved to their centroid and each axis
-scaled to variance 1 (after Hartley, "In defense of the eight-point algorithm", 1997). With one
-scale for all axes the noise counts otherwise: the authors of INDICA scaled each (docs/methods.md).
+Equations as in Abdel-Aziz & Karara 1971. Both sides are first centred and each axis scaled to
+variance 1 (after Hartley, "In defense of the eight-point algorithm", 1997). A common scale for all
+axes would weight the noise differently; the authors of INDICA scale each axis (docs/methods.md).
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def fit_projective(source: Float64, target: Float64) -> Float64:
     for axis in range(m):
         rows[:, axis, axis] = x
         rows[:, axis, m] = -y[:, axis, None] * x
-    # The row of zeros keeps the null vector of as many equations as unknowns but one.
+    # The row of zeros keeps the null vector when there is one equation less than unknowns.
     system = np.vstack([rows.reshape(count * m, -1), np.zeros((m + 1) * n)])
     _, sizes, Vt = np.linalg.svd(system, full_matrices=False)
     if sizes[-2] < _AMBIGUOUS * sizes[0]:
         raise ValueError(
-            "the points do not tell the projection: spread them in all directions, depth too, "
-            "and not on one plane"
+            "the points do not determine the projection: spread them in all directions and in "
+            "depth, not on one plane"
         )
     normal = Vt[-1].reshape(m + 1, n)
     P = np.linalg.solve(T_target, normal @ T_source)
@@ -50,7 +50,7 @@ def fit_projective(source: Float64, target: Float64) -> Float64:
 
 
 def _normalise(points: Float64) -> tuple[Float64, Float64]:
-    """Return the affine map that normalises points, homogeneous, and (N, n + 1) points by it."""
+    """Return the homogeneous map that normalises points, and the (N, n + 1) mapped points."""
     centroid, widths = points.mean(axis=0), points.std(axis=0)
     scales = 1.0 / np.where(widths > 0.0, widths, 1.0)
     T = np.diag([*scales, 1.0])

@@ -1,13 +1,14 @@
-"""Fingertip alignment: the wearer's own fingertip is the tracked point.
+"""Fingertip alignment: the wearer's fingertip is the tracked point.
 
 Moser & Swan 2016, "Evaluation of user-centric optical see-through head-mounted display calibration
-using a Leap Motion controller" (3DUI): 25 alignments for each eye, solved as SPAAM: use
-`handcal.lab.methods.spaam`.
+using a Leap Motion controller" (3DUI): 25 alignments for each eye, solved as in SPAAM
+(`handcal.lab.methods.spaam`).
 
 Jun & Kim 2016, "A calibration method for optical see-through head-mounted displays with a depth
 camera" (VR): after a full calibration when the camera is mounted, a simplified one for each wearer,
-8 alignments according to Hu et al. 2021. We know both publications only second hand, and this one's
-equations not at all: here the simplified calibration keeps the offline display and seeks the eye.
+8 alignments according to Hu et al. 2021. Both publications are known to us only second hand, and
+the equations of this one not at all: here the simplified calibration keeps the offline display and
+solves for the eye.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ _UNTOLD = 1e-9
 
 
 def solve_eye_from_points(points_E_m: ArrayLike, pixels: ArrayLike, display: EyeDisplay) -> Float64:
-    """Return the eye shift that makes a known display fit alignments of single points.
+    """Return the eye shift for which a known display fits alignments of single points.
 
-    With ``n = (K H0)^-1 [m; 1]`` and UQ (`handcal.display`), each alignment asks
-    ``n (z - φ3) = UQ p``, which is linear in φ; divided by z, what remains is in pixels.
+    With ``n = (K H0)^-1 [m; 1]`` and UQ (`handcal.display`), each alignment requires
+    ``n (z - φ3) = UQ p``, which is linear in φ; divided by z, the residuals are in pixels.
 
     Parameters
     ----------
     points_E_m : (N, 3) array_like
         The tracked point at each alignment, in E.
     pixels : (N, 2) array_like
-        What it was aligned with.
+        The pixels with which it was aligned.
     display : EyeDisplay
 
     Returns
@@ -65,5 +66,5 @@ def solve_eye_from_points(points_E_m: ArrayLike, pixels: ArrayLike, display: Eye
     b = rays - points[:, :2] / depth[:, None]
     shift_m, _, rank, _ = np.linalg.lstsq(A.reshape(-1, 3), b.reshape(-1), rcond=_UNTOLD)
     if rank < 3:
-        raise ValueError("the alignments do not tell the eye's position: spread them out")
+        raise ValueError("the alignments do not determine the eye's position: spread them out")
     return np.asarray(shift_m)

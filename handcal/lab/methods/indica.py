@@ -1,9 +1,9 @@
-"""INDICA: the projection from where an eye tracker sees the eye.
+"""INDICA: the projection for an eye position measured by an eye tracker.
 
 Itoh & Klinker 2014, "Interaction-free calibration for optical see-through head-mounted displays
 based on 3D eye localization" (3DUI). The *recycled* setup takes an earlier calibration of the same
-display, such as SPAAM's, and moves its viewpoint to the tracked eye; the *full* setup takes the
-display itself. Formulas as in the authors' own code (github.com/YutaItoh/HMD-Calibration, MIT);
+display, such as SPAAM's, and moves its viewpoint to the tracked eye; the *full* setup uses a model
+of the display. Formulas as in the authors' own code (github.com/YutaItoh/HMD-Calibration, MIT);
 here both have z forward, and the recycled one is the paper's update matrix.
 """
 
@@ -21,12 +21,12 @@ from handcal.types import Float64
 def solve_indica_recycled(
     P_offline: ArrayLike, display_distance_m: float, eye_m: ArrayLike
 ) -> Float64:
-    """Return an earlier projection as seen by the eye where it is now.
+    """Return an earlier projection, updated for the present position of the eye.
 
     Parameters
     ----------
     P_offline : (3, 4) array_like
-        Pixels from points in a frame of the headset, for the eye where it was.
+        Pixels from points in a frame of the headset, for the earlier position of the eye.
     display_distance_m : float
         From that viewpoint to the display's focal plane.
     eye_m : (3,) array_like
@@ -54,7 +54,7 @@ def solve_indica_recycled(
 def solve_indica_full(
     focal_px_m: float, centre_px: ArrayLike, T_S_H: ArrayLike, eye_m: ArrayLike
 ) -> Float64:
-    """Return the projection through a display that is known by itself.
+    """Return the projection through a display with a known model.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def solve_indica_full(
     Raises
     ------
     ValueError
-        For wrong shapes, NaN, or an eye that is not before the focal plane.
+        For wrong shapes, NaN, or an eye that is not in front of the focal plane.
     """
     eye = check_points("eye_m", np.asarray(eye_m)[None], 3, 1)[0]
     T = check_points("T_S_H", np.asarray(T_S_H)[:3], 4, 3)
@@ -102,7 +102,7 @@ def split_projection(P: ArrayLike) -> tuple[Float64, Float64, Float64]:
     Parameters
     ----------
     P : (3, 4) array_like
-        Its sign is such that points before the eye have a positive weight.
+        Its sign gives points in front of the eye a positive weight.
 
     Returns
     -------

@@ -2,8 +2,8 @@
 
 Azimi, Qian, Navab & Kazanzides 2017, "Alignment of the virtual scene to the tracking space of a
 mixed reality head-mounted display" (arXiv 1703.05834): four alignments of five corners. The headset
-is a black box that shows 3D points somewhere; the map from tracked to shown points is sought. Known
-to us second hand, from Hu et al. 2021; the three models of the map are from memory.
+is a black box that shows 3D points somewhere; the method solves for the map from tracked to shown
+points. Known to us second hand, from Hu et al. 2021; the three models of the map are from memory.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ _FLAT = 1e-6
 
 
 def solve_mpaam(tracked_m: ArrayLike, shown_m: ArrayLike, model: MapModel) -> Float64:
-    """Return the map that puts virtual points where the real ones are seen.
+    """Return the map from real points to the virtual points that cover them.
 
     Parameters
     ----------
     tracked_m : (N, 3) array_like
         Corners of the real cube in the headset's frame, of all alignments.
     shown_m : (N, 3) array_like
-        Where the same corners of the virtual cube were put in the virtual scene.
+        The same corners of the virtual cube as placed in the virtual scene.
     model : {"isometric", "affine", "perspective"}
         6, 12 or 15 unknowns.
 
     Returns
     -------
     (4, 4) float64
-        From tracked to virtual points, homogeneous: what is rendered at ``T p`` covers p.
+        From tracked to virtual points, homogeneous: a point rendered at ``T p`` covers p.
 
     Raises
     ------

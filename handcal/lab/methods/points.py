@@ -1,4 +1,4 @@
-"""What every method on point alignments asks of its points."""
+"""Checks of the input points shared by all point-based methods."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ _FARTHEST = 1e6
 
 
 def check_points(name: str, values: ArrayLike, columns: int, fewest: int) -> Float64:
-    """Return (N, columns) float64, or raise ValueError that names what is wrong.
+    """Return (N, columns) float64; ValueError names the fault.
 
     Parameters
     ----------
     name : str
-        What the values are called in a message.
+        Name of the values in messages.
     values : array_like
         Metres or pixels.
     columns, fewest : int
-        Numbers of each point, and points that the method needs.
+        Coordinates of each point, and least number of points.
     """
     points = np.asarray(values, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != columns:
@@ -38,14 +38,14 @@ def check_points(name: str, values: ArrayLike, columns: int, fewest: int) -> Flo
 def check_pairs(
     source: tuple[str, ArrayLike, int], target: tuple[str, ArrayLike, int], fewest: int
 ) -> tuple[Float64, Float64]:
-    """Return both sides of a set of pairs as `check_points` does, and as many of each.
+    """Return both sides of a set of pairs, checked by `check_points` and for equal length.
 
-    Each side is its name, its values, and the numbers of each point.
+    Each side is given by its name, its values, and the coordinates of each point.
     """
     sources, targets = (check_points(*side, fewest) for side in (source, target))
     if len(sources) != len(targets):
         raise ValueError(
             f"{source[0]} has {len(sources)} points and {target[0]} {len(targets)}; "
-            "each needs its partner"
+            "each point needs a partner"
         )
     return sources, targets

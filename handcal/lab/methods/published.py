@@ -1,4 +1,4 @@
-"""What others published of these methods, as Hu et al. 2021 collected it (their tables 2 and 3).
+"""Published results of these methods, as collected by Hu et al. 2021 (their tables 2 and 3).
 
 Conditions differ between studies: displays, distances, users and what counts as truth.
 """
@@ -22,7 +22,7 @@ class PublishedReprojection:
 
 @dataclass(frozen=True, slots=True)
 class PublishedMisalignment:
-    """Misalignment at arm's reach, each "mean ± sd" as far as given."""
+    """Misalignment at arm's reach, each as "mean ± sd" where given."""
 
     study: str
     alignments: str
@@ -31,10 +31,10 @@ class PublishedMisalignment:
     z_mm: str = "–"
     across_mm: str = "–"
     across_arcmin: str = "–"
-    """In x and y together."""
+    """Combined error in x and y."""
     rotation_deg: str = "–"
     whole_mm: str = ""
-    """Where components are not given."""
+    """Total error, where components are not given."""
 
 
 REPROJECTION = (
@@ -44,8 +44,8 @@ REPROJECTION = (
     PublishedReprojection("Moser & Swan 2016, stylus, 25", 9.57, 6.13, 14.80, 0.66, 13.09),
     PublishedReprojection("Moser & Swan 2016, finger, 25", 16.98, 10.83, 25.51, 0.93, 46.87),
 )
-"""The row on SPAAM is in the paper's source, not in its table. The stylus's third quartile is above
-its maximum as printed."""
+"""The row on SPAAM is in the paper's source but not in its table. The stylus's third quartile is
+above its maximum, as printed."""
 
 MISALIGNMENT = (
     PublishedMisalignment(
@@ -58,4 +58,4 @@ MISALIGNMENT = (
     PublishedMisalignment("Guo et al. 2019", "5, box", rotation_deg="5.42", whole_mm="6.83"),
     PublishedMisalignment("Jun & Kim 2016", "8, fingertip", whole_mm="about 10"),
 )
-"""Of cameras or users; not of the same quantity."""
+"""Measured with cameras or users; not all of the same quantity."""

@@ -3,8 +3,8 @@
 Tuceryan & Navab 2000, "Single point active alignment method (SPAAM) for optical see-through HMD
 calibration for AR"; in print as Tuceryan, Genc & Navab 2002, Presence 11(3), whose abstract and
 procedure this follows. The wearer aligns crosshairs on the display with a tracked point, one after
-the other; the 11 unknowns are found linearly. Written from the published equations as the authors
-of INDICA use them (`docs/methods.md`); the normalisation is Hartley's.
+the other; the 11 unknowns are solved linearly. Written from the published equations as used by the
+authors of INDICA (`docs/methods.md`), with Hartley's normalisation.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def solve_spaam(points_m: ArrayLike, pixels: ArrayLike) -> Float64:
         The tracked point at each alignment, in one frame of the headset; N from 6, in practice
         20 or more.
     pixels : (N, 2) array_like
-        The crosshairs it was aligned with.
+        The crosshairs with which it was aligned.
 
     Returns
     -------
@@ -38,8 +38,8 @@ def solve_spaam(points_m: ArrayLike, pixels: ArrayLike) -> Float64:
     Raises
     ------
     ValueError
-        For fewer than 6 alignments, wrong shapes, NaN, points that leave the projection open
-        (as on a plane), or alignments that put points behind the eye.
+        For fewer than 6 alignments, wrong shapes, NaN, degenerate points (such as on a plane), or
+        alignments that place points behind the eye.
     """
     points, targets = check_pairs(
         ("points_m", points_m, 3), ("pixels", pixels, 2), FEWEST_ALIGNMENTS

@@ -1,4 +1,4 @@
-"""Stereo-SPAAM: both eyes' projections from alignments with a mark seen in depth.
+"""Stereo-SPAAM: both eyes' projections from alignments with a stereoscopic mark.
 
 Genc, Sauer, Wenzel, Tuceryan & Navab 2000, "Optical see-through HMD calibration: a stereo method";
 as in Tuceryan, Genc & Navab 2002: "the user aligns a stereoscopically fused 2D marker, which is
@@ -27,7 +27,7 @@ def solve_stereo_spaam(
     points_m : (N, 3) array_like
         The tracked point at each alignment, in one frame of the headset.
     pixels : mapping of eye to (N, 2) array_like
-        Where each eye's half of the mark was drawn.
+        The pixels at which each eye's half of the mark was drawn.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def solve_stereo_spaam(
     Raises
     ------
     ValueError
-        As `solve_spaam`; the message names the eye.
+        See `solve_spaam`; the message names the eye.
     """
     projections: dict[Eye, Float64] = {}
     for eye, drawn_px in pixels.items():
