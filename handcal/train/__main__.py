@@ -19,7 +19,7 @@ from handcal.train.simulated import render_hands
 _SIMULATED = 1800
 _MOMENTS = 80
 
-# Weights that know hands already learn from larger crops, closer to what the detector will see.
+# Weights already trained on hands learn from larger crops, closer to the detector's input.
 _FURTHER = TrainSettings(
     seed=7,
     steps=28_000,
@@ -31,7 +31,7 @@ _FURTHER = TrainSettings(
 
 @errors_in_one_line()
 def main() -> None:
-    """Prepare, train or resume, and log to ``log.jsonl``."""
+    """Prepare, start or resume training, and log to ``log.jsonl``."""
     parser = Parser(prog="python -m handcal.train", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="oxford_hands: train and val")
     count = number(int, 1, 64)
@@ -39,13 +39,15 @@ def main() -> None:
     start.add_argument(
         "--backbone",
         type=Path,
-        help="start anew from this folder 'model' of the npm package @vladmandic/face-api",
+        help="start from this folder 'model' of the npm package @vladmandic/face-api",
     )
     start.add_argument(
-        "--model", type=Path, help="train this exported model of floats (ONNX) further"
+        "--model", type=Path, help="continue training this exported float model (ONNX)"
     )
     parser.add_argument("--folder", type=Path, default=Path(".training"), help="working files")
-    parser.add_argument("--steps", type=number(int, 1, 10_000_000), help="instead of the recipe's")
+    parser.add_argument(
+        "--steps", type=number(int, 1, 10_000_000), help="number of steps; default: the recipe's"
+    )
     parser.add_argument("--threads", type=count, default=1)
     parser.add_argument("--workers", type=count, default=1)
     parser.add_argument(

@@ -1,6 +1,6 @@
-"""Random views of a picture, as a headset's camera might have taken it.
+"""Random views of an image, as a headset's camera might take them.
 
-Maps and boxes count pixels from the image's upper left corner.
+Maps and boxes are in pixels from the image's upper left corner.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from handcal.types import Float32, Float64
 
 
 def transform_corners(warp: Float64, corners: Float64) -> Float64:
-    """Return the upright boxes (M, 4) about corners (M, 4, 2) after an affine map (2, 3)."""
+    """Return the upright boxes (M, 4) of corners (M, 4, 2) after an affine map (2, 3)."""
     moved = corners @ warp[:, :2].T + warp[:, 2]
     return np.concatenate([moved.min(1), moved.max(1)], axis=1)
 
@@ -33,8 +33,8 @@ def random_warp(
 ) -> Float64:
     """Return a map (2, 3) of an image to a square of that side that shows `center`.
 
-    Scaled, turned half the time, mirrored half the time, and stretched by up to 10 %;
-    mostly moved so that little of the square is outside the image.
+    It scales, rotates half the time, mirrors half the time, and stretches by up to 10 %; usually
+    it is shifted so that little of the square is outside the image.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def random_warp(
     scale : float
     side_px : int
     turn_rad : float
-        Most that it is turned by.
+        Largest rotation.
     """
     angle = rng.uniform(-turn_rad, turn_rad) * (rng.random() < 0.5)
     stretch = np.exp(rng.uniform(-0.1, 0.1) / 2)
@@ -63,21 +63,21 @@ def random_warp(
 
 
 def clipped(boxes: Float64, side_px: int, shown_min: float, smallest_px: float) -> Float32:
-    """Return boxes cut at the square's sides, with 1 appended where too little is left to learn.
+    """Return boxes clipped to the square, with 1 appended if too little is left to learn from.
 
     Parameters
     ----------
     boxes : (M, 4) float64
     side_px : int
     shown_min : float
-        Share of a hand that must be in view.
+        Least visible share of a hand.
     smallest_px : float
-        Square root of the area that a hand must have.
+        Least square root of a hand's area.
 
     Returns
     -------
     (K, 5) float32
-        Boxes wholly out of view are gone.
+        Without boxes outside the view.
     """
     cut = boxes.clip(0.0, side_px)
     area, cut_area = (np.prod(b[:, 2:] - b[:, :2], axis=1) for b in (boxes, cut))
@@ -110,7 +110,7 @@ def relight(rng: np.random.Generator, image: MatLike) -> MatLike:
 
 
 def blemish(rng: np.random.Generator, image: MatLike) -> MatLike:
-    """Blur as a lens or a moving hand does, and add a sensor's noise."""
+    """Blur like a lens or a moving hand, and add sensor noise."""
     if rng.random() < 0.15:
         image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 2.0))
     if rng.random() < 0.1:

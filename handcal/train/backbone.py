@@ -1,6 +1,6 @@
-"""The pretrained backbone: an SSD-MobileNetV1 that was trained to find faces.
+"""The pretrained backbone: an SSD-MobileNetV1 trained to detect faces.
 
-It ships in the npm package `@vladmandic/face-api` (MIT), quantised to 8 bits.
+It is part of the npm package `@vladmandic/face-api` (MIT), quantised to 8 bits.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _MOST_BYTES = 2**25
 def load_backbone(net: HandNet, folder: Path) -> None:
     """Fill the network's stem and blocks from the package's folder `model`, in place.
 
-    Where a block has fewer channels than the package's, it takes those whose standard deviation
-    times the weight that the next block gives them is largest. `take_moments` must follow.
+    A block with fewer channels than the package's takes those with the largest product of standard
+    deviation and weight in the next block. `take_moments` must follow.
 
     Raises
     ------
     FileError
-        If the files are missing or not those of the package.
+        If the files are missing or not from the package.
     """
     try:
         tensors = _read(folder)
@@ -60,7 +60,7 @@ def _read(folder: Path) -> _Tensors:
     for entry in manifest[0]["weights"]:
         count = int(np.prod(entry["shape"]))
         if "quantization" not in entry:
-            break  # a constant of the face detector's own post-processing, the last
+            break  # the last: a constant of the face detector's post-processing
         values = np.frombuffer(data, np.uint8, count, offset).astype(np.float32)
         scale: dict[str, Any] = entry["quantization"]
         tensors[entry["name"]] = (values * scale["scale"] + scale["min"]).reshape(entry["shape"])
@@ -69,7 +69,7 @@ def _read(folder: Path) -> _Tensors:
 
 
 def _stem(tensors: _Tensors) -> tuple[Float32, Float32]:
-    """Return weights, their axes in PyTorch's order, and biases."""
+    """Return weights, with axes in PyTorch's order, and biases."""
     weights = tensors[f"{_ROOT}0_pointwise/weights"].transpose(3, 2, 0, 1)
     return weights, tensors[f"{_ROOT}0_pointwise/convolution_bn_offset"]
 
@@ -93,7 +93,7 @@ def _pointwise(tensors: _Tensors, number: int) -> tuple[Float32, Float32]:
 
 
 def _kept(tensors: _Tensors, number: int, depthwise: nn.Module) -> NDArray[np.intp]:
-    """Return which channels a block gets."""
+    """Return the channels that a block takes."""
     deviation = tensors[f"{_ROOT}{number + 1}_depthwise/BatchNorm/gamma"]
     taken = np.square(deviation) * np.square(_pointwise(tensors, number)[0]).sum((0, 2, 3))
     order = np.argsort(-taken, kind="stable")

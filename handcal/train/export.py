@@ -1,4 +1,4 @@
-"""The trained network as ONNX: in 32-bit floats, and quantised to 8-bit integers.
+"""Export of the trained network as ONNX: with 32-bit floats, and quantised to 8-bit integers.
 
 ``python -m handcal.train.export --data DIR``
 """
@@ -64,7 +64,7 @@ class _Camera(nn.Module):
 def export_float(net: HandNet, path: Path) -> None:
     """Write the network with input ``image`` (1, H, W, 3) uint8 and output ``raw`` (5, N)."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # this exporter is the old one, but needs fewer packages
+        warnings.simplefilter("ignore")  # the older exporter, which needs fewer packages
         torch.onnx.export(
             _Camera(net).eval().cpu(),
             (torch.zeros(1, 256, 320, 3, dtype=torch.uint8),),
@@ -84,7 +84,7 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
     ----------
     float_path, path : Path
     photos : sequence of Photo
-        A few hundred of them give the ranges of all values between the layers.
+        A few hundred, which determine the value ranges between the layers.
     """
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
@@ -100,8 +100,8 @@ def export_integer(float_path: Path, path: Path, photos: Sequence[Photo]) -> Non
             weight_type=QuantType.QInt8,
             reduce_range=True,
             op_types_to_quantize=["Conv", "Clip", "Add", "Resize"],
-            # Logits and logarithms of distances have no range in common; and of three channels
-            # integers make nothing faster.
+            # Logits and logarithms of distances have no common range, and with three channels
+            # integers are not faster.
             nodes_to_exclude=[name for name in nodes if "predict" in name or "stem" in name],
         )
 

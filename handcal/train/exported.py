@@ -1,6 +1,6 @@
-"""The network that an exported model of floats (ONNX) holds, to be trained further.
+"""Loading of an exported float model (ONNX), to continue its training.
 
-Batch normalisation is folded into the exported convolutions, and taken apart again here.
+Batch normalisation is folded into the exported convolutions and separated again here.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from handcal.train.model import HandNet
 from handcal.train.moments import fold_in
 
 _MOST_BYTES = 2**25
-# Of each channel's weights, which normalisation makes arbitrary: about that of the backbone's own,
-# so that the same learning rates suit it.
+# Norm of each channel's weights, which normalisation makes arbitrary: about that of the backbone,
+# so that the same learning rates apply.
 _LENGTH = 1.5
 
 
 def load_exported(net: HandNet, path: Path) -> None:
-    """Fill a network with the weights of a model that `export_float` wrote, in place.
+    """Fill a network with the weights of a model written by `export_float`, in place.
 
-    It computes what the model does, but `take_moments` must follow before it is trained.
+    It then computes the same as the model; `take_moments` must follow before training.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def load_exported(net: HandNet, path: Path) -> None:
 
 
 def _fill(net: HandNet, graph: onnx.GraphProto) -> None:
-    """Set all weights so that the network computes what the graph does, its moments 0 and 1."""
+    """Set all weights so that the network computes the same as the graph, with moments 0 and 1."""
     values = {
         tensor.name: torch.from_numpy(numpy_helper.to_array(tensor).copy())
         for tensor in graph.initializer
@@ -60,14 +60,14 @@ def _fill(net: HandNet, graph: onnx.GraphProto) -> None:
             length = weight.flatten(1).norm(dim=1).clamp_min(1e-9)
             convolution.weight.copy_(_LENGTH * weight / length[:, None, None, None])
         for name, convolution, normalisation in units:
-            # Levels that share a convolution differ by a factor of each channel only.
+            # Levels that share a convolution differ only by a factor for each channel.
             weight, bias = folded[_node(name)]
             gain = (weight * convolution.weight).sum((1, 2, 3)) / _LENGTH**2
             fold_in(normalisation, gain, bias)
 
 
 def _node(name: str) -> str:
-    """Return how the exporter calls a layer's convolution: a.0/a.0.1/a.0.1.0 for that of a.0.1."""
+    """Return the exporter's name of a layer's convolution: a.0/a.0.1/a.0.1.0 for a.0.1."""
     parts = name.split(".")
     scopes = [".".join(parts[:end]) for end in range(2, len(parts) + 1)]
     return "/".join(["/_net", *scopes, f"{name}.0", "Conv"])

@@ -1,4 +1,4 @@
-"""The training itself: resumable, and the same on every run of one machine."""
+"""The training loop: resumable, and reproducible on one machine."""
 
 from __future__ import annotations
 
@@ -29,50 +29,49 @@ _CHECKPOINT = "checkpoint.pt"
 
 @dataclass(frozen=True, slots=True)
 class TrainSettings:
-    """How the network is trained."""
+    """Settings of the training."""
 
     seed: int = 1
     steps: int = 60_000
     batch: int = 4
     rate: float = 1e-3
     backbone_rate: float = 3e-4
-    """Highest learning rates of AdamW, of the new layers and of the pretrained ones; rising over
-    the first `rise` of the steps, falling linearly to 0 over the last `fall`."""
+    """Peak learning rates of AdamW for the new and the pretrained layers; they rise over the first
+    share `rise` of the steps and fall linearly to 0 over the last share `fall`."""
     rise: float = 0.03
     fall: float = 0.8
     weight_decay: float = 0.03
     gradient_max: float = 10.0
-    """Longer gradients are shortened to this norm."""
+    """Norm to which longer gradients are clipped."""
     average: float = 0.998
-    """Decay per step of the running mean of the weights, which is what is evaluated."""
+    """Decay per step of the running mean of the weights, which is evaluated."""
     settled: int = 300
-    """Batches over which batch normalisation takes the moments of the averaged weights, at the
-    end."""
+    """Batches for the final moments of batch normalisation with the averaged weights."""
     validated: float = 0.1
-    """Share of the photographs kept aside to judge progress by."""
+    """Share of the photographs held out for evaluation."""
     samples: SampleSettings = field(default_factory=SampleSettings)
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How often progress is written, and what computes it."""
+    """Intervals of saving and logging, and the computing device."""
 
     checkpoint_s: float = 180.0
     validate_steps: int = 2000
     threads: int = 1
     workers: int = 1
-    """Of the network, and processes that prepare samples."""
+    """Threads of the network, and processes that prepare samples."""
     bfloat16: bool = False
-    """Whether a processor computes gradients with numbers of 16 bits, as CUDA devices always do."""
+    """Compute gradients with 16-bit numbers on a processor, as always on CUDA devices."""
 
 
 class Training:
-    """A network in training, and all it takes to go on after an interruption.
+    """A network in training, with everything needed to resume.
 
     Parameters
     ----------
     net : HandNet
-        With its backbone loaded.
+        With a loaded backbone.
     folder : Path
         Holds ``checkpoint.pt`` and ``log.jsonl``; training resumes from there.
     settings : TrainSettings
@@ -100,7 +99,7 @@ class Training:
             self._restore()
 
     def run(self, photos: Sequence[Photo], hands: Path) -> nn.Module:
-        """Train to the end and return the averaged network.
+        """Complete the training and return the averaged network.
 
         Parameters
         ----------
@@ -174,7 +173,7 @@ class Training:
         return [score_loss.item(), box_loss.item()]
 
     def _settle(self, samples: Samples) -> None:
-        """Take the moments of the averaged weights: the mean of earlier weights' is not theirs."""
+        """Compute the moments of the averaged weights, which differ from the averaged moments."""
         end = self._settings.steps
         batches = self._batches(samples, end, end + self._settings.settled)
         images = (images.to(self._device).float() for images, _ in batches)
@@ -212,7 +211,7 @@ class Training:
 
 
 def read_average(folder: Path) -> HandNet:
-    """Return the averaged network of the checkpoint in a folder, its weights rounded for good.
+    """Return the averaged network of the checkpoint in a folder, with rounded weights.
 
     Raises
     ------
@@ -236,7 +235,7 @@ def read_average(folder: Path) -> HandNet:
 
 
 def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[Photo]]:
-    """Return the photographs to train on, and those kept aside."""
+    """Return the photographs for training, and those held out."""
     order = np.random.default_rng(0).permutation(len(photos))
     aside = set(order[: round(validated * len(photos))].tolist())
     return (
@@ -246,7 +245,7 @@ def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[
 
 
 def _groups(net: HandNet, settings: TrainSettings) -> list[dict[str, Any]]:
-    """Return all parameters with their highest rates; biases and scales do not decay."""
+    """Return all parameters with their peak rates; biases and scales do not decay."""
     groups = []
     for pretrained, rate in ((True, settings.backbone_rate), (False, settings.rate)):
         named = [
@@ -262,7 +261,7 @@ def _groups(net: HandNet, settings: TrainSettings) -> list[dict[str, Any]]:
 
 
 def _ema(decay: float) -> Any:
-    """Return the averaging of `AveragedModel`, quicker over the first steps."""
+    """Return the averaging function for `AveragedModel`, faster over the first steps."""
 
     def update(averages: list[Tensor], values: list[Tensor], averaged: Tensor) -> None:
         weight = 1.0 - min(decay, (1.0 + float(averaged)) / (10.0 + float(averaged)))

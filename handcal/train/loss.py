@@ -1,4 +1,4 @@
-"""What the network is trained to: which points answer for which hand, and how wrong they are."""
+"""The training loss: assignment of points to hands, and their errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Grid:
     strides: Tensor
 
     def boxes(self, raw: Tensor) -> Tensor:
-        """Return the boxes (..., N, 4) that raw predictions (..., 4, N) stand for."""
+        """Return the boxes (..., N, 4) of raw predictions (..., 4, N)."""
         left, top, right, bottom = (raw.clamp(-6.0, 6.0).exp() * self.strides).unbind(-2)
         x, y = self.points.T
         return torch.stack([x - left, y - top, x + right, y + bottom], -1)
@@ -37,7 +37,7 @@ def detection_loss(raw: Tensor, targets: list[Tensor], grid: Grid) -> tuple[Tens
     ----------
     raw : (B, 5, N) float
     targets : list of B (M, 5) float
-        Box of each hand in pixels, and 1 if it is to be left out: neither right nor wrong.
+        Box of each hand in pixels, and 1 if it is ignored: neither right nor wrong.
     grid : Grid
     """
     logits = raw[:, 0]
@@ -69,11 +69,11 @@ def _inside(points: Tensor, boxes: Tensor) -> Tensor:
 
 
 def _assign(logits: Tensor, boxes: Tensor, hands: Tensor, grid: Grid) -> tuple[Tensor, Tensor]:
-    """Return the points that answer for a hand, and which (SimOTA: Ge et al. 2021, YOLOX)."""
+    """Assign points to hands (SimOTA: Ge et al. 2021, YOLOX)."""
     center = (hands[:, :2] + hands[:, 2:]) / 2
     away = (grid.points[:, None] - center).abs().amax(-1) / grid.strides[:, None]
     central = away < _CENTER_STRIDES
-    # A hand smaller than the grid may hold no point at all.
+    # A hand smaller than the grid may contain no point.
     fitting = central & (_inside(grid.points, hands) | (away < 1.0))
     rows = fitting.any(1).nonzero()[:, 0]
     pairs = fitting[rows]

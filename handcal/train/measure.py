@@ -24,9 +24,9 @@ from handcal.sim.room import make_room
 from handcal.train.simulated import Picture, picture
 from handcal.types import UInt8
 
-# Luminance of the skin in even light that parts three groups of about the same size.
+# Luminance of the skin in even light at the limits of three groups of similar size.
 _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}
-# What lights leave of the values of red, green and blue.
+# Factors on red, green and blue for each light.
 _LIGHTS = {"dim": (0.3, 0.3, 0.3), "warm": (1.0, 0.75, 0.45), "cold": (0.6, 0.8, 1.0)}
 _RUNS = 50
 
@@ -58,14 +58,14 @@ def main() -> None:
 
 
 class _InLight(HandDetector):
-    """The detector before which every image is dimmed or tinted."""
+    """A detector for which every image is first dimmed or tinted."""
 
     def __init__(self, model: Path, gains: tuple[float, float, float]) -> None:
         super().__init__(model, EVALUATED)
         self._gains = np.array(gains)
 
     def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
-        """Find the hands in an image as the light shows it."""
+        """Find the hands in an image under the given light."""
         return super().detect((color * self._gains).astype(np.uint8), pixels)
 
 
@@ -76,7 +76,7 @@ def photographed(detector: HandDetector, folder: Path) -> dict[str, float | None
 
 
 def simulated_pictures(seeds: int) -> Iterator[Picture]:
-    """Yield a hand, wholly in view, and a room for each seed, as a D415 sees them."""
+    """Yield a D415's image of a hand, wholly in view, and a room for each seed."""
     for seed in range(seeds):
         room = make_room(seed)
         attempt = 0
@@ -86,9 +86,9 @@ def simulated_pictures(seeds: int) -> Iterator[Picture]:
 
 
 def simulated(detector: HandDetector, pictures: list[Picture]) -> dict[str, Any]:
-    """Return the share of simulated hands that are found, over all and by skin tone.
+    """Return the share of simulated hands found, over all and by skin tone.
 
-    Found is a hand whose box the best detection overlaps by half.
+    A hand is found if the best detection overlaps its box by half.
     """
     tones: dict[str, list[bool]] = {tone: [] for tone in _TONES}
     for drawn in pictures:
@@ -119,7 +119,7 @@ def latency_ms(detector: HandDetector, color: UInt8) -> float:
 
 
 def _shown(drawn: Picture) -> float:
-    """Return which share of a hand's box is within the image."""
+    """Return the share of a hand's box within the image."""
     height, width = drawn.color.shape[:2]
     cut = drawn.box.clip(0.0, [width, height, width, height])
     whole, shown = (np.prod(box[2:] - box[:2]) for box in (drawn.box, cut))

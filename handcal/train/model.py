@@ -15,8 +15,8 @@ from torch.nn import functional
 from handcal.hand.detect import STRIDES
 
 # Channels in, channels out and stride of the thirteen separable convolutions: those of MobileNetV1,
-# but fewer where few are of use: at the stem, where 14 of 32 pretrained ones are all zero, and
-# from the seventh on.
+# but fewer where few are useful: at the stem, where 14 of 32 pretrained ones are all zero, and from
+# the seventh on.
 _BLOCKS = (
     (16, 64, 1),
     (64, 128, 2),
@@ -40,7 +40,7 @@ _PRIOR = 0.01
 class _Conv(nn.Conv2d):
     """A convolution with weights of 7 bits, one scale per output channel, as in the integer export.
 
-    Gradients pass as if nothing were rounded (Jacob et al. 2018).
+    Gradients ignore the rounding (Jacob et al. 2018).
     """
 
     _is_baked = False
@@ -50,7 +50,7 @@ class _Conv(nn.Conv2d):
         return self._conv_forward(features, self._rounded(), self.bias)
 
     def bake(self) -> None:
-        """Round the weights themselves, for good."""
+        """Round the weights permanently."""
         self.weight.data = self._rounded().data
         self._is_baked = True
 
@@ -75,7 +75,7 @@ def _normalised(
 def _folded(
     inputs: int, outputs: int, size: int = 1, groups: int = 1, stride: int = 1
 ) -> nn.Sequential:
-    """Return a convolution that batch normalisation is folded into; not to be trained."""
+    """Return a convolution with folded batch normalisation; it is not trained."""
     return nn.Sequential(
         _Conv(inputs, outputs, size, stride, size // 2, groups=groups), nn.ReLU6(inplace=True)
     ).requires_grad_(False)
@@ -100,7 +100,7 @@ def _tower() -> nn.Sequential:
 
 
 def _share_convolutions(tower: nn.Sequential, other: nn.Sequential) -> None:
-    """Let two levels have their convolutions in common, but not what they are normalised by."""
+    """Share the convolutions of two levels, but not their normalisation."""
     for layer, other_layer in zip(tower.children(), other.children(), strict=True):
         (convolution, *_), (other_convolution, *_) = layer.children(), other_layer.children()
         other_convolution.weight = convolution.weight
@@ -109,9 +109,9 @@ def _share_convolutions(tower: nn.Sequential, other: nn.Sequential) -> None:
 class HandNet(nn.Module):
     """Maps (B, 3, H, W) RGB of 0 to 255, H and W multiples of 32, to (B, 5, N) raw predictions.
 
-    N counts the points of all strides, rows first; the five are the logit of the score and the
-    logarithms of the distances, in strides, from the point to the box's left, top, right, bottom.
-    The first blocks, and the convolution before them, are not trained.
+    N is the number of points of all strides, rows first. The five values are the logit of the score
+    and the logarithms of the distances, in strides, from the point to the box's left, top, right
+    and bottom. The first blocks, and the convolution before them, are not trained.
     """
 
     def __init__(self) -> None:
@@ -125,12 +125,12 @@ class HandNet(nn.Module):
         self.towers = nn.ModuleList(towers)
         self.predict = nn.Conv2d(_WIDTH, 5, 1)
         nn.init.normal_(self.predict.weight, std=0.01)
-        # At first a point is rarely a hand, and boxes are four strides wide.
+        # Initially points are rarely hands, and boxes are four strides wide.
         first_bias = [-math.log(1.0 / _PRIOR - 1.0)] + [math.log(2.0)] * 4
         self.predict.bias = nn.Parameter(torch.tensor(first_bias))
 
     def normalised(self) -> Iterator[tuple[str, nn.Conv2d, nn.BatchNorm2d]]:
-        """Yield the convolutions that are normalised, the layers that do so, and both's name."""
+        """Yield the normalised convolutions with their normalising layers and names."""
         for name, module in self.named_modules():
             if isinstance(module, nn.Sequential):
                 convolution, normalisation, *_ = module
@@ -138,7 +138,7 @@ class HandNet(nn.Module):
                     yield name, convolution, normalisation
 
     def bake(self) -> None:
-        """Round the weights as training does, so that nothing is left to round; for export."""
+        """Round the weights permanently, as in training; for export."""
         for module in self.modules():
             if isinstance(module, _Conv):
                 module.bake()

@@ -1,7 +1,7 @@
-"""Batch normalisation put into a trained network that had none, or only folded into its weights.
+"""Insertion of batch normalisation into a trained network that has none, or has it folded in.
 
-Without it training kills the backbone: at rates that suit the new layers ever more channels come to
-be 0 or 6 whatever they see.
+Without it training destroys the backbone: at the learning rates of the new layers more and more
+channels become constant at 0 or 6.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from handcal.train.model import HandNet
 
 
 def fold_in(normalisation: nn.BatchNorm2d, gain: Tensor, bias: Tensor) -> None:
-    """Let a layer multiply by `gain` (C,) and add `bias` (C,), nothing being known of its input."""
+    """Set a layer to multiply by `gain` (C,) and add `bias` (C,), with unknown input moments."""
     normalisation.load_state_dict(
         {
             "weight": gain,
@@ -26,13 +26,13 @@ def fold_in(normalisation: nn.BatchNorm2d, gain: Tensor, bias: Tensor) -> None:
 
 
 def take_moments(net: HandNet, images: Tensor) -> None:
-    """Give normalisation the moments of images, so that the network computes what it did.
+    """Set the moments of normalisation from images; the network's function is unchanged.
 
     Parameters
     ----------
     net : HandNet
     images : (B, 3, H, W) tensor
-        Like those to be trained on.
+        Similar to the training images.
     """
     hooks = [
         normalisation.register_forward_pre_hook(_take) for _, _, normalisation in net.normalised()

@@ -1,4 +1,4 @@
-"""What the network is shown: crops of photographs, and simulated hands alone or pasted on them."""
+"""Training samples: crops of photographs, and simulated hands alone or pasted on them."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ from handcal.types import Float32, Float64, UInt8
 _SHOWN_MIN = 0.35
 _SMALLEST_PX = 9.0
 _GRAY = (127, 127, 127)
-# Hands of photographs are annotated by turned rectangles, which may be turned further; the upright
-# boxes of simulated ones only grow.
+# Photographs are annotated with rotated rectangles, which may be rotated further; the upright boxes
+# of simulated hands only grow.
 _PHOTO_TURN_RAD = 0.6
 _SIMULATED_TURN_RAD = 0.2
-# A hand with a smaller share of a blend is neither right nor wrong.
+# A hand with a smaller share of a blend is ignored.
 _BLEND_MIN = 0.35
 
 
 @dataclass(frozen=True, slots=True)
 class SampleSettings:
-    """How samples are drawn."""
+    """Distribution of the samples."""
 
     side_px: int = 288
-    """Of the square crops; a multiple of the largest stride."""
+    """Side of the square crops; a multiple of the largest stride."""
     whole_px: float = 332.0
-    """Side of a square with as many pixels as the detector will shrink a whole image to."""
+    """Side of a square with as many pixels as the detector's input."""
     zoomed: float = 0.5
-    """Share of the crops as large as makes one hand fill 12–85 % of the side, as a wearer's does;
-    the others show the photograph about as large as the detector will see it."""
+    """Share of crops scaled so that one hand fills 12–85 % of the side, like a wearer's; the others
+    have about the scale of the detector's input."""
     centered: float = 0.72
-    """Share of the crops that are about that hand. The others show any part of the photograph, as
-    large: faces, arms and things that are no hands."""
+    """Share of these crops centred on that hand. The others show any part of the photograph at the
+    same scale: faces, arms and other objects."""
     zoom_max: float = 4.0
-    """A photograph is enlarged no further."""
+    """Largest enlargement of a photograph."""
     large_weight: float = 2.0
-    """How much likelier a photograph is chosen if a hand fills 15 % of it or more."""
+    """Relative probability of photographs in which a hand fills 15 % or more."""
     simulated: float = 0.1
     pasted: float = 0.08
-    """Shares of samples that are simulated pictures, and photographs with a simulated hand."""
+    """Shares of simulated images, and of photographs with a simulated hand."""
     blended: float = 0.2
-    """Share of samples that are two of the others, one seen through the other."""
+    """Share of samples that blend two others."""
     disturbed: float = 1.0
     """Share of samples whose light and sharpness are changed."""
 
@@ -119,7 +119,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         return image, self._clipped(transform_corners(warp, photo.quads))
 
     def _part(self, rng: np.random.Generator, photo: Photo) -> Float64:
-        """Choose a part of a photograph: about one of its hands, or anywhere."""
+        """Select a part of a photograph: around one of its hands, or anywhere."""
         settings = self._settings
         image_px = np.sqrt(photo.width * photo.height)
         scale = settings.whole_px / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
@@ -142,7 +142,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
     def _paste(
         self, rng: np.random.Generator, image: UInt8, boxes: Float32
     ) -> tuple[UInt8, Float32]:
-        """Hold a simulated hand before a picture; hands that it covers are left out."""
+        """Draw a simulated hand over an image; hands that it covers are ignored."""
         picture, pasted, warp = self._raised(rng)
         cut = self._warped(np.ascontiguousarray(picture), warp, border=0)
         opaque = cv2.GaussianBlur(cut[..., 3:], (3, 3), 0.7)[..., None] / np.float32(255.0)
@@ -153,7 +153,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         return blended.astype(np.uint8), np.concatenate([boxes, pasted])
 
     def _raised(self, rng: np.random.Generator) -> tuple[UInt8, Float32, Float64]:
-        """Return a simulated picture (RGBA), and the box and map of a view of it."""
+        """Return a simulated image (RGBA), with the box and map of a view of it."""
         path, box = self._hands[rng.integers(len(self._hands))]
         picture = read_image(path, cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]]
         hand_px = float(np.sqrt(np.prod(box[0, 2:] - box[0, :2])))
@@ -171,12 +171,12 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         return picture, boxes, warp
 
     def _warped(self, image: UInt8, warp: Float64, border: int | None = None) -> UInt8:
-        """Return the square that the map takes an image to."""
+        """Return the square to which the map transforms an image."""
         side = self._settings.side_px
         scale = np.sqrt(abs(np.linalg.det(warp[:, :2])))
         smooth = cv2.GaussianBlur(image, (0, 0), 0.35 / scale) if scale < 0.6 else image
         fill = _GRAY if border is None else (border,) * 4
-        # OpenCV counts from the middle of the first pixel.
+        # OpenCV's origin is the centre of the first pixel.
         offset = warp[:, 2] + warp[:, :2] @ (0.5, 0.5) - 0.5
         square = cv2.warpAffine(
             smooth, np.column_stack([warp[:, :2], offset]), (side, side), borderValue=fill
@@ -190,7 +190,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
 def _blend(
     rng: np.random.Generator, image: UInt8, boxes: Float32, other: UInt8, other_boxes: Float32
 ) -> tuple[UInt8, Float32]:
-    """Return an image seen through another (mixup, Zhang et al. 2019 for detectors)."""
+    """Return a blend of two images (mixup; Zhang et al. 2019 for detectors)."""
     share = rng.uniform(0.5, 0.8)
     blend = cv2.addWeighted(image, share, other, 1.0 - share, 0.0).astype(np.uint8, copy=False)
     if 1.0 - share < _BLEND_MIN:
@@ -199,6 +199,6 @@ def _blend(
 
 
 def collate(samples: list[tuple[UInt8, Float32]]) -> tuple[Tensor, list[Tensor]]:
-    """Return images (B, 3, side, side) uint8, channels last in memory, and each one's boxes."""
+    """Return images (B, 3, side, side) uint8, channels last in memory, and their boxes."""
     images = torch.from_numpy(np.stack([image for image, _ in samples]))
     return images.permute(0, 3, 1, 2), [torch.from_numpy(boxes) for _, boxes in samples]

@@ -1,4 +1,4 @@
-"""Simulated hands to train on: of all skin tones, raised before a wearer's camera."""
+"""Simulated hands for training: all skin tones, raised in front of a wearer's camera."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from handcal.types import Bool, Float64, Intrinsics, UInt8
 
 # A third of the colour image of an Intel RealSense D415, 69° across.
 CAMERA = Intrinsics(width=424, height=240, fx=306.0, fy=306.0, cx=211.5, cy=119.5)
-_FIRST_SEED = 1_000_000  # tests and benchmarks count from 0
+_FIRST_SEED = 1_000_000  # tests and benchmarks start at 0
 _HANDS_PER_ROOM = 25
 _GRID_M = 0.003
-_TILT = 1.6  # foreshortened and sideways hands are the hardest to find
+_TILT = 1.6  # foreshortened and sideways hands are the hardest to detect
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,8 +33,8 @@ class Picture:
     is_hand: Bool
     """(H, W); the hand and its forearm."""
     box: Float64
-    """(4,); x0, y0, x1, y1 about the hand without its forearm, px from the image's upper left
-    corner; may reach beyond the image."""
+    """(4,); x0, y0, x1, y1 of the hand without its forearm, px from the image's upper left corner;
+    may extend beyond the image."""
     skin: Float64
     """(3,); mean colour of the skin in even light, RGB of 0 to 255."""
 
@@ -42,9 +42,9 @@ class Picture:
 def picture(
     seed: int, room: Room, camera: Intrinsics, settings: HandSettings, tilt: float = 1.0
 ) -> Picture:
-    """Draw the hand of a seed, raised somewhere before a camera in a room.
+    """Render the hand of a seed, raised in front of a camera in a room.
 
-    With a larger `tilt`, hands are more often foreshortened or sideways than a wearer's are.
+    A larger `tilt` makes hands foreshortened or sideways more often than a wearer's.
     """
     rng = np.random.default_rng(seed)
     hand = make_hand(seed, settings)
@@ -59,9 +59,9 @@ def picture(
 
 
 def render_hands(folder: Path, count: int) -> None:
-    """Write `count` pictures as PNG, opaque where the hand and its arm are, and their boxes.
+    """Write `count` images as PNG, opaque on the hand and its arm, and their boxes.
 
-    Does nothing where they are already there.
+    Existing ones are kept.
     """
     listing = make_folder(folder) / "boxes.json"
     if listing.exists() and len(read_json(listing)) == count:
@@ -80,11 +80,11 @@ def render_hands(folder: Path, count: int) -> None:
 
 
 def _hand_box(hand: HandModel, T_D_hand: Float64, camera: Intrinsics) -> Float64:
-    """Return x0, y0, x1, y1 about the hand, its forearm left out, in pixels; (4,) float64."""
+    """Return x0, y0, x1, y1 of the hand without its forearm, in pixels; (4,) float64."""
     beyond_wrist = (hand.vertices_m - hand.wrist_m) @ hand.arm_axis < 0.0
     x, y, z = transform(T_D_hand, hand.vertices_m[beyond_wrist].astype(np.float64)).T
     u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-    return np.array([u.min(), v.min(), u.max(), v.max()]) + 0.5  # u, v: from a pixel's middle
+    return np.array([u.min(), v.min(), u.max(), v.max()]) + 0.5  # u, v: from a pixel's centre
 
 
 def _raised(rng: np.random.Generator, camera: Intrinsics, tilt: float) -> Float64:

@@ -1,4 +1,4 @@
-"""How well and how fast handcal does what it promises, measured on this machine."""
+"""The benchmark: accuracy and speed, measured on this machine."""
 
 from handcal.lab.bench.run import PARTS, bench_table, run_bench
 from handcal.lab.bench.settings import QUICK, BenchSettings

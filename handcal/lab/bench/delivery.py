@@ -1,4 +1,4 @@
-"""How long the headset takes to have a cursor, on a good network and on a bad one."""
+"""Latency of sending a cursor to the headset, on a good network and on a bad one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PATIENCE_S = 5.0
 
 
 def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
-    """Measure how long a cursor takes to be acknowledged over loopback."""
+    """Measure the time until a cursor is acknowledged over loopback."""
     figures = []
     worst_ms = {}
     for done, loss in enumerate(_LOSSES, 1):
@@ -32,7 +32,7 @@ def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
 
 
 def _cursor_durations_ms(loss: float, settings: BenchSettings) -> list[float]:
-    """Time cursors, one after the other, lost and reordered with probability `loss`."""
+    """Time successive cursors, with datagrams lost and reordered with probability `loss`."""
     rng = np.random.default_rng(0)
     key = new_pairing_key().encode()
     durations_ms = []

@@ -1,4 +1,4 @@
-"""A measured figure beside its target."""
+"""Measured figures with their targets."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ class Figure:
     what: str
     value: float
     unit: str
-    """Empty for a ratio."""
+    """Unit; empty for a ratio."""
     at_least: float | None = None
     at_most: float | None = None
-    """The target; None where there is none on that side."""
+    """Target limits; None if there is none on that side."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return what was measured, the target as text, and whether it is met: None without one."""
+        """Return the figure, its target as text, and whether it is met (None without target)."""
         bounds = []
         if self.at_least is not None:
             bounds.append((f"≥ {self.at_least:g}", self.value >= self.at_least))

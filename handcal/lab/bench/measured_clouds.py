@@ -1,4 +1,4 @@
-"""Clouds as a sensor gives them: cut at different places, sampled apart, noisy."""
+"""Clouds as from a sensor: cut at different places, sampled independently, noisy."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ANGLE_MAX_DEG = 9.0
 
 
 def measure_cuts(settings: BenchSettings, progress: Progress) -> Measured:
-    """Measure ``consistent`` on clouds that are cut differently, beside the floor."""
+    """Compare ``consistent`` on differently cut clouds with the floor."""
 
     def solve(angle_deg: float, trial: int) -> Errors:
         rng = np.random.default_rng([trial, 1])
@@ -52,9 +52,9 @@ def measure_cuts(settings: BenchSettings, progress: Progress) -> Measured:
 
 
 def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
-    """Measure whether the covariance says how large the errors are.
+    """Measure whether the covariance matches the errors.
 
-    The squared error, normalised by the covariance, averages 3 where it does.
+    If it does, the squared error normalised by the covariance averages 3.
     """
 
     def solve(trial: int) -> float:
@@ -76,7 +76,7 @@ def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
 def _measured(
     rng: np.random.Generator, trial: int, angle_deg: float, sigma_m: float, points: int
 ) -> SimulatedAlignment:
-    """Make an alignment whose forearms are cut anywhere from 20 to 60 mm below the wrist."""
+    """Return an alignment whose forearms are cut 20 to 60 mm below the wrist."""
     cursor_forearm_m, hand_forearm_m = rng.uniform(*_FOREARM_M, 2)
     making = AlignmentSettings(
         count=points,

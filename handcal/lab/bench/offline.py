@@ -1,4 +1,4 @@
-"""The whole offline calibration from rendered photographs of a rig whose truth is known."""
+"""The whole offline calibration, from rendered photographs of a known rig."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ HEADSET_CAMERA = Intrinsics(
 _MADE = "simulated"
 _CAMERA_TURN_RAD = 0.04
 _MOST_RATIO = 1.1
-# The manufacturer's figures of the example's displays: 2,456 px of focal length at 2 m.
+# The manufacturer's figures for the example's displays: 2,456 px of focal length at 2 m.
 _KNOWN_PIXELS = DisplaySettings(pixel_m=pixel_size_m(2.0 * np.arctan(0.5 / FOCAL_PX), 1.0, Z_E_S_M))
 _FIGURES = (
     ("offline: rotation of T_H_D", "rotation_deg", 1.0, "°", 0.05),
@@ -55,39 +55,39 @@ _FIGURES = (
 
 @dataclass(frozen=True, slots=True)
 class OfflineSettings:
-    """What is photographed."""
+    """Settings of the photographs."""
 
     views: int = 20
-    """Of the board, for each camera's intrinsics and for each pair of cameras."""
+    """Images of the board for each camera's intrinsics, and for each pair of cameras."""
     grids: int = 3
-    """Of each display."""
+    """Images of each display."""
     viewpoint_camera: Intrinsics = VIEWPOINT_CAMERA
     headset_camera: Intrinsics = HEADSET_CAMERA
-    """The true ones."""
+    """True intrinsics."""
     pictures: PictureSettings = field(default_factory=lambda: PictureSettings(samples=2))
     """Blur and noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OfflineRun:
-    """A rig calibrated from photographs, and how far its parts are from the truth."""
+    """A rig calibrated from photographs, with the errors of its parts."""
 
     rig: Rig
     rotation_deg: float
     translation_mm: float
     """Error of T_H_D."""
     focal_share: float
-    """The largest relative error of both cameras' focal lengths."""
+    """Largest relative error of both cameras' focal lengths."""
     homography_px: float
-    """The largest error on both displays, px of the display."""
+    """Largest error on both displays, in display pixels."""
     distance_share: float
-    """The larger relative error of z(C0→S)."""
+    """Larger relative error of z(C0→S)."""
     viewpoint_mm: float
-    """The larger error of t(C0→V)."""
+    """Larger error of t(C0→V)."""
 
 
 def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
-    """Measure what the calibration of some rigs from photographs is worth; the worst counts."""
+    """Measure the accuracy of rigs calibrated from photographs; the worst one counts."""
     runs = []
     for seed in range(settings.offline_rigs):
         runs.append(calibrate_from_photographs(example_rig(), seed))
@@ -115,7 +115,7 @@ def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
 
 
 def _stand_in_ratios(rigs: list[Rig], wearers: int, progress: Progress) -> list[MeanInterval]:
-    """Return, for each rig in place of the true one, the ratio of wearers' reprojection errors."""
+    """Return the ratio of wearers' reprojection errors with each rig and with the true one."""
     if not rigs:
         return []
     errors = []
@@ -131,15 +131,15 @@ def _stand_in_ratios(rigs: list[Rig], wearers: int, progress: Progress) -> list[
 def calibrate_from_photographs(
     true: Rig, seed: int, settings: OfflineSettings | None = None
 ) -> OfflineRun:
-    """Calibrate a rig as a technician does, from what its cameras would see.
+    """Calibrate a rig as a technician does, from rendered images.
 
     Parameters
     ----------
     true : Rig
-        Of it, only the displays' sizes, T_V_H and the depth camera's intrinsics are used, as the
-        devices tell them; all else is solved.
+        Only the displays' sizes, T_V_H and the depth camera's intrinsics are used, which devices
+        report; everything else is solved.
     seed : int
-        Of poses and noise.
+        Seed of poses and noise.
     settings : OfflineSettings, optional
     """
     settings = settings or OfflineSettings()
@@ -184,7 +184,7 @@ def calibrate_from_photographs(
 
 
 class _Studio:
-    """A rig, a board and cameras, and whoever takes the photographs."""
+    """Takes photographs of a board with the cameras of a rig."""
 
     def __init__(self, true: Rig, seed: int, settings: OfflineSettings) -> None:
         self.rng = np.random.default_rng(seed)
@@ -197,12 +197,12 @@ class _Studio:
         }
 
     def board_views(self, camera: Intrinsics) -> list[View]:
-        """Hold the board before one camera."""
+        """Photograph the board with one camera."""
         poses = board_poses(self._board, camera, self._settings.views, self.rng)
         return [self._photograph(camera, T, number) for number, T in enumerate(poses)]
 
     def pairs(self, camera: Intrinsics, T_H_camera: Float64) -> list[tuple[View, View]]:
-        """Hold the board before a camera and the headset's."""
+        """Photograph the board with one camera and the headset's."""
         headset = self._settings.headset_camera
         poses = board_poses(
             self._board, camera, self._settings.views, self.rng, others=((T_H_camera, headset),)
@@ -216,7 +216,7 @@ class _Studio:
         ]
 
     def grid_views(self, eye: Eye, R_E_C: Float64) -> dict[str, GridView]:
-        """Show the grid to the viewpoint camera behind a display."""
+        """Photograph the displayed grid with the viewpoint camera."""
         display, camera = self._true.eyes[eye], self._settings.viewpoint_camera
         grid = Grid(display.width_px, display.height_px)
         shown = draw_grid(grid)
@@ -233,7 +233,7 @@ class _Studio:
     def homography_error_px(
         self, eye: Eye, R_E_C: Float64, found: DisplayHomography, camera: Intrinsics
     ) -> float:
-        """Return how far off, on the display, the found homography puts what a camera sees."""
+        """Return the error of the solved homography on the display."""
         display = self._true.eyes[eye]
         x, y = np.linspace(0, display.width_px - 1, 9), np.linspace(0, display.height_px - 1, 9)
         display_px = np.dstack(np.meshgrid(x, y)).reshape(-1, 2)

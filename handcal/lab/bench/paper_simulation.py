@@ -1,8 +1,8 @@
 """The paper's own simulation (Hu et al. 2021, "Simulation test on rotation-constrained ICP").
 
 A hand, the cursor made from it with a known φ, and the cursor turned about a random point of the
-cloud. Once with data as the paper makes them, from UQ itself (κ = 1), and once with data of a
-hand that keeps its size (κ = 1 - φ3φ4).
+cloud. One set of data follows the paper, made from UQ itself (κ = 1); the other has a hand of
+constant size (κ = 1 - φ3φ4).
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from handcal.types import METHODS, Float64
 _SLOW = "paper", "linear"
 _PUBLISHED_MM = 4.0
 _FLOOR_RATIO = 1.1
-# Where the floor, or the paper's error, is nothing but rounding, it counts as this much.
+# Lower limit of the floor and of the paper's error, which may be only rounding.
 _ROUNDING_MM = 0.01
-# How the data are made, and whether their equation is exact.
+# The two sets of data, and whether their equation is exact.
 _DATA = {"paper's data": False, "honest data": True}
 
 
 def measure_paper_simulation(settings: BenchSettings, progress: Progress) -> Measured:
-    """Compare the methods with one another, with the floor and with the published result."""
+    """Compare the methods with each other, with the floor and with the published result."""
 
     def solve(case: tuple[str, float], trial: int) -> Errors:
         data, angle_deg = case
@@ -67,7 +67,7 @@ def _floor(data: str) -> str:
 
 
 def _published(by_angle: Mapping[float, Errors]) -> list[Figure]:
-    """Return up to which angle ``paper`` keeps the published accuracy, of φ and by component."""
+    """Return the largest angle at which ``paper`` reaches the published accuracy."""
 
     def reach_deg(measure_mm: Callable[[Float64], float]) -> float:
         good = takewhile(lambda a: measure_mm(by_angle[a]["paper"]) <= _PUBLISHED_MM, by_angle)
@@ -84,7 +84,7 @@ def _published(by_angle: Mapping[float, Errors]) -> list[Figure]:
 
 
 def _compare(data: str, by_angle: Sequence[Errors]) -> list[Figure]:
-    """Return how ``consistent`` stands against the floor and against ``paper``, at worst."""
+    """Compare ``consistent`` with the floor and with ``paper``, in the worst case."""
     limits = {_floor(data): _FLOOR_RATIO, "paper": 1.0}
     return [
         Figure(
@@ -98,7 +98,7 @@ def _compare(data: str, by_angle: Sequence[Errors]) -> list[Figure]:
 
 
 def _ratio(errors_m: Float64, baseline_m: Float64) -> float:
-    """Return the ratio of mean |Δφ| over the trials that both have."""
+    """Return the ratio of mean |Δφ| over the trials common to both."""
     shared = errors_m[: len(baseline_m)]
     return mean_length_mm(shared) / max(mean_length_mm(baseline_m), _ROUNDING_MM)
 

@@ -1,4 +1,4 @@
-"""The whole benchmark: every part in turn, and its figures beside their targets."""
+"""The whole benchmark: all parts in turn, and their figures with targets."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ def run_bench(
     report: Callable[[str, float], None] | None = None,
     only: str = "",
 ) -> dict[str, Any]:
-    """Measure everything, one part after the other, or only one of `PARTS`.
+    """Measure all of `PARTS` in turn, or only one.
 
     Parameters
     ----------
     settings : BenchSettings
     report : callable, optional
-        Is told the name of the part being measured, and the fraction of that part that is done.
+        Called with the name of the present part and the share of it that is done.
     only : str
-        A part's name; empty measures all.
+        Name of a part; empty for all.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def run_bench(
 
 
 def bench_table(results: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return for every figure of `run_bench`: what, value, target, and whether it is met."""
+    """Return name, value, target and whether it is met for every figure of `run_bench`."""
     return [
         (
             figure["what"],
@@ -87,7 +87,7 @@ def bench_table(results: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
 
 
 def _environment() -> dict[str, Any]:
-    """Return what the figures depend on besides handcal."""
+    """Return the environment on which the figures depend."""
     versions: dict[str, str | None] = {}
     for name in _LIBRARIES:
         try:

@@ -1,4 +1,4 @@
-"""How fast a study is done, and what a second process adds."""
+"""Speed of a study, with one and with two processes."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
 from handcal.lab.study.run import Study, run_study
 from handcal.lab.study.store import Row
 
-# Each process makes its own; in a whole study, there are more, and it hardly shows.
+# Each process makes its own hands; in a whole study this time is negligible.
 _HANDS = 2
 _SPEED_UP = 1.7
 _PER_MINUTE = 2000.0
 
 
 def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
-    """Do a small noise study in this process, then in two, from the first process's start on."""
+    """Run a small noise study in this process, then in two, including their start."""
     if not settings.study_trials:
         progress(1.0)
         return Measured([], {})

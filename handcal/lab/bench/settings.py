@@ -1,4 +1,4 @@
-"""How much to measure."""
+"""Settings of the benchmark."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class BenchSettings:
-    """How much to measure; the defaults take some minutes on two cores."""
+    """Extent of the benchmark; the defaults take a few minutes on two cores."""
 
     points: int = 5000
-    """Points of every cloud."""
+    """Number of points of every cloud."""
     angles_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 20.0)
-    """Rotations between cursor and hand in the paper's simulation; 0 among them."""
+    """Rotations between cursor and hand in the paper's simulation; must include 0."""
     cut_angles_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0)
-    """The same, for clouds that are cut differently; 0 among them."""
+    """Rotations for differently cut clouds; must include 0."""
     trials: int = 40
-    """Alignments at each angle, for the methods that are quick."""
+    """Alignments at each angle for the fast methods."""
     slow_trials: int = 3
-    """Of these, the ones that ``paper`` and ``linear`` solve too, ``paper`` at some seconds
+    """Number of these also solved by ``paper`` and ``linear``; ``paper`` takes seconds for
     each."""
     covariance_trials: int = 200
-    """Alignments that the covariance is judged by."""
+    """Alignments for judging the covariance."""
     repeats: int = 25
-    """How often a duration is measured."""
+    """Repetitions of each timing."""
     paper_repeats: int = 3
-    """The same for ``paper``."""
+    """Repetitions of timing ``paper``."""
     offline_rigs: int = 1
-    """Rigs calibrated from rendered photographs, at some minutes each."""
+    """Rigs calibrated from rendered photographs, which takes minutes for each."""
     offline_wearers: int = 100
-    """Who calibrate with each of them, and with the true rig."""
+    """Wearers who calibrate with each of these rigs, and with the true one."""
     study_trials: int = 8
-    """Alignments of each value in a small noise study, done twice; none of it if 0."""
+    """Alignments per value in a small noise study, run twice; 0 to skip it."""
 
 
 QUICK = BenchSettings(
@@ -46,4 +46,4 @@ QUICK = BenchSettings(
     offline_rigs=0,
     study_trials=0,
 )
-"""A look whether everything runs, in some seconds; its figures say little."""
+"""Smoke-test settings: a few seconds; the figures are not meaningful."""

@@ -1,4 +1,4 @@
-"""How long the steps take that a person waits for, or that run at camera rate."""
+"""Duration of the steps that a person waits for or that run at camera rate."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _FRAMES, _FRAME_NS = 120, 33_333_333
 
 
 def measure_speed(settings: BenchSettings, progress: Progress) -> Measured:
-    """Measure segmentation, registration and solving, one after the other in one thread."""
+    """Measure segmentation, registration and solving in turn, in one thread."""
     trials = range(settings.paper_repeats)
     alignments = [_noisy_alignment(trial, settings.points) for trial in trials]
     figures = _segmentation(settings.repeats)
@@ -59,7 +59,7 @@ def _noisy_alignment(trial: int, points: int) -> Alignment:
 
 
 def _segmentation(repeats: int) -> list[Figure]:
-    """Time the segmentation of one simulated frame, 1280x720, and the way to its ROI."""
+    """Time the segmentation of one simulated frame, 1280x720, and the tracking of its ROI."""
     frame = simulated_frame()
     segmenting = SegmentSettings()
     roi_px = segment_hand(frame, segmenting).box_px
@@ -82,14 +82,14 @@ def simulated_frame() -> Frame:
 
 
 def following_ms(detector: Detector, frame: Frame) -> float:
-    """Return the mean processor time a frame of following a hand at 30 frames a second.
+    """Return the mean processor time per frame for tracking a hand at 30 frames a second.
 
-    The detector's looks at it are counted in, but not those that found it.
+    The detector's checks of the hand are included, but not its detection.
 
     Raises
     ------
     HandError
-        If there is no hand in the frame, or it is lost.
+        If no hand is found in the frame, or it is lost.
     """
     finder = RoiFinder(detector, SegmentSettings())
     finder.find(frame)
@@ -102,7 +102,7 @@ def following_ms(detector: Detector, frame: Frame) -> float:
 
 
 def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
-    """Time the guard, and a whole registration against Open3D's, where that is installed."""
+    """Time the guard, and a whole registration beside Open3D's if it is installed."""
     guards = [(RotationGuard(a.cursor_m, a.cursor_is_cut), a) for a in alignments]
     [guard_ms] = _medians_ms(
         guards * repeats, lambda pair: pair[0].rotation(pair[1].hand_m, pair[1].hand_is_cut)
@@ -126,7 +126,7 @@ def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]
 
 
 def _open3d_icp() -> Callable[[tuple[Float64, Float64]], object] | None:
-    """Return Open3D's ICP with its defaults, from two clouds; None if it is not installed."""
+    """Return Open3D's ICP of two clouds with its defaults; None if it is not installed."""
     try:
         import open3d as o3d
     except ImportError:
@@ -143,7 +143,7 @@ def _open3d_icp() -> Callable[[tuple[Float64, Float64]], object] | None:
 
 
 def _solving(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
-    """Time solving both eyes, by the default and as published, on the same alignments."""
+    """Time solving both eyes by the default and the published method, on the same alignments."""
     rig = example_rig()
     [consistent_ms] = _medians_ms([*alignments] * repeats, lambda a: solve_alignment(a, rig))
     [paper_ms] = _medians_ms(alignments, lambda a: solve_alignment(a, rig, "paper"))
@@ -156,9 +156,9 @@ def _solving(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
 
 
 def _medians_ms(inputs: Sequence[Input], *actions: Callable[[Input], object]) -> list[float]:
-    """Return the median duration of each action over the inputs; one cold first run is no matter.
+    """Return the median duration of each action over the inputs.
 
-    The actions take turns, so that a busy moment of the machine strikes them alike.
+    The actions alternate, so that a busy moment of the machine affects all of them.
     """
     durations_s: list[list[float]] = [[] for _ in actions]
     for value in inputs:

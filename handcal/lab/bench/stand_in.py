@@ -1,4 +1,4 @@
-"""How well a calibrated rig stands in for the true one, for wearers who calibrate with it."""
+"""Reprojection errors of wearers who calibrate with an imperfect rig."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _DEPTH_SIGMA_M = 0.001
 def reprojection_of_wearers(rig: Rig, worn_rig: Rig, wearers: int, progress: Progress) -> Float64:
     """Return each wearer's mean reprojection error, arcmin, after one alignment with both eyes.
 
-    They differ in eyes, hand and slips as in the demonstration; wearer n is the same for every rig.
+    They differ in eyes, hands and placement errors; wearer n is the same for every rig.
 
     Parameters
     ----------
     rig : Rig
-        The one that is calibrated and rendered with.
+        Rig used for calibration and rendering.
     worn_rig : Rig
-        The true one.
+        The true rig.
     wearers : int
     progress : callable
     """
@@ -51,7 +51,7 @@ def reprojection_of_wearers(rig: Rig, worn_rig: Rig, wearers: int, progress: Pro
 
 
 def ratio_of_means(errors: Float64, baseline: Float64) -> MeanInterval:
-    """Return the ratio of two means (N,) over the same wearers, with its interval of 95 %.
+    """Return the ratio of two means (N,) over the same wearers, with its 95 % interval.
 
     The ratio is linearised (Cochran 1977, Sampling Techniques, section 6.4).
     """

@@ -1,4 +1,4 @@
-"""Simulated alignments, many at a time, and what the methods make of them."""
+"""Many simulated alignments, solved by several methods."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ Case = TypeVar("Case")
 Outcome = TypeVar("Outcome")
 
 Progress: TypeAlias = Callable[[float], None]
-"""Is told the fraction done."""
+"""Called with the share done."""
 
 Errors: TypeAlias = Mapping[str, Float64]
-"""Errors of φ by method, or by floor: (3,) of one trial, (trials, 3) of several."""
+"""Errors of φ by method or floor: (3,) for one trial, (trials, 3) for several."""
 
 _HANDS = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a part of the benchmark found: its headline figures, and the rest as JSON."""
+    """The result of a part of the benchmark: headline figures, and details as JSON."""
 
     figures: list[Figure]
     details: Any
@@ -41,7 +41,7 @@ class Measured:
 def run_trials(
     trial: Callable[[Task], Outcome], tasks: Sequence[Task], progress: Progress
 ) -> list[Outcome]:
-    """Run a trial for every task, in as many threads as there are cores, and keep the order."""
+    """Run a trial for every task, with one thread per core; the order is kept."""
     outcomes = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for outcome in pool.map(trial, tasks):
@@ -53,9 +53,9 @@ def run_trials(
 def collect_errors(
     trial: Callable[[Case, int], Errors], cases: Sequence[Case], trials: int, progress: Progress
 ) -> dict[Case, Errors]:
-    """Run trials 0, 1, … of every case, and stack the errors of φ that each gives.
+    """Run trials 0, 1, … of every case, and stack their errors of φ.
 
-    What trial 0 names counts; later trials may leave some out.
+    Trial 0 determines the methods; later trials may omit some.
     """
     tasks = list(product(cases, range(trials)))
     outcomes = run_trials(lambda task: trial(*task), tasks, progress)
@@ -70,12 +70,12 @@ def collect_errors(
 
 
 def trial_hand(trial: int) -> HandModel:
-    """Return the hand of a trial: some people, who come again."""
+    """Return the hand of a trial, one of a few that repeat."""
     return study_hand(trial % _HANDS)
 
 
 def trial_alignment(trial: int, angle_deg: float, making: AlignmentSettings) -> SimulatedAlignment:
-    """Return the alignment of a trial; at other angles it is the same but for the angle."""
+    """Return the alignment of a trial; it is the same at all angles except for the angle."""
     rng = np.random.default_rng(trial)
     return simulate_alignment(rng, trial_hand(trial), np.radians(angle_deg), making)
 

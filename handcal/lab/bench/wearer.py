@@ -1,4 +1,4 @@
-"""Alignments as a person makes them who looks through the displays and errs nowhere."""
+"""Ideal alignments by a simulated person without placement error."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BIAS_MM = 0.3
 
 
 def measure_wearer(settings: BenchSettings, progress: Progress) -> Measured:
-    """Measure the bias in φ3 of an eye 10 mm nearer to the display, and 10 mm farther."""
+    """Measure the bias in φ3 for an eye 10 mm nearer to the display and 10 mm farther."""
     rig = example_rig()
 
     def solve(along_m: float, trial: int) -> Errors:
