@@ -37,13 +37,13 @@ class Results:
     method: Method
     alignments: tuple[Mapping[Eye, EyeShift], ...]
     """Each alignment alone, without prior."""
-    shifts: Mapping[Eye, EyeShift]
+    eyes: Mapping[Eye, EyeShift]
     """Fused; what the headset shall render with."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
-    """Implied by the shifts; None unless both eyes are solved."""
+    """Implied by `eyes`; None unless both eyes are solved."""
     expected_after_another_arcmin: Mapping[Eye, float]
-    """What `expected_error_arcmin` of the shifts would become with one more alignment like those so
+    """What `expected_error_arcmin` of `eyes` would become with one more alignment like those so
     far."""
 
 
@@ -89,7 +89,7 @@ def solve_session(
     return Results(
         method=settings.method,
         alignments=tuple(solved),
-        shifts=shifts,
+        eyes=shifts,
         verdicts=judge(rig, shifts, settings.verdict),
         eye_distance_m=eye_distance_m(rig, shifts),
         expected_after_another_arcmin={
@@ -109,7 +109,7 @@ def results_json(results: Results) -> dict[str, Any]:
         "eyes": {
             eye: _shift_json(shift)
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
-            for eye, shift in results.shifts.items()
+            for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
         "alignments": [
