@@ -70,16 +70,18 @@ _HOMES = {
 _HOME_OF = {name: f"handcal.{home}" for home, names in _HOMES.items() for name in names}
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used: scipy alone takes longer than a command line."""
-    if name == "__version__":
-        value: Any = import_module("importlib.metadata").version("handcal")
-    elif name in _HOME_OF:
-        value = getattr(import_module(_HOME_OF[name]), name)
-    else:
-        raise AttributeError(f"module 'handcal' has no attribute {name!r}")
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # a type checker would take any name for one of Any
+
+    def __getattr__(name: str) -> Any:
+        """Import a name when it is first used: scipy alone takes longer than a command line."""
+        if name == "__version__":
+            value = import_module("importlib.metadata").version("handcal")
+        elif name in _HOME_OF:
+            value = getattr(import_module(_HOME_OF[name]), name)
+        else:
+            raise AttributeError(f"module 'handcal' has no attribute {name!r}")
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:
