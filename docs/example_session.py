@@ -57,7 +57,7 @@ def calibrate(
         session.save_alignment(alignments[-1])
         results = solve_session(alignments, wearer.rig, SolveSettings())
         session.save_results(results_json(results))
-        solved_m = {eye: shift.shift_m for eye, shift in results.shifts.items()}
+        solved_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
         session.save_applied(solved_m)
         shift_m |= solved_m
     return shift_m

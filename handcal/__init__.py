@@ -1,24 +1,89 @@
-"""handcal: calibrate an optical see-through headset with the wearer's bare hand."""
+"""handcal: calibrate an optical see-through headset with the wearer's bare hand.
+
+>>> import handcal
+>>> session = handcal.open_session("resources/example_session")
+>>> results = handcal.solve(session)
+>>> print(results.eyes["left"])
+φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm; rms 1.43 mm, 97 % inliers, converged
+
+Lengths are in metres, angles in radians, axes OpenCV's; `handcal.types` names the frames.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from handcal.display import update_matrix
+    from handcal.camera.images import read_frame
+    from handcal.conventions import to_opengl, to_openxr, to_unity
+    from handcal.display import projections, update_matrix
+    from handcal.errors import HandcalError, HandError
+    from handcal.hand.shipped import segment
     from handcal.register.guard import rotation_between
+    from handcal.register.results import Results
     from handcal.register.solve import solve_eye_shift
+    from handcal.rig.rig_file import read_rig, write_rig
+    from handcal.session.session import open_session
+    from handcal.station.solve_again import solve
+    from handcal.types import Alignment, EyeShift, Frame, HandCloud, Rig
 
-__all__ = ["rotation_between", "solve_eye_shift", "update_matrix"]
+    __version__: str
+
+__all__ = [
+    "Alignment",
+    "EyeShift",
+    "Frame",
+    "HandCloud",
+    "HandError",
+    "HandcalError",
+    "Results",
+    "Rig",
+    "__version__",
+    "open_session",
+    "projections",
+    "read_frame",
+    "read_rig",
+    "rotation_between",
+    "segment",
+    "solve",
+    "solve_eye_shift",
+    "to_opengl",
+    "to_openxr",
+    "to_unity",
+    "update_matrix",
+    "write_rig",
+]
 
 _HOMES = {
-    "rotation_between": "handcal.register.guard",
-    "solve_eye_shift": "handcal.register.solve",
-    "update_matrix": "handcal.display",
+    "camera.images": ("read_frame",),
+    "conventions": ("to_opengl", "to_openxr", "to_unity"),
+    "display": ("projections", "update_matrix"),
+    "errors": ("HandError", "HandcalError"),
+    "hand.shipped": ("segment",),
+    "register.guard": ("rotation_between",),
+    "register.results": ("Results",),
+    "register.solve": ("solve_eye_shift",),
+    "rig.rig_file": ("read_rig", "write_rig"),
+    "session.session": ("open_session",),
+    "station.solve_again": ("solve",),
+    "types": ("Alignment", "EyeShift", "Frame", "HandCloud", "Rig"),
 }
+_HOME_OF = {name: f"handcal.{home}" for home, names in _HOMES.items() for name in names}
 
 
-def __getattr__(name: str) -> Any:
-    """Import what is asked for only then: scipy alone takes longer than a whole command line."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'handcal' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+if not TYPE_CHECKING:  # a type checker would take any name for one of Any
+
+    def __getattr__(name: str) -> Any:
+        """Import a name when it is first used: scipy alone takes longer than a command line."""
+        if name == "__version__":
+            value = import_module("importlib.metadata").version("handcal")
+        elif name in _HOME_OF:
+            value = getattr(import_module(_HOME_OF[name]), name)
+        else:
+            raise AttributeError(f"module 'handcal' has no attribute {name!r}")
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names: what completion offers."""
+    return __all__

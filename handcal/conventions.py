@@ -21,8 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from handcal.display import projections
 from handcal.geometry import rigid
-from handcal.types import Float64, Projection, freeze
+from handcal.types import Eye, Float64, Projection, Rig, Solved, brief, freeze
 
 # Each is its own inverse.
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -42,6 +43,8 @@ class Pose:
         freeze(self, "position_m", np.float64, 3)
         freeze(self, "quaternion_xyzw", np.float64, 4)
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, slots=True)
 class Fov:
@@ -51,6 +54,122 @@ class Fov:
     right_rad: float
     up_rad: float
     down_rad: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeCamera:
+    """One eye as a camera of OpenGL or Unity; column vectors, clip space's z from -1 to +1."""
+
+    projection: Float64
+    """(4, 4); clip space from V, in OpenGL's axes. It holds the whole of P, so its frustum is not
+    symmetric and its eye not at V's origin."""
+    view_from_head: Float64
+    """(4, 4); V, in OpenGL's axes, from the headset rig H, in the axes of the system."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "projection", np.float64, 4, 4)
+        freeze(self, "view_from_head", np.float64, 4, 4)
+
+    __repr__ = brief
+
+
+def to_unity(
+    rig: Rig, results: Solved, *, near_m: float = 0.1, far_m: float = 100.0
+) -> dict[Eye, EyeCamera]:
+    """Return both eyes as Unity's stereo cameras.
+
+    `EyeCamera.projection` is for ``Camera.SetStereoProjectionMatrix``;
+    `EyeCamera.view_from_head` times the head's ``worldToLocalMatrix`` is for
+    ``Camera.SetStereoViewMatrix``. An eye that was not solved keeps its offline calibration.
+
+    Parameters
+    ----------
+    rig : Rig
+    results : Results
+        From `handcal.solve`; anything with `eyes`, φ of each solved eye.
+    near_m, far_m : float
+        Clipping distances in front of the eye.
+
+    Returns
+    -------
+    dict of eye to EyeCamera
+
+    Raises
+    ------
+    ValueError
+        Unless ``0 < near_m < far_m``, or if an eye would lie on or beyond its focal plane.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> unity = handcal.to_unity(session.rig, handcal.solve(session), near_m=0.2, far_m=20.0)
+    >>> unity["right"].projection.shape, unity["right"].view_from_head.shape
+    ((4, 4), (4, 4))
+    """
+    return {
+        eye: EyeCamera(
+            opengl_projection(projection, near_m, far_m),
+            unity_world_to_camera(rig.eyes[eye].T_V_H),
+        )
+        for eye, projection in _rendered(rig, results).items()
+    }
+
+
+def to_opengl(
+    rig: Rig, results: Solved, *, near_m: float = 0.1, far_m: float = 100.0
+) -> dict[Eye, EyeCamera]:
+    """Return both eyes as OpenGL cameras: x right, y up, z back.
+
+    The model-view matrix of a point in H is `EyeCamera.view_from_head`, from the headset rig in
+    OpenGL's axes. Parameters and errors as `to_unity`; the projections are the same.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> left = handcal.to_opengl(session.rig, handcal.solve(session))["left"]
+    >>> clip = left.projection @ left.view_from_head @ [0.0, 0.0, -0.6, 1.0]
+    >>> (clip[:3] / clip[3]).round(2)  # normalised device coordinates of a point in H
+    array([0.17, 0.41, 0.69])
+    """
+    return {
+        eye: EyeCamera(
+            opengl_projection(projection, near_m, far_m), opengl_transform(rig.eyes[eye].T_V_H)
+        )
+        for eye, projection in _rendered(rig, results).items()
+    }
+
+
+def to_openxr(rig: Rig, results: Solved) -> dict[Eye, tuple[Pose, Fov]]:
+    """Return both eyes as the pose and angles of OpenXR's XrView.
+
+    Parameters
+    ----------
+    rig : Rig
+    results : Results
+        From `handcal.solve`; anything with `eyes`, φ of each solved eye.
+
+    Returns
+    -------
+    dict of eye to (Pose, Fov)
+        The pose in V, in OpenXR's axes (x right, y up, z back; metres), and the angles in rad.
+
+    Raises
+    ------
+    ValueError
+        If a projection has skew or rotation, which XrFovf cannot express, or an eye would lie on
+        or beyond its focal plane.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> pose, fov = handcal.to_openxr(session.rig, handcal.solve(session))["left"]
+    >>> (1e3 * pose.position_m).round(2)  # mm: the eye in V
+    array([-3.28, -1.69, -0.32])
+    """
+    return {eye: openxr_view(one) for eye, one in _rendered(rig, results).items()}
 
 
 def opengl_transform(T: Float64) -> Float64:
@@ -144,6 +263,13 @@ def openxr_view(projection: Projection) -> tuple[Pose, Fov]:
         down_rad=float(np.arctan((cy + 0.5 - projection.height_px) / fy)),
     )
     return pose(opengl_transform(rigid(translation_m=eye_m))), fov
+
+
+def _rendered(rig: Rig, results: Solved) -> dict[Eye, Projection]:
+    return {
+        eye: Projection(eye, P, rig.eyes[eye].width_px, rig.eyes[eye].height_px)
+        for eye, P in projections(rig, results).items()
+    }
 
 
 def _metric(P: Float64) -> Float64:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.geometry import invert, project, rigid, transform
-from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig
+from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig, Solved
 
 TARGET_SIDE_M = 0.08
 TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
@@ -41,6 +41,15 @@ def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:
     ValueError
         If the shift is not three finite numbers, the distance is not positive, or the eye
         would lie on or beyond the focal plane.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> handcal.update_matrix([0.002, 0.0, 0.01], display_distance_m=2.0)
+    array([[ 0.995,  0.   ,  0.001, -0.002],
+           [ 0.   ,  0.995,  0.   , -0.   ],
+           [ 0.   ,  0.   ,  1.   , -0.01 ],
+           [ 0.   ,  0.   ,  0.   ,  1.   ]])
     """
     shift = np.asarray(shift_m, dtype=np.float64)
     if shift.shape != (3,) or not np.isfinite(shift).all():
@@ -84,6 +93,50 @@ def projection_matrix(display: EyeDisplay, shift_m: ArrayLike = (0.0, 0.0, 0.0))
     """
     P: Float64 = eye_projection(display, shift_m) @ rigid(translation_m=display.t_C0_V_m)
     return P
+
+
+def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
+    """Return P1 of both eyes, what the headset renders with after a calibration.
+
+    ``P1 = K H0 UQ [I t(C0→V); 0 1]`` (Hu et al. 2021, eq. for P1). An eye that was not solved keeps
+    its offline calibration, φ = 0.
+
+    Parameters
+    ----------
+    rig : Rig
+        The one that the alignments were made with, ``session.rig``.
+    results : Results
+        From `handcal.solve`; anything with `eyes`, φ of each solved eye.
+
+    Returns
+    -------
+    dict of eye to (3, 4) float64
+        Pixels on the eye's display from points in V, the headset's rendering camera, in metres:
+        ``ζ m = P [p_V; 1]``. OpenCV's axes: x right, y down, z forward.
+
+    Raises
+    ------
+    ValueError
+        If an eye would lie on or beyond its display's focal plane.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> P = handcal.projections(session.rig, handcal.solve(session))
+    >>> P["left"].shape
+    (3, 4)
+    >>> u, v, depth = P["left"] @ [0.0, 0.0, 0.5, 1.0]  # half a metre ahead of V
+    >>> print(f"{u / depth:.0f} {v / depth:.0f} px")
+    643 351 px
+    """
+    solved = results.eyes
+    return {
+        eye: projection_matrix(display, solved[eye].shift_m)
+        if eye in solved
+        else projection_matrix(display)
+        for eye, display in rig.eyes.items()
+    }
 
 
 def arcmin_from_px(display: EyeDisplay, error_px: ArrayLike) -> Float64:

@@ -9,10 +9,11 @@ x right, y down, z forward.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from html import escape
 from types import MappingProxyType
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -31,6 +32,8 @@ RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
 VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
+
+_FEW = 6  # items that `brief` shows
 
 
 def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...]) -> NDArray[Any]:
@@ -72,6 +75,37 @@ def freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) ->
             raise ValueError(f"{type(instance).__name__}.{name}: {error}") from None
 
 
+def brief(instance: Any) -> str:
+    """Return a dataclass as one line, large arrays by type and shape: a ``__repr__``."""
+    values = ", ".join(
+        f"{one.name}={_brief(getattr(instance, one.name))}" for one in fields(instance)
+    )
+    return f"{type(instance).__name__}({values})"
+
+
+def html_table(rows: Sequence[Sequence[str]]) -> str:
+    """Return a table for notebooks; the first row and the first column are its headings."""
+    head, *body = ([escape(cell) for cell in row] for row in rows)
+    lines = ["".join(f"<th>{cell}</th>" for cell in head)]
+    for name, *cells in body:
+        lines.append(f"<th>{name}</th>" + "".join(f"<td>{cell}</td>" for cell in cells))
+    return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
+
+
+def _brief(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        if value.size <= _FEW:
+            return np.array2string(value, precision=6, separator=", ").replace("\n", "")
+        return f"{value.dtype} {value.shape}"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key!r}: {_brief(one)}' for key, one in value.items())}}}"
+    if isinstance(value, tuple) and len(value) > _FEW:
+        return f"<{len(value)} items>"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_brief, value))})"
+    return repr(value)
+
+
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
     """A pinhole camera in pixels, with OpenCV's distortion coefficients (empty: none)."""
@@ -104,6 +138,8 @@ class Frame:
     color_intrinsics: Intrinsics | None = None
     T_C_D: Float64 = field(default_factory=lambda: np.eye(4))
     """(4, 4); from the depth camera to the colour camera; identity for depth aligned to colour."""
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         intrinsics = self.depth_intrinsics
@@ -140,6 +176,8 @@ class HandCloud:
     """(4,); x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive."""
     median_depth_m: float
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         freeze(self, "points_m", np.float32, None, 3)
         freeze(self, "is_cut", np.bool_, len(self.points_m))
@@ -172,6 +210,8 @@ class Alignment:
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
     """each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration."""
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "cursor_m", np.float64, None, 3)
@@ -215,6 +255,54 @@ class EyeShift:
         freeze(self, "residuals_m", np.float64, None)
         freeze(self, "history_m2", np.float64, None)
 
+    @property
+    def sigma_m(self) -> Float64:
+        """(3,); one standard deviation of each coordinate of φ, from the covariance's diagonal."""
+        return np.sqrt(np.diag(self.covariance_m2))
+
+    def __str__(self) -> str:
+        state = "converged" if self.converged else f"not converged ({self.stop_reason})"
+        return (
+            f"{phi_text(self)}; rms {1e3 * self.rms_m:.2f} mm, "
+            f"{100 * self.inlier_ratio:.0f} % inliers, {state}"
+        )
+
+    def __repr__(self) -> str:
+        return f"<EyeShift {self}>"
+
+    def _repr_html_(self) -> str:
+        return html_table([["", self.method], *shift_rows([self])])
+
+
+def phi_text(shift: EyeShift) -> str:
+    """Return φ ± σ in one line: ``φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm``."""
+    return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
+
+
+def shift_rows(shifts: Sequence[EyeShift]) -> list[list[str]]:
+    """Return what there is to say of eye shifts as rows of a table, a column for each shift."""
+    coordinates = zip(*map(_coordinates_mm, shifts), strict=True)
+    names = ("φ1 (right), mm", "φ2 (down), mm", "φ3 (forward), mm")
+    return [
+        *([name, *cells] for name, cells in zip(names, coordinates, strict=True)),
+        ["rms, mm", *(f"{1e3 * shift.rms_m:.2f}" for shift in shifts)],
+        ["inliers, %", *(f"{100 * shift.inlier_ratio:.0f}" for shift in shifts)],
+        ["converged", *("yes" if shift.converged else shift.stop_reason for shift in shifts)],
+    ]
+
+
+def _coordinates_mm(shift: EyeShift) -> list[str]:
+    pairs = zip(1e3 * shift.shift_m, 1e3 * shift.sigma_m, strict=True)
+    return [f"{value:+.2f} ± {sigma:.2f}" for value, sigma in pairs]
+
+
+class Solved(Protocol):
+    """Anything with solved eye shifts, such as `handcal.Results`."""
+
+    @property
+    def eyes(self) -> Mapping[Eye, EyeShift]:
+        """φ of each solved eye."""
+
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
@@ -235,6 +323,8 @@ class Projection:
     height_px: int
     """Size of the display."""
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         freeze(self, "P", np.float64, 3, 4)
 
@@ -246,6 +336,8 @@ class Target:
     eye: Eye
     corners_V_m: Float64
     """(4, 3); clockwise from the upper left, in V."""
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "corners_V_m", np.float64, 4, 3)
@@ -267,6 +359,8 @@ class EyeDisplay:
     height_px: int
     T_V_H: Float64
     """(4, 4); from the headset rig to the rendering camera, as the headset reports it."""
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "K", np.float64, 3, 3)
@@ -295,6 +389,8 @@ class Origin:
     covariance: Float64
     """(n, n); covariance of the n `parameters`."""
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         freeze(self, "covariance", np.float64, len(self.parameters), len(self.parameters))
 
@@ -310,6 +406,8 @@ class Rig:
     depth_intrinsics: Intrinsics
     origins: Mapping[RigPart, Origin] = field(default_factory=dict)
     """Origin of each of `RIG_PARTS`, where it is known."""
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_D", np.float64, 4, 4)

@@ -127,7 +127,7 @@ def simulated_alignments(seed: int) -> list[Alignment]:
             align_hand(wearer, rng, eyes, shift_m, WearerSettings(), POINTS, DEPTH_SIGMA_M)
         )
         results = solve_session(alignments, wearer.rig, SolveSettings())
-        shift_m |= {eye: shift.shift_m for eye, shift in results.shifts.items()}
+        shift_m |= {eye: shift.shift_m for eye, shift in results.eyes.items()}
     return alignments
 
 
@@ -144,7 +144,7 @@ def test_simulated_wearers_calibrated(seed: int, golden: dict[str, Any]) -> None
     results = solve_session(alignments, rig, SolveSettings())
     projections = {
         eye: projection_matrix(rig.eyes[eye], shift.shift_m).tolist()
-        for eye, shift in results.shifts.items()
+        for eye, shift in results.eyes.items()
     }
     clouds = [[digest(one.cursor_m), digest(one.hand_m)] for one in alignments]
     check(
@@ -201,7 +201,7 @@ def test_the_journal_of_a_session(tmp_path: Path, golden: dict[str, Any]) -> Non
             session.save_alignment(alignment)
         results = solve_session(alignments, rig, SolveSettings())
         session.save_results(results_json(results))
-        shifts_m = {eye: shift.shift_m for eye, shift in results.shifts.items()}
+        shifts_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
         session.save_applied(shifts_m)
         session.save_fine_tuned({eye: shift_m + 0.001 for eye, shift_m in shifts_m.items()})
         for eye in EYES:

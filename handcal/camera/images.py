@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import FileError
-from handcal.io.files import read_json
-from handcal.io.images import MAX_SIDE_PX, read_image
+from handcal.io.files import make_folder, read_json, write_atomic, write_json
+from handcal.io.images import MAX_SIDE_PX, read_image, write_png
 from handcal.types import Frame, Intrinsics, UInt8, UInt16
 
 DEPTH_SCALES_M = 1e-6, 0.1
@@ -21,24 +23,47 @@ DISTORTION_COUNTS = 0, 4, 5, 8, 12, 14
 """Numbers of coefficients of OpenCV's lens models."""
 
 
-def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
+def read_frame(
+    color: str | PathLike[str], depth: str | PathLike[str], intrinsics: str | PathLike[str]
+) -> Frame:
     """Read one frame whose depth is aligned to colour.
 
     Parameters
     ----------
-    color : Path
+    color : path
         PNG or JPEG, 8 bits per channel.
-    depth : Path
+    depth : path
         16-bit grey PNG of the same size; 0 where there is no measurement.
-    intrinsics : Path
+    intrinsics : path
         JSON with ``width``, ``height``, ``fx``, ``fy``, ``cx``, ``cy`` in pixels and
-        ``depth_scale`` in metres per unit of depth.
+        ``depth_scale`` in metres per unit of depth; ``distortion``, OpenCV's coefficients, if any.
+
+    Returns
+    -------
+    Frame
+        Depth (H, W) and colour (H, W, 3), RGB, of one camera; its times and index are 0.
 
     Raises
     ------
     FileError
         If a file is missing, malformed or too large, or if the files do not match.
+
+    Examples
+    --------
+    A frame of the simulated camera, written and read:
+
+    >>> import handcal
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from handcal.camera.images import write_frame
+    >>> from handcal.sim.camera import simulated_frame
+    >>> with TemporaryDirectory() as folder:
+    ...     paths = write_frame(Path(folder), simulated_frame(seed=1))
+    ...     frame = handcal.read_frame(*paths)
+    >>> frame.depth.shape, frame.depth.dtype, frame.color.shape
+    ((720, 1280), dtype('uint16'), (720, 1280, 3))
     """
+    color, depth, intrinsics = Path(color), Path(depth), Path(intrinsics)
     values = read_json(intrinsics)
     camera = intrinsics_from(values, intrinsics)
     depth_scale_m = number_from(values, intrinsics, "depth_scale", *DEPTH_SCALES_M)
@@ -54,6 +79,36 @@ def read_frame(color: Path, depth: Path, intrinsics: Path) -> Frame:
         color=color_image,
         color_intrinsics=camera,
     )
+
+
+def write_frame(folder: str | PathLike[str], frame: Frame) -> tuple[Path, Path, Path]:
+    """Write a frame as `read_frame` reads it; return the paths that it takes, in its order.
+
+    Parameters
+    ----------
+    folder : path
+        Created if missing; gets ``color.png``, ``depth.png`` and ``intrinsics.json``.
+    frame : Frame
+        Its depth aligned to colour.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be written.
+    ValueError
+        If the frame has no colour, or its depth is not aligned to it.
+    """
+    camera = frame.depth_intrinsics
+    if frame.color is None or frame.color_intrinsics != camera or (np.eye(4) != frame.T_C_D).any():
+        raise ValueError("the frame needs colour, and depth aligned to it")
+    folder = make_folder(Path(folder))
+    color, depth, intrinsics = (
+        folder / name for name in ("color.png", "depth.png", "intrinsics.json")
+    )
+    write_png(color, frame.color)
+    write_atomic(depth, cv2.imencode(".png", frame.depth)[1].tobytes())
+    write_json(intrinsics, asdict(camera) | {"depth_scale": frame.depth_scale_m})
+    return color, depth, intrinsics
 
 
 def intrinsics_from(values: dict[str, Any], path: Path) -> Intrinsics:

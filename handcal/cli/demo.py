@@ -155,7 +155,7 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
         eye: shift_m + rig.eyes[eye].t_C0_V_m - worn_rig.eyes[eye].t_C0_V_m
         for eye, shift_m in eyes_m.items()
     }
-    solved_m = {eye: shift.shift_m for eye, shift in results.shifts.items()}
+    solved_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
     nothing_m = {eye: np.zeros(3) for eye in EYES}
     return {
         "eyes": {
@@ -167,7 +167,7 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
                 "verdict": results.verdicts[eye].name,
                 "reason": results.verdicts[eye].reason,
             }
-            for eye, shift in results.shifts.items()
+            for eye, shift in results.eyes.items()
         },
         "reprojection_arcmin": {
             "before": reprojection_arcmin(rig, nothing_m, eyes_m, worn_rig),

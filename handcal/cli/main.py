@@ -108,7 +108,7 @@ def solve(arguments: argparse.Namespace) -> None:
         raise FileError(f"{arguments.session} holds no alignment to solve")
     save(arguments.json, results_json(results))
     shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
-    for eye, shift in results.shifts.items():
+    for eye, shift in results.eyes.items():
         shown_table.add_row(
             eye,
             _triple(1e3 * shift.shift_m),

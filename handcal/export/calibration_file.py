@@ -47,8 +47,8 @@ def write_calibration_yaml(path: Path, outcome: Outcome) -> None:
         storage.write("shift_m", outcome.final_shift_m(eye)[:, None])
         for origin, shift_m in outcome.shifts_m[eye].items():
             storage.write(f"{origin}_shift_m", shift_m[:, None])
-        if outcome.results is not None and eye in outcome.results.shifts:
-            storage.write("solved_covariance_m2", outcome.results.shifts[eye].covariance_m2)
+        if outcome.results is not None and eye in outcome.results.eyes:
+            storage.write("solved_covariance_m2", outcome.results.eyes[eye].covariance_m2)
         storage.endWriteStruct()
     write_atomic(path, storage.releaseAndGetString().encode())
 
@@ -123,7 +123,7 @@ def _solution(
     if origin == "solved" and outcome.results is not None:
         verdict = outcome.results.verdicts[eye]
         found |= {
-            "covariance_m2": outcome.results.shifts[eye].covariance_m2.tolist(),
+            "covariance_m2": outcome.results.eyes[eye].covariance_m2.tolist(),
             "verdict": verdict.name,
             "reason": verdict.reason,
         }

@@ -69,8 +69,8 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
                 for place, shifts in enumerate(results.alignments, 1)
                 if eye in shifts
             }
-            if eye in results.shifts:
-                each[fused + offset] = results.shifts[eye]
+            if eye in results.eyes:
+                each[fused + offset] = results.eyes[eye]
             ax.errorbar(
                 list(each),
                 [1e3 * shift.shift_m[component] for shift in each.values()],
@@ -106,9 +106,9 @@ def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results
                 _ellipse(ax, shifts[eye], "0.45", linewidth=0.8)
                 x_mm, y_mm, _ = 1e3 * shifts[eye].shift_m
                 ax.text(x_mm, y_mm, f"{number}", fontsize=6.5, color="0.3", ha="center")
-        if eye in results.shifts:
-            _ellipse(ax, results.shifts[eye], COLORS[eye], linewidth=1.6)
-            ax.plot(*(1e3 * results.shifts[eye].shift_m[:2]), "+", color=COLORS[eye])
+        if eye in results.eyes:
+            _ellipse(ax, results.eyes[eye], COLORS[eye], linewidth=1.6)
+            ax.plot(*(1e3 * results.eyes[eye].shift_m[:2]), "+", color=COLORS[eye])
         ax.plot(0.0, 0.0, "x", color="black", markersize=5)
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.08)

@@ -96,6 +96,6 @@ def _shifts_m(record: SessionRecord, results: Results | None, eye: Eye) -> dict[
     shifts_m: dict[Origin, Float64] = {}
     if record.fine_tuned is not None and eye in record.fine_tuned:
         shifts_m["fine_tuned"] = record.fine_tuned[eye]
-    if results is not None and eye in results.shifts:
-        shifts_m["solved"] = results.shifts[eye].shift_m
+    if results is not None and eye in results.eyes:
+        shifts_m["solved"] = results.eyes[eye].shift_m
     return shifts_m | {"offline": np.zeros(3)}

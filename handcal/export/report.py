@@ -164,7 +164,7 @@ def _solution(outcome: Outcome, results: Results) -> Section:
                 str(shift.iterations),
                 f"{results.verdicts[eye].reason} (stopped: {shift.stop_reason})",
             ]
-            for eye, shift in results.shifts.items()
+            for eye, shift in results.eyes.items()
         ],
     )
     items: list[Item] = [table]
@@ -419,7 +419,7 @@ def _error_cells(errors: ErrorStatistics) -> list[str]:
 
 def _shift_cells(outcome: Outcome, eye: Eye, origin: Origin) -> list[str]:
     if origin == "solved" and outcome.results is not None:
-        return _with_sigma(outcome.results.shifts[eye])
+        return _with_sigma(outcome.results.eyes[eye])
     return [_mm(value) for value in outcome.shifts_m[eye][origin]]
 
 

@@ -88,7 +88,7 @@ def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
                     "rotation_deg": float(np.degrees(np.linalg.norm(alignment.rotation_rad))),
                     **_triple("drawn_phi{}_mm", 1e3 * alignment.drawn_shift_m[eye]),
                 }
-        for eye, shift in results.shifts.items():
+        for eye, shift in results.eyes.items():
             verdict = results.verdicts[eye]
             yield {
                 "source": "fused",

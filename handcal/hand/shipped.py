@@ -4,20 +4,65 @@ from __future__ import annotations
 
 import time
 from functools import cache
+from typing import get_args
 
 import numpy as np
 
 from handcal.errors import FileError
 from handcal.hand.detect import DetectSettings, HandDetector
 from handcal.hand.finder import HandFinder
-from handcal.hand.settings import SegmentSettings
+from handcal.hand.settings import Roi, SegmentSettings
 from handcal.io.resources import resource_path
+from handcal.types import Frame, HandCloud
 
 FLOAT_MODEL, INTEGER_MODEL = "hand_detector.onnx", "hand_detector_int8.onnx"
 
 _RUNS = 5
 _GAIN_MIN = 1.2  # a smaller gain is not worth the rounding of integers
 _IMAGE = np.zeros((720, 1280, 3), np.uint8)
+
+
+def segment(frame: Frame, *, roi: Roi = "detector") -> HandCloud:
+    """Segment the bare hand in one frame.
+
+    The hand must be from 0.35 to 0.70 m away, all of it in the image. For a camera's frames one
+    after the other use `make_finder`, which follows the hand.
+
+    Parameters
+    ----------
+    frame : Frame
+        Depth, and colour for the detector; aligned or not. Without colour, ``"depth"`` is used.
+    roi : {"detector", "left", "right", "depth"}
+        Where to look: where the shipped detector sees a hand in the colour image (of several the
+        nearest, the leftmost or the rightmost), or for the nearest hand-sized thing in the depth
+        image.
+
+    Returns
+    -------
+    HandCloud
+        About 5,000 points of the visible surface and the outer contour, in metres in frame D, the
+        depth camera's; the mask in the depth image. The forearm is cut 2 cm behind the wrist.
+
+    Raises
+    ------
+    HandError
+        If there is no hand, or the image does not show all of it; the text says why.
+    ValueError
+        If `roi` is unknown.
+
+    Examples
+    --------
+    A frame of the simulated camera:
+
+    >>> import handcal
+    >>> from handcal.sim.camera import simulated_frame
+    >>> hand = handcal.segment(simulated_frame(seed=1), roi="depth")
+    >>> hand.points_m.shape[1], f"{hand.median_depth_m:.2f} m"
+    (3, '0.48 m')
+    """
+    if roi not in get_args(Roi):
+        raise ValueError(f"unknown roi {roi!r}: choose from {', '.join(get_args(Roi))}")
+    return make_finder(SegmentSettings(roi=roi)).find(frame)
 
 
 def make_finder(settings: SegmentSettings) -> HandFinder:

@@ -129,6 +129,15 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
     ------
     ValueError
         For NaN, a wrong shape, fewer than 100 points, or points on one line.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> alignment = session.alignments[0]
+    >>> rotation_rad = handcal.rotation_between(alignment.cursor_m, alignment.hand_m)
+    >>> print(f"{np.degrees(np.linalg.norm(rotation_rad)):.1f}°")
+    1.3°
     """
     guard = RotationGuard(check_cloud("cursor_m", cursor_m), settings=_ONCE)
     return guard.rotation(check_cloud("hand_m", hand_m))

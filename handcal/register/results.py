@@ -15,7 +15,17 @@ from handcal.register.verdict import (
     eye_distance_m,
     judge,
 )
-from handcal.types import Alignment, Eye, EyeShift, Method, Rig, Verdict
+from handcal.types import (
+    Alignment,
+    Eye,
+    EyeShift,
+    Method,
+    Rig,
+    Verdict,
+    html_table,
+    phi_text,
+    shift_rows,
+)
 
 RESULTS_VERSION = 1
 
@@ -32,19 +42,44 @@ class SolveSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """What all alignments so far say."""
+    """Eye shifts of one wearer: each alignment alone, all of them fused, and judged."""
 
     method: Method
     alignments: tuple[Mapping[Eye, EyeShift], ...]
     """Each alignment alone, without prior."""
-    shifts: Mapping[Eye, EyeShift]
+    eyes: Mapping[Eye, EyeShift]
     """Fused; what the headset shall render with."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
-    """Implied by the shifts; None unless both eyes are solved."""
+    """Implied by `eyes`; None unless both eyes are solved."""
     expected_after_another_arcmin: Mapping[Eye, float]
-    """What `expected_error_arcmin` of the shifts would become with one more alignment like those so
+    """What `expected_error_arcmin` of `eyes` would become with one more alignment like those so
     far."""
+
+    def __str__(self) -> str:
+        solved = (
+            f"{eye} {phi_text(shift)}, {self.verdicts[eye].name}"
+            for eye, shift in self.eyes.items()
+        )
+        return f"{self._summary()}: {'; '.join(solved)}"
+
+    def __repr__(self) -> str:
+        return f"<Results {self}>"
+
+    def _repr_html_(self) -> str:
+        verdicts = self.verdicts.values()
+        return html_table(
+            [
+                [self._summary(), *self.eyes],
+                *shift_rows(list(self.eyes.values())),
+                ["verdict", *(verdict.name for verdict in verdicts)],
+                ["", *(verdict.reason for verdict in verdicts)],
+            ]
+        )
+
+    def _summary(self) -> str:
+        count = len(self.alignments)
+        return f"{self.method}, {count} alignment{'s' * (count != 1)}"
 
 
 def solve_session(
@@ -89,7 +124,7 @@ def solve_session(
     return Results(
         method=settings.method,
         alignments=tuple(solved),
-        shifts=shifts,
+        eyes=shifts,
         verdicts=judge(rig, shifts, settings.verdict),
         eye_distance_m=eye_distance_m(rig, shifts),
         expected_after_another_arcmin={
@@ -109,7 +144,7 @@ def results_json(results: Results) -> dict[str, Any]:
         "eyes": {
             eye: _shift_json(shift)
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
-            for eye, shift in results.shifts.items()
+            for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
         "alignments": [

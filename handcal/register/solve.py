@@ -60,6 +60,22 @@ def solve_eye_shift(
         one line, or a distance that is not positive.
     HandError
         If nearly all points lie beside cut edges.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> alignment = session.alignments[0]
+    >>> shift = handcal.solve_eye_shift(
+    ...     alignment.cursor_m,
+    ...     alignment.hand_m,
+    ...     display_distance_m=session.rig.eyes["left"].z_C0_S_m,
+    ...     T_E_W=alignment.T_E_W["left"],
+    ...     cursor_cut=alignment.cursor_is_cut,
+    ...     hand_cut=alignment.hand_is_cut,
+    ... )
+    >>> print(shift)
+    φ = (-4.04 ± 0.34, +0.68 ± 0.43, +0.29 ± 0.71) mm; rms 1.43 mm, 97 % inliers, converged
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")

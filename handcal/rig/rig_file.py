@@ -7,6 +7,7 @@ survive exactly. Version 1, which does not know how, is read as well; writing ma
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 
 import cv2
@@ -21,8 +22,14 @@ RIG_VERSION = 2
 MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 8 kB with how it was calibrated
 
 
-def write_rig(path: Path, rig: Rig) -> None:
-    """Write `rig` to `path`, atomically.
+def write_rig(path: str | PathLike[str], rig: Rig) -> None:
+    """Write a rig file, version 2, atomically.
+
+    Parameters
+    ----------
+    path : path
+        OpenCV FileStorage YAML; its folder exists.
+    rig : Rig
 
     Raises
     ------
@@ -30,7 +37,21 @@ def write_rig(path: Path, rig: Rig) -> None:
         If the rig would be refused by `read_rig`.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> from dataclasses import replace
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> rig = handcal.read_rig("resources/example_rig.yaml")
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "rig.yaml"
+    ...     handcal.write_rig(path, replace(rig, name="My headset"))
+    ...     handcal.read_rig(path).name
+    'My headset'
     """
+    path = Path(path)
     check_rig(rig)
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.write("handcal_rig", RIG_VERSION)
@@ -64,15 +85,34 @@ def write_rig(path: Path, rig: Rig) -> None:
     write_atomic(path, data)
 
 
-def read_rig(path: Path) -> Rig:
-    """Read and check a rig file.
+def read_rig(path: str | PathLike[str]) -> Rig:
+    """Read and check a rig file, version 1 or 2.
+
+    Parameters
+    ----------
+    path : path
+        OpenCV FileStorage YAML, as `write_rig` and ``handcal rig`` write it.
+
+    Returns
+    -------
+    Rig
+        Both eyes' displays, K in pixels and distances in metres, and T_H_D, the depth camera's
+        place on the headset.
 
     Raises
     ------
     FileError
         If the file cannot be read, is not a rig file or of an unknown version, or a field is
         missing or implausible; the text names the field and what is expected.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> rig = handcal.read_rig("resources/example_rig.yaml")
+    >>> rig.eyes["left"].K.shape, rig.eyes["left"].z_C0_S_m
+    ((3, 3), 2.0)
     """
+    path = Path(path)
     data = read_limited(path, MAX_RIG_BYTES)
     try:
         return parse_storage(data, _parse)

@@ -20,6 +20,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
@@ -86,6 +87,10 @@ class SessionRecord:
     """Length of the journal's complete lines."""
     torn_bytes: int
     """Length of an unfinished last line, which is left out; 0 if there is none."""
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.alignments)} alignments, {len(self.trials)} trials"
+        return f"<SessionRecord {self.path}: {counts}>"
 
 
 class Session(Closable):
@@ -380,6 +385,36 @@ class Session(Closable):
     def _append(self, event: str, data: dict[str, Any]) -> None:
         self._history.take(self._journal.append(event, data))
         self.revision += 1
+
+
+def open_session(path: str | PathLike[str]) -> SessionRecord:
+    """Read a session folder; nothing in it changes.
+
+    Parameters
+    ----------
+    path : path
+        The folder that holds the session's ``journal.jsonl``, or a copy of it; the session may be
+        in use, or left by a killed program.
+
+    Returns
+    -------
+    SessionRecord
+        Rig, settings, alignments, trials of the user test, notes and events.
+
+    Raises
+    ------
+    FileError
+        If the folder is not a session, is of an unknown version, or a file in it is missing,
+        damaged or too large.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> session.wearer, len(session.alignments), len(session.trials)
+    ('Simulated wearer', 2, 6)
+    """
+    return Session.open(Path(path))
 
 
 def _replay(path: Path, events: Sequence[Event]) -> History:

@@ -11,8 +11,10 @@ import numpy as np
 from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import invert, rigid
 from handcal.io.closable import Closable
+from handcal.sim.hand import make_hand
 from handcal.sim.raster import D415
 from handcal.sim.render import World, render
+from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.types import Frame, Intrinsics
@@ -129,3 +131,17 @@ class SyntheticCamera(Closable):
     def close(self) -> None:
         """Stop; safe to call twice."""
         self._is_open = False
+
+
+def simulated_frame(seed: int = 1) -> Frame:
+    """Return one frame of a hand held up half a metre away, in a room.
+
+    Parameters
+    ----------
+    seed : int
+        Of the hand, the room and the sensor's noise.
+    """
+    held_up = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
+    world = World(make_hand(seed), make_room(seed))
+    with SyntheticCamera(world, lambda: SceneState(0, np.eye(4), held_up), seed=seed) as camera:
+        return camera.read()

@@ -184,7 +184,7 @@ class _Studio:
             )
             for _ in range(settings.alignments)
         ]
-        return solve_session(alignments, self._rig, SolveSettings()).shifts[settings.eye].shift_m
+        return solve_session(alignments, self._rig, SolveSettings()).eyes[settings.eye].shift_m
 
     def capture_display(self, shown: UInt8, T_E_C: Float64, rng: np.random.Generator) -> UInt8:
         """Return the camera's image of the display in the dark."""

@@ -489,7 +489,7 @@ class Calibration:
 
     def _solved_shift_m(self) -> dict[Eye, Float64]:
         assert self.results is not None
-        return {eye: shift.shift_m for eye, shift in self.results.shifts.items()}
+        return {eye: shift.shift_m for eye, shift in self.results.eyes.items()}
 
     def _require_settled(self) -> None:
         if self.state in (State.ALIGN, State.APPLYING):

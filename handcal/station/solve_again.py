@@ -3,12 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import CalibrationSettings
+from handcal.types import METHODS, Method
+
+
+def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
+    """Solve a stored session's alignments, fuse them and judge the result.
+
+    Parameters
+    ----------
+    session : SessionRecord
+        From `handcal.open_session`; it stays as it is.
+    method : {"consistent", "paper", "linear", "icp"}, optional
+        Solver of each alignment, the session's own if not given. ``paper``: Hu et al. 2021 as
+        published. ``linear``: its model with all three rows of each pair. ``consistent``: exact
+        factor, and robust to cuts, sampling and a turned hand. ``icp``: rigid, the paper's
+        baseline. Its other settings are the session's own.
+
+    Returns
+    -------
+    Results
+        `eyes` holds φ of each solved eye, from C0 to C1 in E's axes, metres, fused from all
+        alignments. Equal input gives equal output, bit for bit.
+
+    Raises
+    ------
+    FileError
+        If the session has no alignments, one of them cannot be solved, or its settings cannot be
+        read.
+    HandError
+        If hardly a point of an alignment lies off the cut edges.
+    ValueError
+        If the method is unknown.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> results = handcal.solve(session)
+    >>> print(results.eyes["left"])
+    φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm; rms 1.43 mm, 97 % inliers, converged
+    >>> results.verdicts["left"].name
+    'accept'
+    """
+    if method is not None and method not in METHODS:
+        raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
+    settings = stored_solve_settings(session)
+    if method is not None:
+        settings = replace(settings, method=method)
+    results = solve_again(session, settings)
+    if results is None:
+        raise FileError(f"{session.path} holds no alignment to solve")
+    return results
 
 
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:

@@ -172,13 +172,13 @@ class Station(Closable):
             If the session cannot be written.
         """
         results = self.calibration.results
-        if results is None or eye not in results.shifts:
+        if results is None or eye not in results.eyes:
             raise ProcedureError(f"solve the {eye} eye first")
         trial = make_trial(
             self.rig.eyes[eye],
             eye,
             depth_m,
-            results.shifts[eye].shift_m,
+            results.eyes[eye].shift_m,
             self.calibration.applied_shift_m[eye],
         )
         return self.session.save_trial(trial)
@@ -274,8 +274,8 @@ class Station(Closable):
             if scene is not None:
                 T_W_H = scene.T_W_D @ invert(self.worn_rig.T_H_D)
                 image = self._true_eyes.look(eye, T_W_H, scene.T_W_hand)
-        elif calibration.results is not None and eye in calibration.results.shifts:
-            eye_shift_m = calibration.results.shifts[eye].shift_m
+        elif calibration.results is not None and eye in calibration.results.eyes:
+            eye_shift_m = calibration.results.eyes[eye].shift_m
         else:
             eye_shift_m = drawn_shift_m
         T_E_W = view_of_eye(display, T_W_H)

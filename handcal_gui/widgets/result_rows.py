@@ -96,7 +96,7 @@ _EYE_DISTANCE_MEANING = "Between the two solved eyes"
 def result_rows(results: Results, rig: Rig) -> list[Row]:
     """Return what is known of each eye, in a column each, and then of both together."""
     rows = [
-        Row(q.name, tuple(_cell(q, results.shifts.get(eye), rig, eye) for eye in EYES), q.meaning)
+        Row(q.name, tuple(_cell(q, results.eyes.get(eye), rig, eye) for eye in EYES), q.meaning)
         for q in QUANTITIES
     ]
     arcmin = results.expected_after_another_arcmin
@@ -121,7 +121,7 @@ def verdict_rows(results: Results) -> list[Row]:
 def another_text(results: Results, rig: Rig) -> str:
     """Return what one more alignment would buy."""
     gains = ", ".join(
-        f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.shifts[eye], rig.eyes[eye])}"
+        f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.eyes[eye], rig.eyes[eye])}"
         f" → {_arcmin(arcmin)}"
         for eye, arcmin in results.expected_after_another_arcmin.items()
     )
@@ -147,9 +147,9 @@ def comparison_rows(results: Results, other: Results, rig: Rig) -> list[Row]:
     """Return both results and how far the other's numbers are larger, eye after eye."""
     rows = []
     for eye in EYES:
-        if eye in results.shifts and eye in other.shifts:
+        if eye in results.eyes and eye in other.eyes:
             rows.append(Row(EYE_NAMES[eye], ("", "", "")))
-            one, two, display = results.shifts[eye], other.shifts[eye], rig.eyes[eye]
+            one, two, display = results.eyes[eye], other.eyes[eye], rig.eyes[eye]
             for q in QUANTITIES:
                 both = q.text(one, display), q.text(two, display)
                 rows.append(Row(q.name, (*both, q.difference(one, two, display)), q.meaning))

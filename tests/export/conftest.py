@@ -51,7 +51,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
         session.record("refused", reason="turned", angle_deg=12.0)
         results = solve_session(kept, RIG, SolveSettings())
         session.save_results(results_json(results))
-        shifts_m = {eye: shift.shift_m for eye, shift in results.shifts.items()}
+        shifts_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
         session.save_applied(shifts_m)
         for depth_m in (0.4, 0.6):
             for eye, shift_m in shifts_m.items():

@@ -27,7 +27,7 @@ def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: Outcome) -
     finals: dict[Eye, Origin] = {"left": "fine_tuned", "right": "solved"}
     for eye, final in finals.items():
         node, display = storage.getNode(eye), outcome.record.rig.eyes[eye]
-        covariance_m2 = outcome.results.shifts[eye].covariance_m2
+        covariance_m2 = outcome.results.eyes[eye].covariance_m2
         assert node.getNode("final").string() == final
         assert node.getNode("is_applied").real() == 1
         assert np.array_equal(node.getNode("P").mat(), outcome.projection(eye, final).P)

@@ -45,7 +45,7 @@ def mm(value_m: float) -> str:
 def test_it_says_what_was_found(pages: list[Figure], outcome: Outcome) -> None:
     found = texts(pages)
     assert outcome.results is not None
-    for eye, shift in outcome.results.shifts.items():
+    for eye, shift in outcome.results.eyes.items():
         for value, sigma in zip(shift.shift_m, np.sqrt(np.diag(shift.covariance_m2)), strict=True):
             assert f"{mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}" in found
         expected = expected_error_arcmin(outcome.record.rig.eyes[eye], shift)

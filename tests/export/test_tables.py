@@ -42,7 +42,7 @@ def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
         ("yes", "yes"),
     ]
     assert outcome.results is not None
-    alone, fused = outcome.results.alignments[1]["left"], outcome.results.shifts["right"]
+    alone, fused = outcome.results.alignments[1]["left"], outcome.results.eyes["right"]
     assert triple(rows[2], "phi{}_mm") == (1e3 * alone.shift_m).tolist()
     assert triple(rows[4], "sigma{}_mm") == np.sqrt(np.diag(1e6 * fused.covariance_m2)).tolist()
     assert float(rows[4]["covariance23_mm2"]) == 1e6 * fused.covariance_m2[1, 2]

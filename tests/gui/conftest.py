@@ -353,7 +353,7 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
     has_cursor = state in (State.ALIGN, State.ALIGNED, State.SOLVED)
     is_solved = state in (State.SOLVED, State.APPLYING, State.APPLIED)
     is_sent = state in (State.APPLYING, State.APPLIED)
-    applied_m = {eye: results.shifts[eye].shift_m if is_sent else np.zeros(3) for eye in EYES}
+    applied_m = {eye: results.eyes[eye].shift_m if is_sent else np.zeros(3) for eye in EYES}
     return Procedure(
         state=state,
         eyes=EYES,

@@ -16,6 +16,7 @@ from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.types import Target
+from tests.helpers import ROOT
 
 PATIENCE_S = 20.0
 
@@ -23,7 +24,7 @@ PATIENCE_S = 20.0
 def test_the_example_draws_confirms_and_ends_with_the_pc(pairing_key: bytes) -> None:
     with HeadsetServer(pairing_key) as server:
         process = subprocess.Popen(
-            [sys.executable, resource_path("headset_example.py"), *map(str, server.address)],
+            [sys.executable, ROOT / "examples/08_headset_client.py", *map(str, server.address)],
             env=os.environ | {KEY_VARIABLE: pairing_key.decode()},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

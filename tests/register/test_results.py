@@ -66,7 +66,7 @@ def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None
     }  # fmt: skip
     for eye in EYES:
         assert set(data["eyes"][eye]) == solved | {"verdict", "reason"}
-        assert data["eyes"][eye]["shift_m"] == results.shifts[eye].shift_m.tolist()
+        assert data["eyes"][eye]["shift_m"] == results.eyes[eye].shift_m.tolist()
         assert np.shape(data["eyes"][eye]["covariance_m2"]) == (3, 3)
         assert data["eyes"][eye]["verdict"] == results.verdicts[eye].name
         assert data["eyes"][eye]["reason"] == results.verdicts[eye].reason
@@ -78,7 +78,7 @@ def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None
 def test_what_another_alignment_would_buy_is_what_it_buys(left: Alignment) -> None:
     once, twice = (solve_session([left] * count, RIG, SolveSettings()) for count in (1, 2))
     now, after = (
-        expected_error_arcmin(RIG.eyes["left"], results.shifts["left"]) for results in (once, twice)
+        expected_error_arcmin(RIG.eyes["left"], results.eyes["left"]) for results in (once, twice)
     )
     assert set(once.expected_after_another_arcmin) == {"left"}
     predicted = once.expected_after_another_arcmin["left"]
@@ -88,7 +88,7 @@ def test_what_another_alignment_would_buy_is_what_it_buys(left: Alignment) -> No
 
 def test_an_eye_that_took_no_part_has_no_result(left: Alignment) -> None:
     results = solve_session([left], RIG, SolveSettings())
-    assert set(results.shifts) == set(results.verdicts) == {"left"}
+    assert set(results.eyes) == set(results.verdicts) == {"left"}
     assert results.eye_distance_m is None
 
 
@@ -155,7 +155,7 @@ def test_a_stored_session_is_solved_alike_to_the_last_bit(
 
 def test_another_method_gives_another_result(left: Alignment) -> None:
     shifts_m = [
-        solve_session([left], RIG, replace(SolveSettings(), method=method)).shifts["left"].shift_m
+        solve_session([left], RIG, replace(SolveSettings(), method=method)).eyes["left"].shift_m
         for method in ("consistent", "linear", "icp")
     ]
     assert len({tuple(shift_m) for shift_m in shifts_m}) == 3

@@ -269,7 +269,7 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
 
     for eye in EYES:
         projection = stage.shown().projections[eye]
-        expected = projection_matrix(RIG.eyes[eye], results.shifts[eye].shift_m)
+        expected = projection_matrix(RIG.eyes[eye], results.eyes[eye].shift_m)
         np.testing.assert_array_equal(projection.P, expected)
         assert (projection.width_px, projection.height_px) == (1268, 720)
     eventually(lambda: stage.shown().cursor_W_m is None and not stage.shown().prompt)
@@ -417,7 +417,7 @@ def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:
         np.testing.assert_allclose(
             results.alignments[number][eye].shift_m, true_m[eye], atol=1.5e-3
         )
-        assert np.linalg.norm(results.shifts[eye].shift_m - true_m[eye]) < 2e-3
+        assert np.linalg.norm(results.eyes[eye].shift_m - true_m[eye]) < 2e-3
     assert results.eye_distance_m is not None
 
 
@@ -430,12 +430,12 @@ def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(
     slip = rigid(translation_m=[slip_m, 0.0, 0.0])
     stage.calibrate(slip @ cursor_for("left", true_m, np.zeros(3)), T_D_HAND, ("left",))
     assert stage.calibration.results is not None
-    first = stage.calibration.results.shifts["left"]
+    first = stage.calibration.results.eyes["left"]
     stage.align(invert(slip) @ cursor_for("left", true_m, first.shift_m), T_D_HAND, ("left",))
     drawn_m = stage.calibration.alignments[1].drawn_shift_m
     np.testing.assert_array_equal(drawn_m["left"], first.shift_m)
     np.testing.assert_array_equal(drawn_m["right"], np.zeros(3))
-    fused = stage.calibration.solve().shifts["left"]
+    fused = stage.calibration.solve().eyes["left"]
     before_m, after_m = (float(np.linalg.norm(s.shift_m - true_m)) for s in (first, fused))
     assert after_m < max(0.6 * before_m, 5e-4)
     if slip_m == 0.0:
@@ -523,7 +523,7 @@ def test_the_offline_projections_come_first(stage: Stage, server: HeadsetServer)
 
 def test_redo_takes_back_a_projection_that_came_alone(stage: Stage, server: HeadsetServer) -> None:
     stage.align()
-    shift_m = stage.calibration.solve().shifts["left"].shift_m
+    shift_m = stage.calibration.solve().eyes["left"].shift_m
     P = projection_matrix(RIG.eyes["left"], shift_m)
     server.wait_acked(server.send_projection(Projection("left", P, 1268, 720)), 5.0)
     assert not shows_offline_projections(stage.shown())
@@ -641,7 +641,7 @@ def test_a_silent_headset_can_be_applied_to_again_when_it_is_back(
         stage.calibration.apply()
         stage.calibration.wait_applied()
         for eye in EYES:
-            expected = projection_matrix(RIG.eyes[eye], results.shifts[eye].shift_m)
+            expected = projection_matrix(RIG.eyes[eye], results.eyes[eye].shift_m)
             np.testing.assert_array_equal(back.state().projections[eye].P, expected)
 
 
@@ -721,7 +721,7 @@ def test_polling_never_waits_and_comes_to_the_same(stage: Stage, session: Sessio
     record = Session.open(session.path)
     assert record.is_applied
     for eye in EYES:
-        solved_m = results.shifts[eye].shift_m
+        solved_m = results.eyes[eye].shift_m
         np.testing.assert_array_equal(calibration.applied_shift_m[eye], solved_m)
         np.testing.assert_array_equal(record.applied_shift_m[eye], solved_m)
     with pytest.raises(ProcedureError, match="apply first"):

@@ -129,7 +129,7 @@ class FineTunePanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show what the headset renders with, unless it was set here, and whether it has it."""
         results = snapshot.procedure.results
-        solved = {eye: shift.shift_m for eye, shift in results.shifts.items()} if results else {}
+        solved = {eye: shift.shift_m for eye, shift in results.eyes.items()} if results else {}
         why_not = _why_not(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:

@@ -141,7 +141,7 @@ class TrialsPanel(QWidget):
         procedure, eye = self._snapshot.procedure, self._next_eye()
         if procedure.state is not State.APPLIED or procedure.results is None:
             return "Solve and apply the alignments first."
-        if eye not in procedure.results.shifts:
+        if eye not in procedure.results.eyes:
             return f"The {EYE_NAMES[eye].lower()} has not been aligned."
         return ""
 
@@ -151,7 +151,7 @@ class TrialsPanel(QWidget):
         if self._why_not() or procedure is None or procedure.results is None:
             return False
         eye = self._next_eye()
-        solved_m = procedure.results.shifts[eye].shift_m
+        solved_m = procedure.results.eyes[eye].shift_m
         return bool(np.allclose(procedure.applied_shift_m[eye], solved_m, rtol=0.0, atol=1e-6))
 
     def _refresh(self) -> None:

@@ -64,7 +64,7 @@ class WearerViewPanel(QWidget):
         for eye, column in self._eyes.items():
             is_closed = procedure.cursor is not None and eye not in procedure.eyes
             message = _CLOSED if is_closed else missing
-            is_solved = procedure.results is not None and eye in procedure.results.shifts
+            is_solved = procedure.results is not None and eye in procedure.results.eyes
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
 
     def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:

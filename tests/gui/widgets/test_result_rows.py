@@ -50,7 +50,7 @@ def test_a_shift_is_told_in_millimetres_with_its_sigma(rig: Rig) -> None:
 def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
     rows = result_rows(results, rig)
     for column, eye in enumerate(EYES):
-        shift = results.shifts[eye]
+        shift = results.eyes[eye]
         error = expected_error_arcmin(rig.eyes[eye], shift)
         another = results.expected_after_another_arcmin[eye]
         assert cells(rows, "Expected error")[column] == f"{error:.1f}′"
@@ -88,14 +88,14 @@ def test_each_alignment_is_told_alone(results: Results, rig: Rig) -> None:
 def test_a_difference_is_the_other_less_this_one(results: Results, rig: Rig) -> None:
     shifts = {
         eye: replace(shift, shift_m=shift.shift_m + np.array([0.001, 0.0, -0.002]), iterations=0)
-        for eye, shift in results.shifts.items()
+        for eye, shift in results.eyes.items()
     }
-    other = replace(results, method="icp", shifts=shifts)
+    other = replace(results, method="icp", eyes=shifts)
     rows = comparison_rows(results, other, rig)
     assert cells(rows, "φ1 (mm)")[2] == "+1.00"
     assert cells(rows, "φ2 (mm)")[2] == "+0.00"
     assert cells(rows, "φ3 (mm)")[2] == "−2.00"
-    assert cells(rows, "Iterations")[2] == f"−{results.shifts['left'].iterations}"
+    assert cells(rows, "Iterations")[2] == f"−{results.eyes['left'].iterations}"
     assert cells(rows, "Eye distance")[2] == "+0.0 mm"
     assert [row.label for row in rows if not any(row.cells)] == ["Left eye", "Right eye"]
 

@@ -102,7 +102,7 @@ def test_shows_what_the_headset_renders_with(
 ) -> None:
     show()
     for eye in EYES:
-        solved_mm = 1e3 * results.shifts[eye].shift_m
+        solved_mm = 1e3 * results.eyes[eye].shift_m
         np.testing.assert_allclose(fields_mm(panel, eye), solved_mm, atol=0.005)
     assert status(panel) == "In the headset"
     assert field(panel, "left", 1).isEnabled()
@@ -159,10 +159,10 @@ def test_arrow_keys_move_the_chosen_eye(
     QTest.keyClick(panel, Qt.Key.Key_E)
     with qtbot.waitSignal(panel.shift_changed) as changed:
         QTest.keyClick(panel, key)
-    expected_m = results.shifts["right"].shift_m.copy()
+    expected_m = results.eyes["right"].shift_m.copy()
     expected_m[axis] += sign * 0.001
     np.testing.assert_allclose(changed.args[0]["right"], expected_m, atol=1e-12)
-    np.testing.assert_array_equal(changed.args[0]["left"], results.shifts["left"].shift_m)
+    np.testing.assert_array_equal(changed.args[0]["left"], results.eyes["left"].shift_m)
 
 
 def test_both_eyes_move_together(
@@ -172,7 +172,7 @@ def test_both_eyes_move_together(
     QTest.keyClick(panel, Qt.Key.Key_L)
     with qtbot.waitSignal(panel.shift_changed) as changed:
         field(panel, "left", 2).setValue(5.0)
-    step_m = [changed.args[0][eye] - results.shifts[eye].shift_m for eye in EYES]
+    step_m = [changed.args[0][eye] - results.eyes[eye].shift_m for eye in EYES]
     np.testing.assert_allclose(step_m[0], step_m[1], atol=1e-12)
     assert changed.args[0]["left"][1] == pytest.approx(0.005)
 
@@ -233,7 +233,7 @@ def test_undo_and_redo(
         QTest.keyClick(focused.lineEdit(), Qt.Key.Key_Z, ctrl)
     assert fields_mm(panel, "left") == before_mm
     qtbot.waitUntil(lambda: bool(sent))
-    assert same_shifts(sent[-1], {eye: results.shifts[eye].shift_m for eye in EYES})
+    assert same_shifts(sent[-1], {eye: results.eyes[eye].shift_m for eye in EYES})
     for _ in range(2):
         QTest.keyClick(focused.lineEdit(), Qt.Key.Key_Z, ctrl | shift)
     assert fields_mm(panel, "left") == after_mm
@@ -267,7 +267,7 @@ def test_resets(
     assert same_shifts(sent[-1], OFFLINE)
     action(panel, "Reset to solved").trigger()
     qtbot.waitUntil(lambda: len(sent) > 1)
-    assert same_shifts(sent[-1], {eye: results.shifts[eye].shift_m for eye in EYES})
+    assert same_shifts(sent[-1], {eye: results.eyes[eye].shift_m for eye in EYES})
 
 
 def test_nothing_solved_leaves_the_offline_calibration_to_begin_with(
@@ -307,7 +307,7 @@ def test_only_one_is_shown_instead(
     QTest.keyClick(panel, Qt.Key.Key_B)
     QTest.keyClick(panel, Qt.Key.Key_S)
     assert not action(panel, "Show offline").isChecked()
-    solved_m = {eye: results.shifts[eye].shift_m for eye in EYES}
+    solved_m = {eye: results.eyes[eye].shift_m for eye in EYES}
     qtbot.waitUntil(lambda: bool(sent) and same_shifts(sent[-1], solved_m))
 
 

@@ -88,7 +88,7 @@ def test_the_numbers_are_the_results(solved: ResultsPanel, results: Results) -> 
     assert table.as_text().splitlines()[1].startswith("φ1 (mm)\t")
     for column, eye in enumerate(EYES):
         shown_mm = float(cell(table, 0, column).split("±")[0].replace("−", "-"))
-        assert shown_mm == pytest.approx(1e3 * results.shifts[eye].shift_m[0], abs=0.005)
+        assert shown_mm == pytest.approx(1e3 * results.eyes[eye].shift_m[0], abs=0.005)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_a_comparison_is_asked_for_and_shown(
     assert button(solved, "start").isEnabled()
     table = child(solved, CompareTab).table
     assert table.as_text().startswith("\tconsistent\ticp\tDifference\n")
-    apart_mm = 1e3 * (other.shifts["left"].shift_m - results.shifts["left"].shift_m)[0]
+    apart_mm = 1e3 * (other.eyes["left"].shift_m - results.eyes["left"].shift_m)[0]
     shown_mm = float(cell(table, 1, 2).replace("−", "-"))
     assert shown_mm == pytest.approx(apart_mm, abs=0.005)
 

@@ -80,7 +80,7 @@ def test_needs_an_applied_calibration(
 def test_needs_the_eye_to_be_solved(
     panel: TrialsPanel, snapshot: Callable[..., Snapshot], results: Results
 ) -> None:
-    one = replace(results, shifts={"right": results.shifts["right"]})
+    one = replace(results, eyes={"right": results.eyes["right"]})
     panel.show_snapshot(snapshot(State.APPLIED, procedure={"results": one}))
     assert label(panel, "message") == "The left eye has not been aligned."
     choose(panel, "Eye", "Right eye")

@@ -1,6 +1,6 @@
 """A headset app in miniature: what the app of a real headset does, to begin one from.
 
-    HANDCAL_PAIRING_KEY=KEY python headset_example.py HOST PORT
+    HANDCAL_PAIRING_KEY=KEY python 08_headset_client.py HOST PORT
 
 It tells its pose 60 times a second, says what it is to draw whenever that changes, and confirms an
 alignment on Enter. Ctrl+C, or the PC, ends it.

@@ -1,0 +1,45 @@
+"""Plot two figures of a session's report as you want them: φ with its ellipses, and convergence.
+
+python examples/07_plot_a_report_figure.py [--session FOLDER] [--output FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+import handcal
+from handcal.export.figures import draw_convergence, draw_ellipses
+
+EXAMPLE = Path(__file__).parents[1] / "resources/example_session"
+
+
+def main() -> None:
+    """Draw the report's own figures into axes of our own, and save them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--session", type=Path, default=EXAMPLE, help="session folder")
+    parser.add_argument(
+        "--output", type=Path, default=Path("results/figure.png"), help="PNG, SVG or PDF"
+    )
+    arguments = parser.parse_args()
+
+    session = handcal.open_session(arguments.session)
+    results = handcal.solve(session)
+    numbers = session.alignment_numbers
+
+    # `Figure` draws without a window; in a notebook, plt.subplots() does as well.
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    above, below = figure.subplots(nrows=2, ncols=2)
+    draw_ellipses(axes=above, numbers=numbers, results=results)
+    draw_convergence(axes=below, numbers=numbers, results=results)
+    figure.suptitle(f"{session.path.name}: {results.method}")
+
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(arguments.output, dpi=150)
+    print(f"Written: {arguments.output}")
+
+
+if __name__ == "__main__":
+    main()

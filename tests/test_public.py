@@ -1,0 +1,273 @@
+"""The public names: what a researcher types in a notebook works as written."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import handcal
+from handcal.camera.images import write_frame
+from handcal.display import projection_matrix
+from handcal.register.results import Results
+from handcal.rig.example import example_rig
+from handcal.session.session import Session, SessionRecord
+from handcal.sim.camera import simulated_frame
+from handcal.types import EYES, METHODS, Eye, EyeShift
+from tests.helpers import ROOT
+
+THE_TEN_LINES = """
+import handcal
+session = handcal.open_session("resources/example_session")
+results = handcal.solve(session)
+print(results); print(results.eyes["left"])
+other = handcal.solve(session, method="paper")
+P = handcal.projections(session.rig, results)
+frame = handcal.read_frame("color.png", "depth.png", "intrinsics.json")
+hand = handcal.segment(frame)
+rig = handcal.read_rig("resources/example_rig.yaml")
+U = handcal.to_unity(rig, results)
+"""
+PUBLIC = {
+    "open_session", "solve", "projections", "read_frame", "segment", "read_rig", "write_rig",
+    "HandcalError", "HandError", "Frame", "HandCloud", "Alignment", "EyeShift", "Rig", "Results",
+    "to_unity", "to_opengl", "to_openxr", "__version__",
+    "solve_eye_shift", "update_matrix", "rotation_between",
+}  # fmt: skip
+FUNCTIONS = sorted(name for name in PUBLIC - {"__version__"} if name.islower())
+LEFT_LINE = (
+    "φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm; rms 1.43 mm, 97 % inliers, converged"
+)
+RESULTS_LINE = (
+    "consistent, 2 alignments: "
+    "left φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm, accept; "
+    "right φ = (-1.85 ± 1.78, +0.68 ± 1.03, +2.56 ± 1.85) mm, accept"
+)
+
+
+@pytest.fixture(scope="module")
+def session() -> SessionRecord:
+    return handcal.open_session(ROOT / "resources/example_session")
+
+
+@pytest.fixture(scope="module")
+def results(session: SessionRecord) -> Results:
+    return handcal.solve(session)
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a simulated frame as files, beside the shipped resources."""
+    folder = tmp_path_factory.mktemp("notebook")
+    write_frame(folder, simulated_frame(seed=1))
+    (folder / "resources").symlink_to(ROOT / "resources", target_is_directory=True)
+    return folder
+
+
+def test_the_ten_lines_work_as_written(
+    pictures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(pictures)
+    said: dict[str, Any] = {}
+    exec(THE_TEN_LINES, said)
+    assert capsys.readouterr().out.splitlines() == [RESULTS_LINE, LEFT_LINE]
+    assert said["results"].method == "consistent"
+    assert said["other"].method == "paper"
+    assert {eye: P.shape for eye, P in said["P"].items()} == {"left": (3, 4), "right": (3, 4)}
+    assert isinstance(said["hand"], handcal.HandCloud)
+    assert 0.45 < said["hand"].median_depth_m < 0.55
+    assert set(said["U"]) == set(EYES)
+
+
+def test_completion_offers_exactly_the_public_names() -> None:
+    assert set(dir(handcal)) == set(handcal.__all__) == PUBLIC
+    assert all(getattr(handcal, name) is not None for name in PUBLIC)
+    assert handcal.__version__ == version("handcal")
+
+
+def test_a_name_that_is_not_public_is_refused_by_name() -> None:
+    with pytest.raises(AttributeError, match="'handcal' has no attribute 'segmnt'"):
+        handcal.segmnt  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_the_import_is_quick() -> None:
+    code = "import sys, handcal; dir(handcal); print(*{'numpy', 'scipy', 'cv2'} & set(sys.modules))"
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert run.stdout.split() == []
+
+
+def test_types_are_shipped() -> None:
+    assert (Path(handcal.__file__).parent / "py.typed").is_file()
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_paths_may_be_text_or_path(
+    pictures: Path, tmp_path: Path, kind: Callable[[Path], str | os.PathLike[str]]
+) -> None:
+    session = handcal.open_session(kind(ROOT / "resources/example_session"))
+    rig = handcal.read_rig(kind(ROOT / "resources/example_rig.yaml"))
+    handcal.write_rig(kind(tmp_path / "rig.yaml"), rig)
+    frame = handcal.read_frame(
+        *(kind(pictures / name) for name in ("color.png", "depth.png", "intrinsics.json"))
+    )
+    assert len(session.alignments) == 2
+    assert handcal.read_rig(kind(tmp_path / "rig.yaml")).name == rig.name
+    np.testing.assert_array_equal(frame.depth, simulated_frame(seed=1).depth)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda path: handcal.open_session(path),
+        lambda path: handcal.read_rig(path),
+        lambda path: handcal.read_frame(path, path, path),
+        lambda path: handcal.write_rig(Path(path) / "rig.yaml", example_rig()),
+    ],
+    ids=["open_session", "read_rig", "read_frame", "write_rig"],
+)
+@pytest.mark.parametrize("path", ["missing", "a_file"])
+def test_a_wrong_path_is_one_line(
+    wrong: Callable[[str], object], path: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a_file").write_text("nothing of use")
+    with pytest.raises(handcal.HandcalError) as caught:
+        wrong(str(tmp_path / path))
+    assert path in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(handcal.HandcalError, match="cannot read"):
+        handcal.read_rig(tmp_path)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_solves_a_session(session: SessionRecord, method: Any) -> None:
+    results = handcal.solve(session, method=method)
+    assert results.method == method
+    assert str(results).startswith(f"{method}, 2 alignments: left φ = (")
+
+
+def test_unknown_choices_are_refused_by_name(session: SessionRecord) -> None:
+    with pytest.raises(ValueError, match="unknown method 'best': choose from paper, linear"):
+        handcal.solve(session, method="best")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="unknown roi 'all': choose from detector, left"):
+        handcal.segment(simulated_frame(), roi="all")  # type: ignore[arg-type]
+
+
+def test_a_session_without_alignments_is_one_line(tmp_path: Path) -> None:
+    with Session.create(tmp_path, example_rig(), {}, name="empty"):
+        pass
+    with pytest.raises(handcal.HandcalError, match="empty holds no alignment to solve"):
+        handcal.solve(handcal.open_session(tmp_path / "empty"))
+
+
+@pytest.mark.parametrize("roi", ["detector", "left", "right", "depth"])
+def test_a_hand_is_segmented_wherever_one_looks(roi: Any) -> None:
+    hand = handcal.segment(simulated_frame(seed=1), roi=roi)
+    assert 4000 < len(hand.points_m) < 6000
+
+
+def test_no_hand_says_why() -> None:
+    frame = simulated_frame(seed=1)
+    empty = handcal.Frame(0, 0, 0, np.zeros_like(frame.depth), 1e-4, frame.depth_intrinsics)
+    with pytest.raises(handcal.HandError, match="no hand-sized thing"):
+        handcal.segment(empty)
+
+
+def test_projections_are_those_the_headset_gets(session: SessionRecord, results: Results) -> None:
+    P = handcal.projections(session.rig, results)
+    for eye in EYES:
+        expected = projection_matrix(session.rig.eyes[eye], results.eyes[eye].shift_m)
+        np.testing.assert_array_equal(P[eye], expected)
+
+
+def test_an_eye_that_was_not_solved_keeps_its_offline_calibration(results: Results) -> None:
+    class OnlyLeft:
+        eyes: dict[Eye, EyeShift] = {"left": results.eyes["left"]}  # noqa: RUF012
+
+    rig = example_rig()
+    P = handcal.projections(rig, OnlyLeft())
+    np.testing.assert_array_equal(P["right"], projection_matrix(rig.eyes["right"]))
+    assert set(handcal.to_openxr(rig, OnlyLeft())) == set(EYES)
+
+
+def test_every_system_draws_a_point_on_the_same_pixel(
+    session: SessionRecord, results: Results
+) -> None:
+    rig = session.rig
+    point_H_m = np.array([0.01, 0.02, 0.6, 1.0])
+    P = handcal.projections(rig, results)
+    unity, opengl = handcal.to_unity(rig, results), handcal.to_opengl(rig, results)
+    openxr = handcal.to_openxr(rig, results)
+    for eye in EYES:
+        display = rig.eyes[eye]
+        point_V_m = display.T_V_H @ point_H_m
+        x, y, depth = P[eye] @ point_V_m
+        expected_px = x / depth, y / depth
+        for camera, axes in ((unity[eye], (1, -1, 1, 1)), (opengl[eye], (1, -1, -1, 1))):
+            clip = camera.projection @ camera.view_from_head @ (axes * point_H_m)
+            ndc = clip[:3] / clip[3]
+            u_px = 0.5 * (ndc[0] + 1) * display.width_px - 0.5
+            v_px = 0.5 * (1 - ndc[1]) * display.height_px - 0.5
+            np.testing.assert_allclose((u_px, v_px), expected_px, atol=1e-6)
+        pose, fov = openxr[eye]
+        right_m, up_m, back_m = (1, -1, -1) * point_V_m[:3] - pose.position_m
+        left, right, down, up = map(np.tan, (fov.left_rad, fov.right_rad, fov.down_rad, fov.up_rad))
+        u_px = (-right_m / back_m - left) / (right - left) * display.width_px - 0.5
+        v_px = (up + up_m / back_m) / (up - down) * display.height_px - 0.5
+        np.testing.assert_allclose((u_px, v_px), expected_px, atol=1e-6)
+
+
+def test_results_are_tables_in_a_notebook(results: Results) -> None:
+    page = results._repr_html_()
+    for text in ("consistent, 2 alignments", "left", "right", "-3.78 ± 0.72", ", mm", "accept"):
+        assert text in page
+    assert page.count("<tr>") == page.count("</tr>") == 9
+    assert "-3.78 ± 0.72" in results.eyes["left"]._repr_html_()
+
+
+def test_a_notebook_is_not_flooded(session: SessionRecord, results: Results) -> None:
+    frame = simulated_frame(seed=1)
+    hand = handcal.segment(frame, roi="depth")
+    for value in (session, results, results.eyes, session.rig, frame, hand, session.alignments):
+        text = repr(value)
+        assert "\n" not in text
+        assert len(text) < 1500, text
+    assert "depth=uint16 (720, 1280)" in repr(frame)
+
+
+def test_what_did_not_converge_says_so(results: Results) -> None:
+    shift = replace(results.eyes["left"], converged=False, stop_reason="<100 iterations>")
+    assert str(shift).endswith("not converged (<100 iterations>)")
+    assert "&lt;100 iterations&gt;" in shift._repr_html_()
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_the_docstring_has_an_example_that_runs(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    function = getattr(handcal, name)
+    home = vars(importlib.import_module(function.__module__))
+    (example,) = doctest.DocTestFinder(recurse=False).find(function, name, globs=dict(home))
+    assert example.examples
+    failed, _ = doctest.DocTestRunner().run(example)
+    assert failed == 0
+
+
+def test_the_first_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    failed, tried = doctest.testmod(handcal)
+    assert tried > 0
+    assert failed == 0
