@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from handcal.cli.camera_options import add_realsense_options, realsense_of
+from handcal.cli.cameras import add_realsense_options, realsense_of
 from handcal.cli.terminal import (
     Commands,
     Parser,
