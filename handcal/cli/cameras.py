@@ -8,15 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
-from handcal.cli.terminal import (
-    Parser,
-    console,
-    number,
-    progress,
-    save,
-    table,
-    until_interrupted,
-)
+from handcal.cli.output import console, progress, save, table, until_interrupted
+from handcal.cli.terminal import Parser, number
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 

@@ -8,7 +8,8 @@ import subprocess
 import sys
 from typing import Any
 
-from handcal.cli.terminal import console, fail, progress, save, table
+from handcal.cli.output import console, progress, save, table
+from handcal.cli.terminal import fail
 from handcal.errors import HandcalError
 
 

@@ -12,17 +12,9 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from handcal.cli.output import console, progress, save, table
 from handcal.cli.rig import add_square_option, grid_of
-from handcal.cli.terminal import (
-    Commands,
-    Parser,
-    add_command,
-    console,
-    number,
-    progress,
-    save,
-    table,
-)
+from handcal.cli.terminal import Commands, Parser, add_command, number
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder
 

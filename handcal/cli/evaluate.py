@@ -12,7 +12,8 @@ from pathlib import Path
 from rich.markup import escape
 
 from handcal.cli.cube import add_cube_commands
-from handcal.cli.terminal import Commands, Parser, add_command, console, progress, save, table
+from handcal.cli.output import console, progress, save, table
+from handcal.cli.terminal import Commands, Parser, add_command
 from handcal.io.files import make_folder, require_suffix
 
 

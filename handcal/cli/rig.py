@@ -14,17 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.cli.cameras import add_realsense_options, realsense_of
-from handcal.cli.terminal import (
-    Commands,
-    Parser,
-    add_command,
-    console,
-    fail,
-    number,
-    progress,
-    table,
-    until_interrupted,
-)
+from handcal.cli.output import console, progress, table, until_interrupted
+from handcal.cli.terminal import Commands, Parser, add_command, fail, number
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handcal.cli.output import console, progress, save, table
 from handcal.cli.rig import (
     add_board_options,
     add_square_option,
@@ -15,16 +16,7 @@ from handcal.cli.rig import (
     show_verdict,
     show_views,
 )
-from handcal.cli.terminal import (
-    Commands,
-    Parser,
-    add_command,
-    console,
-    number,
-    progress,
-    save,
-    table,
-)
+from handcal.cli.terminal import Commands, Parser, add_command, number
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from handcal.cli.terminal import console, fail, progress, save, table
+from handcal.cli.output import console, progress, save, table, triple
+from handcal.cli.terminal import fail
 from handcal.errors import FileError
 from handcal.export.formats import FORMATS
 
@@ -34,8 +34,8 @@ def solve(arguments: argparse.Namespace) -> None:
     for eye, shift in results.shifts.items():
         shown_table.add_row(
             eye,
-            _triple(1e3 * shift.shift_m),
-            _triple(1e3 * np.sqrt(np.diag(shift.covariance_m2))),
+            triple(1e3 * shift.shift_m),
+            triple(1e3 * np.sqrt(np.diag(shift.covariance_m2))),
             f"{1e3 * shift.rms_m:.2f}",
             f"{100 * shift.inlier_ratio:.0f} %",
             results.verdicts[eye].name,
@@ -64,7 +64,3 @@ def export(arguments: argparse.Namespace) -> None:
         files = export_session(record, folder, settings, report, lambda: False)
     for file in files:
         console.print(str(file))
-
-
-def _triple(values: Iterable[float]) -> str:
-    return " ".join(f"{value:.1f}" for value in values)

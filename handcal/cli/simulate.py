@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
 from pathlib import Path
 
-from handcal.cli.terminal import console, progress, save, table
+from handcal.cli.output import console, progress, save, table, triple
 from handcal.io.files import make_folder
 
 
@@ -27,7 +26,7 @@ def demo(arguments: argparse.Namespace) -> None:
     save(arguments.json, result)
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "off by", "verdict")
     for eye, found in result["eyes"].items():
-        triples = [_triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
+        triples = [triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
         shown_table.add_row(eye, *triples, f"{found['error_mm']:.1f}", found["verdict"])
     console.print(shown_table)
     for eye, found in result["eyes"].items():
@@ -71,7 +70,3 @@ def _rig_path(rig: Path | None) -> Path:
     from handcal.io.resources import resource_path
 
     return rig or resource_path("example_rig.yaml")
-
-
-def _triple(values: Iterable[float]) -> str:
-    return " ".join(f"{value:.1f}" for value in values)

@@ -11,17 +11,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.terminal import (
-    Commands,
-    add_command,
-    console,
-    fail,
-    number,
-    progress,
-    save,
-    table,
-    until_interrupted,
-)
+from handcal.cli.output import console, progress, save, table, until_interrupted
+from handcal.cli.terminal import Commands, add_command, fail, number
 from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
