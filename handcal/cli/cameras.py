@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, progress, save, table, until_interrupted
-from handcal.cli.terminal import Parser, number
+from handcal.cli.terminal import arg, command, number
 from handcal.errors import HandcalError
+from handcal.hand.settings import Roi
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
@@ -18,14 +19,82 @@ if TYPE_CHECKING:
     from handcal.cli.replay import ReplayStep
 
 
+_POSITIVE = number(float, 0.0, 1e6)
+REALSENSE_OPTIONS = (
+    arg("--serial", default="", help="serial number of the RealSense (default: the first found)"),
+    arg(
+        "--profile",
+        choices=get_args(Profile),
+        default="auto",
+        help="size of the RealSense's images; auto: the largest on offer",
+    ),
+    arg(
+        "--preset",
+        choices=get_args(Preset),
+        help="visual preset of the SDK (default: unchanged)",
+    ),
+    arg(
+        "--exposure-us",
+        type=_POSITIVE,
+        metavar="US",
+        help="exposure time of the depth camera (default: automatic)",
+    ),
+    arg(
+        "--laser-power-mw",
+        type=_POSITIVE,
+        metavar="MW",
+        help="power of the projector (default: unchanged)",
+    ),
+    arg("--spatial-filter", action="store_true", help="apply the SDK's spatial filter to depth"),
+    arg("--temporal-filter", action="store_true", help="apply the SDK's temporal filter to depth"),
+    arg("--hole-filling", action="store_true", help="apply the SDK's hole filling to depth"),
+)
+"""One for every field of `RealSenseSettings`."""
+_ROI = arg(
+    "--roi",
+    choices=get_args(Roi),
+    default="detector",
+    help="search region: detector, the hand that the detector finds in the colour image (the "
+    "nearest of several); left or right, the leftmost or rightmost of them; depth, the nearest "
+    "hand-sized object, without the detector",
+)
+
+
+@command(
+    arg("output", type=Path, help="a .db3 file, or a new folder"),
+    arg("--source", default="realsense", help="realsense, simulator, or a recording to convert"),
+    arg(
+        "--seconds",
+        type=number(float, 0.01, 86_400.0),
+        metavar="S",
+        default=60.0,
+        help="stop after this time",
+    ),
+    arg(
+        "--frames",
+        type=number(int, 1, 100_000),
+        metavar="N",
+        default=100_000,
+        help="stop after this many frames",
+    ),
+    arg(
+        "--seed",
+        type=number(int, 0, 2**32 - 1),
+        metavar="N",
+        default=1,
+        help="random seed of the simulated hand and room",
+    ),
+    *REALSENSE_OPTIONS,
+    json=True,
+)
 def record(arguments: argparse.Namespace) -> None:
-    """Record a camera: into a .db3 file through librealsense, or into a folder of images."""
+    """Record a camera into a .db3 file or a folder of images."""
     from handcal.camera.record import RecordSettings
     from handcal.camera.record import record as record_camera
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
     with _open_source(arguments) as camera, until_interrupted() as is_stopped:
-        said = f"Recording {camera.name}; Ctrl+C ends it and keeps what there is."
+        said = f"Recording {camera.name}; press Ctrl+C to stop and keep the recording."
         console.print(said, markup=False)
         try:
             with progress() as report:
@@ -39,6 +108,14 @@ def record(arguments: argparse.Namespace) -> None:
     )
 
 
+@command(
+    arg("recording", type=Path, help=".db3 or .bag file, or a recorded folder"),
+    arg(
+        "--real-time", action="store_true", help="play at the recorded frame rate, dropping frames"
+    ),
+    _ROI,
+    json=True,
+)
 def replay(arguments: argparse.Namespace) -> None:
     """Play a recording and segment the hand in every frame."""
     from handcal.camera.playback import PlaybackSettings
@@ -46,7 +123,7 @@ def replay(arguments: argparse.Namespace) -> None:
     from handcal.cli.replay import replay as play
     from handcal.hand.settings import SegmentSettings
 
-    shown_table = table("frame", "points", "depth, m", "turned, °", "moved, mm", "took, ms")
+    shown_table = table("frame", "points", "depth, m", "rotation, °", "shift, mm", "time, ms")
     rows: list[dict[str, Any]] = []
     playback = PlaybackSettings(real_time=arguments.real_time)
     with open_recording(arguments.recording, playback) as camera:
@@ -63,8 +140,27 @@ def replay(arguments: argparse.Namespace) -> None:
     console.print(f"{found} of {len(rows)} frames show a hand.")
 
 
+@command(
+    arg("--color", type=Path, metavar="FILE", required=True, help="colour image"),
+    arg(
+        "--depth",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="16-bit PNG, aligned to the colour image",
+    ),
+    arg(
+        "--intrinsics",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit",
+    ),
+    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the results"),
+    _ROI,
+)
 def segment(arguments: argparse.Namespace) -> None:
-    """Segment the hand in one image pair: hand.ply, contour.ply, mask, overlay and hand.json."""
+    """Segment the hand in one image pair: cloud, contour, mask and overlay."""
     from handcal.camera.images import read_frame
     from handcal.cli.segmentation_file import write_segmentation
     from handcal.hand.settings import SegmentSettings
@@ -77,18 +173,6 @@ def segment(arguments: argparse.Namespace) -> None:
         f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
         f"box {', '.join(map(str, cloud.box_px))} px. Results: {arguments.output}"
     )
-
-
-def add_realsense_options(command: Parser) -> None:
-    """Add an option for every field of `RealSenseSettings`."""
-    command.add_argument("--serial", default="", help="of the RealSense; the first if absent")
-    command.add_argument("--profile", choices=get_args(Profile), default="auto", help="size")
-    command.add_argument("--preset", choices=get_args(Preset), help="the SDK's visual preset")
-    positive = number(float, 0.0, 1e6)
-    command.add_argument("--exposure-us", type=positive, help="of the depth; automatic if absent")
-    command.add_argument("--laser-power-mw", type=positive, help="of the projector")
-    for name in ("spatial-filter", "temporal-filter", "hole-filling"):
-        command.add_argument(f"--{name}", action="store_true", help="the SDK's, on the depth")
 
 
 def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:

@@ -1,172 +1,167 @@
 """The command line: ``handcal COMMAND``; exit code 0 for success, 1 for failure, 2 for misuse.
 
-Commands import what they need when they run, so that ``handcal --help`` answers at once.
+Only the module of the chosen command is imported, so that ``handcal --help`` answers at once.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from pathlib import Path
-from typing import get_args
+import sys
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import NamedTuple
 
-from handcal.cli.cameras import add_realsense_options, record, replay, segment
-from handcal.cli.checks import bench, doctor
-from handcal.cli.evaluate import add_evaluate_commands
-from handcal.cli.rig import add_rig_commands
-from handcal.cli.rig_files import add_rig_file_commands
-from handcal.cli.sessions import export, solve
-from handcal.cli.simulate import demo, headset
-from handcal.cli.study import add_study_commands
-from handcal.cli.terminal import Parser, add_command, errors_in_one_line, number
-from handcal.export.formats import FORMATS
-from handcal.hand.settings import Roi
-from handcal.types import METHODS
+from handcal.cli.terminal import Command, Parser, errors_in_one_line
+
+
+class Entry(NamedTuple):
+    """A command or a group of commands, as ``--help`` lists it."""
+
+    purpose: str
+    """The docstring of the command's function."""
+    home: str | Mapping[str, Entry]
+    """The module of the function, or the commands of the group."""
+
+
+_CUBE: Mapping[str, Entry] = {
+    "net": Entry(
+        "Make a cube: its net to print at true size, and the file that describes it.", "cube"
+    ),
+    "capture": Entry(
+        "Capture the real and the drawn cube with a camera, guided step by step.", "cube"
+    ),
+    "simulate": Entry(
+        "Render all captures of a test, with a display calibrated by a simulated hand.", "cube"
+    ),
+    "report": Entry(
+        "Measure the error between the drawn and the real cube, and write a report.", "cube"
+    ),
+}
+
+_EVALUATE: Mapping[str, Entry] = {
+    "cube": Entry("Camera-based test: the error between a drawn cube and the real one.", _CUBE),
+    "detector": Entry(
+        "Measure the hand detector's precision on annotated photographs.", "evaluate"
+    ),
+    "users": Entry("Evaluate the user test: the errors that remain for the wearers.", "evaluate"),
+}
+
+_STUDY: Mapping[str, Entry] = {
+    "noise": Entry(
+        "Repeat the paper's simulation, and add disturbances that it left out.", "study"
+    ),
+    "methods": Entry("Compare calibration methods on the same simulated wearers.", "study"),
+    "recorded": Entry(
+        "Run SPAAM and INDICA on the public recordings of Itoh and Klinker.", "study"
+    ),
+}
+
+_RIG: Mapping[str, Entry] = {
+    "board": Entry("Make a calibration board: a PDF at true size, or a PNG for a screen.", "rig"),
+    "take": Entry(
+        "Capture images of a board, or of a display's grid, from a camera, recording or video.",
+        "rig",
+    ),
+    "camera": Entry("Calibrate a camera's intrinsics from images of a board.", "rig"),
+    "stereo": Entry(
+        "Calibrate the depth camera's pose on the headset from image pairs of one board.", "rig"
+    ),
+    "convert": Entry(
+        "Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal.", "rig"
+    ),
+    "grid": Entry(
+        "Make the grid that a display shows to the viewpoint camera, pixel for pixel.", "rig_files"
+    ),
+    "display": Entry(
+        "Calibrate one eye's display from the viewpoint camera's images of its grid.", "rig_files"
+    ),
+    "make": Entry(
+        "Put the depth camera's pose, a stereo calibration, into a rig file.", "rig_files"
+    ),
+    "check": Entry(
+        "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
+    ),
+    "compare": Entry("Compare two rig files, and show how far apart they draw.", "rig_files"),
+    "migrate": Entry("Convert a rig file of any known version to the newest.", "rig_files"),
+}
+
+COMMANDS: Mapping[str, Entry] = {
+    "demo": Entry(
+        "Calibrate a simulated wearer from start to end, and compare with the truth.", "simulate"
+    ),
+    "headset": Entry(
+        "Run a virtual headset with a simulated wearer, connected by the real protocol.", "simulate"
+    ),
+    "record": Entry("Record a camera into a .db3 file or a folder of images.", "cameras"),
+    "replay": Entry("Play a recording and segment the hand in every frame.", "cameras"),
+    "segment": Entry(
+        "Segment the hand in one image pair: cloud, contour, mask and overlay.", "cameras"
+    ),
+    "solve": Entry("Solve a stored session again; the session itself is not changed.", "sessions"),
+    "export": Entry(
+        "Export a session: report, tables, calibration, clouds, and the session as one file.",
+        "sessions",
+    ),
+    "rig": Entry("Calibrate the rig offline: boards, cameras, displays, and the rig file.", _RIG),
+    "evaluate": Entry("Evaluate handcal on given images and sessions.", _EVALUATE),
+    "study": Entry("Run a study on simulated wearers, in many processes, with a report.", _STUDY),
+    "bench": Entry("Measure accuracy and speed beside targets and a baseline.", "checks"),
+    "doctor": Entry(
+        "Check the installation and the camera, with advice for each problem.", "checks"
+    ),
+}
 
 
 def main() -> None:
-    """Run a command; every foreseen error is one line."""
+    """Run a command; every expected error is one line."""
     with errors_in_one_line():
-        arguments = _parser().parse_args()
+        arguments = parse(sys.argv[1:])
         arguments.command(arguments)
 
 
-def _parser() -> argparse.ArgumentParser:
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """Return the arguments, with the function to call as ``command``.
+
+    Raises
+    ------
+    SystemExit
+        If the arguments are wrong, or ask only for help or the version.
+    """
     parser = Parser(
         prog="handcal",
         description="Calibrate an optical see-through headset with the wearer's bare hand.",
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    _add(parser, COMMANDS, words)
+    return parser.parse_args(words)
+
+
+def load(name: str, module: str) -> Command:
+    """Import a command."""
+    found: Command = getattr(import_module(f"handcal.cli.{module}"), name)
+    return found
+
+
+def _add(parser: Parser, entries: Mapping[str, Entry], words: Sequence[str]) -> None:
+    """Add commands to a parser, the one that `words` begin with complete with its options."""
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
-
-    def add(command: Callable[[argparse.Namespace], None], *, json: bool = True) -> Parser:
-        return add_command(commands, command, json=json)
-
-    share, count, seed = number(float, 0.0, 1.0), number(int, 1, 20), number(int, 0, 2**32 - 1)
-    milliseconds = number(float, 0.0, 10_000.0)
-
-    one = add(demo)
-    one.add_argument(
-        "--output", type=Path, default=Path("results/demo"), help="where to put the session"
-    )
-    one.add_argument("--seed", type=seed, default=1, help="of wearer, hand, room and noise")
-    one.add_argument(
-        "--alignments", type=count, default=1, metavar="K", help="how often, each eye if apart"
-    )
-    one.add_argument(
-        "--eyes", choices=("both", "each"), default="both", help="aligned at once, or apart"
-    )
-    one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
-    one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")
-    one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
-    one.add_argument(
-        "--worn-rig", type=Path, help="the true rig of the simulated headset, if it is another"
-    )
-
-    one = add(segment, json=False)
-    one.add_argument("--color", type=Path, required=True, help="colour image")
-    one.add_argument("--depth", type=Path, required=True, help="16-bit PNG aligned to it")
-    one.add_argument(
-        "--intrinsics",
-        type=Path,
-        required=True,
-        help="JSON with width, height, fx, fy, cx, cy and depth_scale (metres a unit)",
-    )
-    one.add_argument("--output", type=Path, required=True, help="folder for the results")
-    _add_roi(one)
-
-    one = add(solve)
-    one.add_argument("session", type=Path, help="a session's folder")
-    one.add_argument("--method", choices=METHODS, help="solver; the session's own if absent")
-
-    one = add(export, json=False)
-    metres = number(float, 1e-3, 1e6)
-    one.add_argument("session", type=Path, help="a session's folder")
-    one.add_argument(
-        "--output", type=Path, help="folder for the files; results/export/NAME if absent"
-    )
-    one.add_argument(
-        "--format", action="append", choices=tuple(FORMATS), help="may be repeated; all if absent"
-    )
-    one.add_argument("--near-m", type=metres, default=0.1, help="OpenGL's near plane")
-    one.add_argument("--far-m", type=metres, default=100.0, help="OpenGL's far plane")
-
-    one = add(replay)
-    one.add_argument("recording", type=Path, help=".db3 or .bag file, or a recorded folder")
-    one.add_argument(
-        "--real-time", action="store_true", help="at the recorded pace, dropping frames"
-    )
-    _add_roi(one)
-
-    one = add(record)
-    one.add_argument("output", type=Path, help="a .db3 file, or a new folder")
-    one.add_argument(
-        "--source", default="realsense", help="realsense, simulator, or a recording to convert"
-    )
-    one.add_argument(
-        "--seconds", type=number(float, 0.01, 86_400.0), default=60.0, help="end after so long"
-    )
-    one.add_argument(
-        "--frames", type=number(int, 1, 100_000), default=100_000, help="end after so many"
-    )
-    one.add_argument("--seed", type=seed, default=1, help="of the simulated hand and room")
-    add_realsense_options(one)
-
-    one = add(headset, json=False)
-    port = number(int, 1, 65535)
-    one.add_argument("--port", type=port, required=True, help="where the PC listens")
-    one.add_argument(
-        "--scene-port",
-        type=port,
-        help="where a simulated camera listens on this computer; without, none sees the wearer",
-    )
-    one.add_argument("--host", default="127.0.0.1", help="the PC")
-    one.add_argument("--key-file", type=Path, help="pairing key; else in HANDCAL_PAIRING_KEY")
-    one.add_argument("--rig", type=Path, help="rig file; the shipped example if absent")
-    one.add_argument("--worn-rig", type=Path, help="the true rig, if it is another")
-    one.add_argument("--seed", type=seed, default=1, help="of the wearer")
-    one.add_argument("--loss", type=share, default=0.0, help="share of datagrams lost")
-    one.add_argument("--reorder", type=share, default=0.0, help="share of datagrams reordered")
-    one.add_argument("--duplicate", type=share, default=0.0, help="share of datagrams doubled")
-    one.add_argument("--delay-ms", type=milliseconds, default=0.0, help="of every datagram")
-    one.add_argument(
-        "--clock-offset-ms",
-        type=number(float, -1e9, 1e9),
-        default=12345.0,
-        help="headset's clock less the PC's",
-    )
-    one.add_argument("--duration-s", type=number(float, 0.0, 1e6), help="end after so long")
-
-    one = add(bench)
-    one.add_argument("--quick", action="store_true", help="few repetitions: only a look")
-    one.add_argument("--only", metavar="PART", default="", help="one part, such as offline")
-    one.add_argument(
-        "--gui",
-        action="store_true",
-        help="the desktop program instead: needs a display, 12 minutes",
-    )
-    add(doctor, json=False)
-
-    text = "How well handcal does on given data."
-    judged = commands.add_parser("evaluate", help=text, description=text)
-    add_evaluate_commands(judged.add_subparsers(metavar="WHAT", required=True, parser_class=Parser))
-
-    text = "Studies on simulated wearers, in many processes, each with a report."
-    study = commands.add_parser("study", help=text, description=text)
-    add_study_commands(study.add_subparsers(metavar="STUDY", required=True, parser_class=Parser))
-
-    text = "The offline calibration: boards, cameras, displays, and the rig file made of them."
-    rig = commands.add_parser("rig", help=text, description=text)
-    steps = rig.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
-    add_rig_commands(steps)
-    add_rig_file_commands(steps)
-    return parser
+    # No option before a command takes a value.
+    place = next((i for i, word in enumerate(words) if not word.startswith("-")), len(words))
+    for name, entry in entries.items():
+        made = commands.add_parser(name, help=entry.purpose, description=entry.purpose)
+        if [name] != list(words[place : place + 1]):
+            continue
+        if isinstance(entry.home, str):
+            load(name, entry.home).add_to(made)
+        else:
+            _add(made, entry.home, words[place + 1 :])
 
 
-def _add_roi(command: Parser) -> None:
-    command.add_argument(
-        "--roi",
-        choices=get_args(Roi),
-        default="detector",
-        help="look for the hand where the detector sees it in the colour image (of several the "
-        "nearest, leftmost or rightmost), or by depth alone",
-    )
+class _Version(argparse.Action):
+    """Prints the version, which only then is looked up."""
+
+    def __call__(self, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"handcal {version('handcal')}")  # noqa: T201
+        sys.exit()

@@ -7,13 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 
 from handcal.cli.output import console, progress, save, table, triple
-from handcal.cli.terminal import fail
+from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import FileError
 from handcal.export.formats import FORMATS
+from handcal.types import METHODS
+
+_METRES = number(float, 1e-3, 1e6)
 
 
+@command(
+    arg("session", type=Path, help="session folder"),
+    arg("--method", choices=METHODS, help="solver (default: the session's own)"),
+    json=True,
+)
 def solve(arguments: argparse.Namespace) -> None:
-    """Solve a session's alignments again; the session itself stays as it is."""
+    """Solve a stored session again; the session itself is not changed."""
     import numpy as np
 
     from handcal.register.results import results_json
@@ -22,7 +30,7 @@ def solve(arguments: argparse.Namespace) -> None:
 
     record = Session.open(arguments.session)
     if record.torn_bytes:
-        console.print("The journal's last line is unfinished, as after a crash, and left out.")
+        console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
     settings = stored_solve_settings(record)
     if arguments.method:
         settings = replace(settings, method=arguments.method)
@@ -47,6 +55,35 @@ def solve(arguments: argparse.Namespace) -> None:
         console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
 
 
+@command(
+    arg("session", type=Path, help="session folder"),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for the files (default: results/export/NAME)",
+    ),
+    arg(
+        "--format",
+        action="append",
+        choices=tuple(FORMATS),
+        help="format to write; may be repeated (default: all)",
+    ),
+    arg(
+        "--near-m",
+        type=_METRES,
+        metavar="M",
+        default=0.1,
+        help="near clipping plane for OpenGL, metres",
+    ),
+    arg(
+        "--far-m",
+        type=_METRES,
+        metavar="M",
+        default=100.0,
+        help="far clipping plane for OpenGL, metres",
+    ),
+)
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
