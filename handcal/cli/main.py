@@ -6,6 +6,7 @@ Only the module of the chosen command is imported, so that ``handcal --help`` an
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -114,6 +115,7 @@ COMMANDS: Mapping[str, Entry] = {
 
 def main() -> None:
     """Run a command; every expected error is one line."""
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # its warnings would be further lines
     with errors_in_one_line():
         arguments = parse(sys.argv[1:])
         arguments.command(arguments)
@@ -137,7 +139,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 
 def load(name: str, module: str) -> Command:
-    """Import a command."""
+    """Import a command from a module of `handcal.cli`."""
     found: Command = getattr(import_module(f"handcal.cli.{module}"), name)
     return found
 

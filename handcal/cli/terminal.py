@@ -73,6 +73,14 @@ class Parser(argparse.ArgumentParser):
         """Print the error and exit with code 2."""
         fail(f"{message}; see {self.prog} --help", 2)
 
+    # Typed as argparse's, whose overloads differ.
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the arguments; report unknown ones with the help of the command they were for."""
+        parsed, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return parsed, unknown
+
 
 class _Help(argparse.HelpFormatter):
     """Shows the default of every option that has one."""

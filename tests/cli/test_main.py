@@ -399,6 +399,20 @@ def test_the_program_itself_ends_with_one_line(tmp_path: Path) -> None:
     assert ended.stdout == ""
 
 
+def test_opencv_adds_no_line_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "text.txt").write_text("text")
+    ended = subprocess.run(
+        [sys.executable, "-m", "handcal", "rig", "take", "text.txt", "--output", "out"],
+        cwd=tmp_path,
+        env={name: value for name, value in os.environ.items() if name != "OPENCV_LOG_LEVEL"}
+        | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+    )
+    assert ended.returncode == 1
+    assert ended.stderr == "handcal: text.txt is no video that OpenCV can play\n"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
 def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: Path) -> None:
     with subprocess.Popen(
