@@ -225,7 +225,7 @@ def simulate(arguments: argparse.Namespace) -> None:
     json=True,
 )
 def report(arguments: argparse.Namespace) -> None:
-    """Measure the error between the drawn and the real cube, and write a report."""
+    """Report the errors of the drawn cube against the real one, over all captures."""
     from handcal.lab.evaluate.cube_report import cube_report
     from handcal.lab.evaluate.cube_summary import cube_summary
     from handcal.lab.evaluate.cube_test import judge_captures

@@ -70,7 +70,7 @@ def detector(arguments: argparse.Namespace) -> None:
     json=True,
 )
 def users(arguments: argparse.Namespace) -> None:
-    """Evaluate the user test: the errors that remain for the wearers."""
+    """Evaluate the user test over sessions: errors of calibrations against the wearers' view."""
     from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
     from handcal.lab.evaluate.user_test_report import user_test_report
     from handcal.lab.study.store import free_of_studies

@@ -35,7 +35,7 @@ _CUBE: Mapping[str, Entry] = {
         "Render all captures of a test, with a display calibrated by a simulated hand.", "cube"
     ),
     "report": Entry(
-        "Measure the error between the drawn and the real cube, and write a report.", "cube"
+        "Report the errors of the drawn cube against the real one, over all captures.", "cube"
     ),
 }
 
@@ -44,7 +44,10 @@ _EVALUATE: Mapping[str, Entry] = {
     "detector": Entry(
         "Measure the hand detector's precision on annotated photographs.", "evaluate"
     ),
-    "users": Entry("Evaluate the user test: the errors that remain for the wearers.", "evaluate"),
+    "users": Entry(
+        "Evaluate the user test over sessions: errors of calibrations against the wearers' view.",
+        "evaluate",
+    ),
 }
 
 _STUDY: Mapping[str, Entry] = {

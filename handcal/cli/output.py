@@ -1,4 +1,4 @@
-"""Results and progress as the commands show them."""
+"""Tables, progress bars and result files of the commands."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ console = Console(soft_wrap=True, highlight=False)
 
 
 def table(*columns: str) -> Table:
-    """Return an empty table, its numbers to the right of a first column that gives way."""
+    """Return an empty table: a first column that wraps, and right-aligned columns of numbers."""
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for place, column in enumerate(columns):
         made.add_column(
@@ -33,7 +33,7 @@ def table(*columns: str) -> Table:
 
 
 def save(path: Path | None, result: dict[str, Any]) -> None:
-    """Write a result as JSON, if a path is given."""
+    """Write a result as JSON, if there is a path; create its folder."""
     if path is not None:
         make_folder(path.parent)
         write_json(path, result)
@@ -41,7 +41,7 @@ def save(path: Path | None, result: dict[str, Any]) -> None:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, float], None]]:
-    """Yield a function that shows what is going on: a bar on a terminal, else plain lines."""
+    """Yield a function that shows progress: a bar on a terminal, else plain lines."""
     if not console.is_terminal:
         last = ("", 0)
 
@@ -61,7 +61,7 @@ def progress() -> Iterator[Callable[[str, float], None]]:
 
 @contextmanager
 def until_interrupted() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether Ctrl+C was pressed; the second time it interrupts as ever."""
+    """Yield a function that returns whether Ctrl+C was pressed; a second press interrupts."""
     is_stopped = threading.Event()
 
     def stop(*_: object) -> None:

@@ -73,7 +73,7 @@ class Parser(argparse.ArgumentParser):
         """Print the error and exit with code 2."""
         fail(f"{message}; see {self.prog} --help", 2)
 
-    # Typed as argparse's, whose overloads differ.
+    # Any, since argparse overloads this method.
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse the arguments; report unknown ones with the help of the command they were for."""
         parsed, unknown = super().parse_known_args(args, namespace)
