@@ -410,7 +410,8 @@ def test_opencv_adds_no_line_of_its_own(tmp_path: Path) -> None:
         text=True,
     )
     assert ended.returncode == 1
-    assert ended.stderr == "handcal: text.txt is no video that OpenCV can play\n"
+    assert ended.stderr.startswith("handcal: text.txt ")
+    assert ended.stderr.count("\n") == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
