@@ -1,7 +1,4 @@
-"""``handcal evaluate cube …``: the camera-based test with a cube, from its net to its report.
-
-Commands import what they need when they run.
-"""
+"""``handcal evaluate cube``: the camera-based test with a cube, from its net to its report."""
 
 from __future__ import annotations
 
@@ -12,22 +9,17 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from handcal.cli.rig import add_square_option, grid_of
-from handcal.cli.terminal import (
-    Commands,
-    Parser,
-    add_command,
-    console,
-    number,
-    progress,
-    save,
-    table,
-)
+from handcal.cli.output import console, progress, save, table
+from handcal.cli.rig import GRID_OPTION, grid_of
+from handcal.cli.terminal import arg, command, number
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder
+from handcal.lab.evaluate.cube_folder import CapturePlan
+from handcal.rig.cube import Cube
+from handcal.rig.print_page import PAPERS
+from handcal.types import EYES
 
 if TYPE_CHECKING:
-    from handcal.rig.cube import Cube
     from handcal.rig.grid import Grid
     from handcal.types import Rig
 
@@ -39,9 +31,56 @@ _SHOWN = (
 )
 
 
+_USUAL, _PLAN = Cube(), CapturePlan()
+_SIDE = number(float, 1.0, 1000.0)
+_COUNT = number(int, 1, 100)
+_RIG_AND_EYE = (
+    arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
+    arg("--eye", choices=EYES, default="left", help="eye whose display is tested"),
+)
+_CAPTURES = (
+    arg("folder", type=Path, help="folder of the captures: POSITION/POSE/real.png, virtual.png"),
+    arg(
+        "--cube",
+        type=Path,
+        metavar="FILE",
+        help="description of the cube (default: FOLDER/cube.json)",
+    ),
+    *_RIG_AND_EYE,
+    GRID_OPTION,
+)
+
+
+@command(
+    arg("--pdf", type=Path, metavar="FILE", required=True, help="net at true size"),
+    arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
+    arg("--cube", type=Path, metavar="FILE", help="description of the cube (default: not written)"),
+    arg(
+        "--side-mm",
+        type=_SIDE,
+        metavar="MM",
+        default=1e3 * _USUAL.side_m,
+        help="side of the cube",
+    ),
+    arg(
+        "--marker-mm",
+        type=_SIDE,
+        metavar="MM",
+        default=1e3 * _USUAL.marker_m,
+        help="side of a marker",
+    ),
+    arg("--dictionary", default=_USUAL.dictionary, help="ArUco dictionary of the markers"),
+    arg(
+        "--ids",
+        type=number(int, 0, 9999),
+        nargs=6,
+        metavar=("FRONT", "RIGHT", "BACK", "LEFT", "TOP", "BOTTOM"),
+        default=_USUAL.ids,
+        help="markers of the six faces",
+    ),
+)
 def net(arguments: argparse.Namespace) -> None:
     """Make a cube: its net to print at true size, and the file that describes it."""
-    from handcal.rig.cube import Cube
     from handcal.rig.cube_file import write_cube
     from handcal.rig.cube_print import write_cube_pdf
 
@@ -63,11 +102,49 @@ def net(arguments: argparse.Namespace) -> None:
         console.print(f"{arguments.cube}: put the sides there as measured", markup=False)
 
 
+@command(
+    *_CAPTURES,
+    arg(
+        "--camera",
+        type=number(int, 0, 99),
+        metavar="N",
+        help="number of the camera (default: the only one)",
+    ),
+    arg(
+        "--size",
+        type=number(int, 1, 8192),
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        help="image size to request (default: the camera's own)",
+    ),
+    arg(
+        "--positions",
+        nargs="+",
+        default=_PLAN.positions,
+        metavar="NAME",
+        help="positions of the camera",
+    ),
+    arg(
+        "--poses",
+        type=_COUNT,
+        metavar="N",
+        default=_PLAN.poses,
+        help="poses of the cube at each position",
+    ),
+    arg(
+        "--drawn",
+        nargs="+",
+        default=(),
+        metavar="NAME",
+        help="names of the ways of drawing to compare (default: one way, without a name)",
+    ),
+    arg("--no-grid", action="store_true", help="do not capture the display's grid"),
+)
 def capture(arguments: argparse.Namespace) -> None:
-    """Capture the real and the drawn cube with a camera, told at each step what to do."""
+    """Capture the real and the drawn cube with a camera, guided step by step."""
     from handcal.camera.viewpoint import open_viewpoint
     from handcal.lab.evaluate.cube_capture import take_captures
-    from handcal.lab.evaluate.cube_folder import CapturePlan, missing_captures
+    from handcal.lab.evaluate.cube_folder import missing_captures
 
     def ask(what: str) -> None:
         try:
@@ -90,8 +167,33 @@ def capture(arguments: argparse.Namespace) -> None:
         take_captures(camera, arguments.folder, plan, cube, grid, ask, console.out)
 
 
+@command(
+    arg("folder", type=Path, help="new folder for the captures"),
+    arg(
+        "--seed",
+        type=number(int, 0, 2**32 - 1),
+        metavar="N",
+        default=1,
+        help="random seed of everything that varies",
+    ),
+    arg(
+        "--poses",
+        type=_COUNT,
+        metavar="N",
+        default=_PLAN.poses,
+        help="poses of the cube at each position",
+    ),
+    arg(
+        "--alignments",
+        type=number(int, 1, 20),
+        metavar="K",
+        default=1,
+        help="alignments of the hand at each position",
+    ),
+    *_RIG_AND_EYE,
+)
 def simulate(arguments: argparse.Namespace) -> None:
-    """Render all captures of a test, the display calibrated by a simulated hand."""
+    """Render all captures of a test, with a display calibrated by a simulated hand."""
     from handcal.sim.cube_captures import CaptureSettings, write_captures
 
     settings = CaptureSettings(
@@ -105,8 +207,25 @@ def simulate(arguments: argparse.Namespace) -> None:
     console.print(f"Captures: {arguments.folder}", markup=False)
 
 
+@command(
+    *_CAPTURES,
+    arg(
+        "--camera-intrinsics",
+        type=Path,
+        metavar="FILE",
+        help="intrinsics of the camera in the eye's place (default: FOLDER/camera.json)",
+    ),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        default=Path("results/cube"),
+        help="folder for the report",
+    ),
+    json=True,
+)
 def report(arguments: argparse.Namespace) -> None:
-    """Tell from all captures how far the drawn cube is from the real one."""
+    """Report the errors of the drawn cube against the real one, over all captures."""
     from handcal.lab.evaluate.cube_report import cube_report
     from handcal.lab.evaluate.cube_summary import cube_summary
     from handcal.lab.evaluate.cube_test import judge_captures
@@ -139,83 +258,6 @@ def report(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
     for file in written:
         console.print(str(file), markup=False)
-
-
-def add_cube_commands(commands: Commands) -> None:
-    """Add ``handcal evaluate cube net, capture, simulate, report``."""
-    from handcal.lab.evaluate.cube_folder import CapturePlan
-    from handcal.rig.cube import Cube
-    from handcal.rig.print_page import PAPERS
-
-    usual, plan = Cube(), CapturePlan()
-    one = add_command(commands, net, json=False)
-    one.add_argument("--pdf", type=Path, metavar="FILE", required=True, help="to scale")
-    one.add_argument("--paper", choices=tuple(PAPERS), default="a4", help="of the PDF")
-    one.add_argument("--cube", type=Path, metavar="FILE", help="where to write its description")
-    side = number(float, 1.0, 1000.0)
-    one.add_argument("--side-mm", type=side, default=1e3 * usual.side_m, help="of the cube")
-    one.add_argument("--marker-mm", type=side, default=1e3 * usual.marker_m, help="markers' side")
-    one.add_argument("--dictionary", default=usual.dictionary, help="of the markers")
-    one.add_argument(
-        "--ids",
-        type=number(int, 0, 9999),
-        nargs=6,
-        metavar=("FRONT", "RIGHT", "BACK", "LEFT", "TOP", "BOTTOM"),
-        default=usual.ids,
-        help="the markers",
-    )
-
-    one = add_command(commands, capture, json=False)
-    _add_captures(one)
-    one.add_argument("--camera", type=number(int, 0, 99), help="its number; the only one if absent")
-    one.add_argument(
-        "--size", type=number(int, 1, 8192), nargs=2, metavar=("W", "H"), help="asked of the camera"
-    )
-    one.add_argument(
-        "--positions", nargs="+", default=plan.positions, metavar="NAME", help="of the camera"
-    )
-    one.add_argument("--poses", type=number(int, 1, 100), default=plan.poses, help="at each")
-    one.add_argument(
-        "--drawn", nargs="+", default=(), metavar="NAME", help="ways of drawing that are compared"
-    )
-    one.add_argument("--no-grid", action="store_true", help="do not capture the display's grid")
-
-    one = add_command(commands, simulate, json=False)
-    one.add_argument("folder", type=Path, help="a new folder for the captures")
-    one.add_argument("--seed", type=number(int, 0, 2**32 - 1), default=1, help="of all that varies")
-    one.add_argument("--poses", type=number(int, 1, 100), default=plan.poses, help="at each place")
-    one.add_argument(
-        "--alignments", type=number(int, 1, 20), default=1, help="of the hand at each place"
-    )
-    _add_rig(one)
-
-    one = add_command(commands, report)
-    _add_captures(one)
-    one.add_argument(
-        "--camera-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="the eye-replacement camera's; FOLDER/camera.json if absent",
-    )
-    one.add_argument(
-        "--output", type=Path, default=Path("results/cube"), help="folder for the report"
-    )
-
-
-def _add_captures(command: Parser) -> None:
-    command.add_argument("folder", type=Path, help="POSITION/POSE/real.png, virtual.png")
-    command.add_argument(
-        "--cube", type=Path, metavar="FILE", help="its description; FOLDER/cube.json if absent"
-    )
-    _add_rig(command)
-    add_square_option(command)
-
-
-def _add_rig(command: Parser) -> None:
-    from handcal.types import EYES
-
-    command.add_argument("--rig", type=Path, help="whose display; the shipped example if absent")
-    command.add_argument("--eye", choices=EYES, default="left", help="whose display")
 
 
 def _cube(arguments: argparse.Namespace) -> Cube:

@@ -1,8 +1,8 @@
-"""One whole calibration on the simulator, by itself: the technician's part played by a script.
+"""A complete calibration of a simulated wearer, operated by a script.
 
-The wearer and the headset live in a process of their own and reach the engine only through
-rendered frames and real datagrams. What they really are is drawn again from the seed, after the
-fact, to judge the result.
+The wearer and the headset run in a separate process, and reach the engine only through rendered
+frames and real datagrams. The true eye positions are drawn again from the seed afterwards, to
+measure the error of the result.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ Report = Callable[[str, float], None]
 
 _PATIENCE_S = 60.0
 _PATIENCE_STEPS = 300
-"""Steps of the station, at least five a second on an idle machine: a starved one gets longer."""
+"""Minimum number of station steps before giving up, so that a slow computer gets more time."""
 
 
 @dataclass(frozen=True, slots=True)
 class DemoSettings:
-    """What the demonstration runs."""
+    """Settings of the demonstration."""
 
     seed: int = 1
-    """Of the wearer, the hand, the room and all noise."""
+    """Seed of the wearer, the hand, the room and all noise."""
     alignments: int = 1
-    """How many times the wearer aligns (with each eye, if one at a time)."""
+    """Number of alignments; of each eye, if `eyes` is ``"each"``."""
     eyes: Literal["both", "each"] = "both"
     loss: float = 0.0
     reorder: float = 0.0
     """Share of the link's datagrams lost, and reordered, in each direction."""
     worn_rig: str = ""
-    """Path of the rig that the wearer really looks through; empty takes the one calibrated with."""
+    """Path of the rig that the wearer really looks through; empty: the rig of the calibration."""
 
 
 def run_demo(
     settings: DemoSettings, rig_path: Path, output: Path, report: Report
 ) -> dict[str, Any]:
-    """Calibrate one simulated wearer and judge the result by the truth.
+    """Calibrate one simulated wearer, and compare the result with the truth.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def run_demo(
     output : Path
         Folder in which the session is created.
     report : callable
-        Told what is going on and which share of the whole is done.
+        Called with the current step and the share of the whole that is done.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def run_demo(
     Raises
     ------
     HandcalError
-        If the headset does not answer, the wearer does not get on, or the disk is full.
+        If the headset does not answer, the wearer does not finish a step, or the disk is full.
     """
     station_settings = StationSettings(
         rig=str(rig_path),
@@ -106,7 +106,7 @@ def run_demo(
 
 
 def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> list[Observation]:
-    """Do every planned alignment, solving and applying after each."""
+    """Do every planned alignment; solve and apply after each."""
     calibration = station.calibration
     each: tuple[tuple[Eye, ...], ...] = (
         (EYES,) if settings.eyes == "both" else (("left",), ("right",))
@@ -150,7 +150,7 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
     assert calibration.results is not None
     results, rig, worn_rig = calibration.results, station.rig, station.worn_rig
     eyes_m = draw_eyes(np.random.default_rng(settings.seed), WearerSettings())
-    # From the C0 that the rig knows, which is not quite where it is.
+    # Relative to the rig's C0, which differs from the true one.
     truth_m = {
         eye: shift_m + rig.eyes[eye].t_C0_V_m - worn_rig.eyes[eye].t_C0_V_m
         for eye, shift_m in eyes_m.items()

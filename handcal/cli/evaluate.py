@@ -1,7 +1,4 @@
-"""``handcal evaluate …``: how well handcal does on given data.
-
-Commands import what they need when they run.
-"""
+"""``handcal evaluate detector, users``: the hand detector and the user test."""
 
 from __future__ import annotations
 
@@ -11,13 +8,26 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from handcal.cli.cube import add_cube_commands
-from handcal.cli.terminal import Commands, Parser, add_command, console, progress, save, table
+from handcal.cli.output import console, progress, save, table
+from handcal.cli.terminal import arg, command
 from handcal.io.files import make_folder, require_suffix
 
 
+@command(
+    arg("--images", type=Path, metavar="FOLDER", required=True, help="folder of photographs"),
+    arg(
+        "--annotations",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="JSON with the hands in the photographs",
+    ),
+    arg("--sheet", type=Path, metavar="FILE", help="PNG with the worst failures"),
+    arg("--model", type=Path, metavar="FILE", help="ONNX model (default: the shipped one)"),
+    json=True,
+)
 def detector(arguments: argparse.Namespace) -> None:
-    """Measure on annotated photographs how well hands are found."""
+    """Measure the hand detector's precision on annotated photographs."""
     from handcal.hand.detect import HandDetector
     from handcal.hand.shipped import load_detector
     from handcal.lab.evaluate.annotations import read_annotations
@@ -48,8 +58,19 @@ def detector(arguments: argparse.Namespace) -> None:
         write_contact_sheet(arguments.sheet, photos, results)
 
 
+@command(
+    arg("folder", type=Path, nargs="+", help="session folder, or a folder of sessions"),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        default=Path("results/users"),
+        help="folder for the report",
+    ),
+    json=True,
+)
 def users(arguments: argparse.Namespace) -> None:
-    """Evaluate the user test over sessions: how far calibrations miss what the wearers see."""
+    """Evaluate the user test over sessions: errors of calibrations against the wearers' view."""
     from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
     from handcal.lab.evaluate.user_test_report import user_test_report
     from handcal.lab.study.store import free_of_studies
@@ -78,24 +99,3 @@ def users(arguments: argparse.Namespace) -> None:
     console.print(described.lead)
     for file in written:
         console.print(str(file), markup=False)
-
-
-def add_evaluate_commands(commands: Commands) -> None:
-    """Add ``handcal evaluate …``."""
-    text = "The camera-based test: how far a drawn cube is from the real one."
-    cube = commands.add_parser("cube", help=text, description=text)
-    add_cube_commands(cube.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser))
-
-    one = add_command(commands, detector)
-    one.add_argument("--images", type=Path, required=True, help="folder of photographs")
-    one.add_argument("--annotations", type=Path, required=True, help="JSON: the hands in them")
-    one.add_argument("--sheet", type=Path, metavar="FILE", help="PNG of the worst failures")
-    one.add_argument("--model", type=Path, metavar="FILE", help="ONNX; the shipped one if absent")
-
-    one = add_command(commands, users)
-    one.add_argument(
-        "folder", type=Path, nargs="+", help="a session's folder, or one that holds sessions"
-    )
-    one.add_argument(
-        "--output", type=Path, default=Path("results/users"), help="folder for the report"
-    )

@@ -1,4 +1,4 @@
-"""Run the segmentation over everything a camera gives, and follow the hand from frame to frame."""
+"""Segmentation of every frame of a camera, with the motion of the hand between frames."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from handcal.types import Float64, Frame, HandCloud, freeze
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandMotion:
-    """How the hand moved since the last frame that showed it."""
+    """The motion of the hand since the last frame in which it was found."""
 
     rotation_rad: Float64
     """(3,); rotation vector, frame D."""
@@ -35,14 +35,14 @@ class HandMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReplayStep:
-    """What one frame showed."""
+    """The result of one frame."""
 
     frame: Frame
     hand: HandCloud | None
     problem: str
-    """Why there is no hand; empty if there is one."""
+    """The reason why no hand was found; empty if one was."""
     segment_s: float
-    """How long the segmentation took."""
+    """Duration of the segmentation."""
     motion: HandMotion | None
     """None for the first hand."""
 

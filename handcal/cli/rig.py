@@ -1,7 +1,7 @@
-"""``handcal rig board, take, camera, stereo, convert``: boards and cameras from the command line.
+"""``handcal rig board, take, camera, stereo, convert``: boards and cameras.
 
-Each command reads images or files, says what was found and how far to trust it, and writes one
-part; they import what they need when they run.
+Each calibration reads images, prints the result with its residuals and a verdict, and writes one
+part of the rig.
 """
 
 from __future__ import annotations
@@ -13,38 +13,96 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from handcal.cli.camera_options import add_realsense_options, realsense_of
-from handcal.cli.terminal import (
-    Commands,
-    Parser,
-    add_command,
-    console,
-    fail,
-    number,
-    progress,
-    table,
-    until_interrupted,
-)
+from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
+from handcal.cli.output import console, progress, table, until_interrupted
+from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
+from handcal.rig.board import Board, BoardKind
+from handcal.rig.camera import LensModel
+from handcal.rig.formats import FORMATS
+from handcal.rig.print_page import PAPERS
+from handcal.rig.views import MAX_VIEWS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from handcal.rig.board import Board
     from handcal.rig.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
     from handcal.rig.views import View
     from handcal.rig.worst import WorstView
 
 
+_BOARD = Board()
+_SIDE = number(float, 1.0, 1000.0)
+BOARD_OPTIONS = (
+    arg("--kind", choices=get_args(BoardKind), default=_BOARD.kind, help="kind of board"),
+    arg(
+        "--squares",
+        type=number(int, 3, 40),
+        nargs=2,
+        metavar=("COLUMNS", "ROWS"),
+        default=_BOARD.squares,
+        help="number of squares, not of inner corners",
+    ),
+    arg(
+        "--square-mm",
+        type=_SIDE,
+        metavar="MM",
+        default=1e3 * _BOARD.square_m,
+        help="measured side of a square",
+    ),
+    arg(
+        "--marker-mm",
+        type=_SIDE,
+        metavar="MM",
+        default=1e3 * _BOARD.marker_m,
+        help="measured side of a marker",
+    ),
+    arg("--dictionary", default=_BOARD.dictionary, help="ArUco dictionary of the markers"),
+    arg("--legacy", action="store_true", help="the board was made by OpenCV before 4.6"),
+)
+GRID_OPTION = arg(
+    "--square-px",
+    type=number(int, 20, 2000),
+    metavar="PX",
+    default=80,
+    help="side of the grid's squares",
+)
+_CALIBRATION_OPTIONS = (
+    *BOARD_OPTIONS,
+    arg("--lens", choices=get_args(LensModel), default="full", help="distortion model"),
+    arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
+    arg("--output", type=Path, metavar="FILE", help="file for the result (default: only print it)"),
+    arg(
+        "--format",
+        choices=FORMATS,
+        default="json",
+        help="format of the result; only json holds all of it",
+    ),
+)
+
+
+@command(
+    *BOARD_OPTIONS,
+    arg("--pdf", type=Path, metavar="FILE", help="PDF at true size, with a ruler to check it"),
+    arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
+    arg("--png", type=Path, metavar="FILE", help="PNG for a screen"),
+    arg(
+        "--square-px",
+        type=number(int, 4, 2000),
+        metavar="PX",
+        default=100,
+        help="side of a square in the PNG",
+    ),
+)
 def board(arguments: argparse.Namespace) -> None:
-    """Make a board to put up: a PDF at true size, or a PNG for a screen."""
+    """Make a calibration board: a PDF at true size, or a PNG for a screen."""
     from handcal.io.images import write_png
     from handcal.rig.board_print import draw_board, write_board_pdf
 
     if arguments.pdf is None and arguments.png is None:
-        fail("say where the board goes: --pdf FILE, --png FILE or both", 2)
+        fail("no output given; add --pdf FILE, --png FILE or both", 2)
     made = board_of(arguments)
     try:
         if arguments.pdf:
@@ -61,8 +119,40 @@ def board(arguments: argparse.Namespace) -> None:
         raise HandcalError(str(error)) from error
 
 
+@command(
+    arg("source", help="realsense, the number of a camera, or a recording or video"),
+    arg(
+        "--headset",
+        metavar="SOURCE",
+        help="the headset's camera, to capture pairs of images (default: single images)",
+    ),
+    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the images"),
+    arg(
+        "--seconds",
+        type=number(float, 0.1, 3600.0),
+        metavar="S",
+        default=60.0,
+        help="stop after this time on the camera's clock",
+    ),
+    arg(
+        "--most",
+        type=number(int, 1, MAX_VIEWS),
+        metavar="N",
+        help="stop after this many images (default: 25; with --grid, 5)",
+    ),
+    arg(
+        "--grid",
+        type=number(int, 60, 16384),
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        help="capture the grid on a display of this size; keeps images that are alike",
+    ),
+    GRID_OPTION,
+    *BOARD_OPTIONS,
+    *REALSENSE_OPTIONS,
+)
 def take(arguments: argparse.Namespace) -> None:
-    """Take images of a board, or of a display's grid, from a camera, a recording or a video."""
+    """Capture images of a board, or of a display's grid, from a camera, recording or video."""
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.take_board import TakeSettings, keep_imager, take_views
     from handcal.camera.view_source import open_view_source
@@ -70,7 +160,7 @@ def take(arguments: argparse.Namespace) -> None:
 
     sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
     if len(set(sources)) < len(sources):
-        fail("one camera cannot be both of a pair", 2)
+        fail("the two cameras of a pair must differ", 2)
     folder = arguments.output.absolute()
     folders = [folder / "depth", folder / "headset"] if arguments.headset else [folder]
     if arguments.grid:
@@ -87,20 +177,24 @@ def take(arguments: argparse.Namespace) -> None:
             for source, into in zip(sources, folders, strict=True)
         ]
         names = " and ".join(one.name for one in cameras)
-        console.print(f"From {names}; Ctrl+C ends it", markup=False)
+        console.print(f"Capturing from {names}; press Ctrl+C to stop", markup=False)
         is_stopped = stack.enter_context(until_interrupted())
         report = stack.enter_context(progress())
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
         taken = take_views(cameras, folders, board, settings, report, is_stopped)
     for why, count in taken.passed_over.items():
-        console.print(f"{count} of {taken.looked_at} moments passed over: {why}")
+        console.print(f"{count} of {taken.looked_at} moments skipped: {why}")
     if not taken.kept:
-        raise HandcalError("no image was kept; see above")
+        raise HandcalError("no image was kept; see the reasons above")
     console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}", markup=False)
 
 
+@command(
+    arg("images", type=Path, nargs="+", help="images, or folders of images"),
+    *_CALIBRATION_OPTIONS,
+)
 def camera(arguments: argparse.Namespace) -> None:
-    """Solve a camera's intrinsics from images of a board."""
+    """Calibrate a camera's intrinsics from images of a board."""
     from handcal.rig.camera import CameraSettings, calibrate_camera
     from handcal.rig.formats import camera_json, write_intrinsics
 
@@ -123,8 +217,39 @@ def camera(arguments: argparse.Namespace) -> None:
     )
 
 
+@command(
+    arg(
+        "--depth",
+        type=Path,
+        nargs="+",
+        metavar="IMAGE",
+        required=True,
+        help="images from the depth camera, or folders of images",
+    ),
+    arg(
+        "--depth-intrinsics",
+        type=Path,
+        metavar="FILE",
+        help="known intrinsics, such as the camera's own (default: solved from the images)",
+    ),
+    arg(
+        "--headset",
+        type=Path,
+        nargs="+",
+        metavar="IMAGE",
+        required=True,
+        help="images from the headset's camera, or folders of images",
+    ),
+    arg(
+        "--headset-intrinsics",
+        type=Path,
+        metavar="FILE",
+        help="known intrinsics, such as the camera's own (default: solved from the images)",
+    ),
+    *_CALIBRATION_OPTIONS,
+)
 def stereo(arguments: argparse.Namespace) -> None:
-    """Solve where the depth camera is on the headset, from pairs of images of one board."""
+    """Calibrate the depth camera's pose on the headset from image pairs of one board."""
     import numpy as np
 
     from handcal.rig.camera import CameraSettings
@@ -133,7 +258,9 @@ def stereo(arguments: argparse.Namespace) -> None:
     from handcal.rig.views import drop, pair_views
 
     if arguments.format == "ros":
-        raise HandcalError("ROS's camera_info holds no pose between cameras: use opencv or json")
+        raise HandcalError(
+            "ROS camera_info has no pose between cameras; use --format opencv or json"
+        )
     pairs = pair_views(
         drop(_views(arguments.depth, arguments), arguments.drop),
         _views(arguments.headset, arguments),
@@ -149,8 +276,9 @@ def stereo(arguments: argparse.Namespace) -> None:
     shift_mm = 1e3 * result.T_H_D[:3, 3]
     angle_rad = np.arccos(np.clip((np.trace(result.T_H_D[:3, :3]) - 1) / 2, -1, 1))
     console.print(
-        f"The depth camera is at {' '.join(f'{one:.2f}' for one in shift_mm)} mm in the headset's, "
-        f"turned by {np.degrees(angle_rad):.2f}°; each pair alone differs by "
+        f"Pose of the depth camera in the headset camera's frame: "
+        f"{' '.join(f'{one:.2f}' for one in shift_mm)} mm, "
+        f"rotated by {np.degrees(angle_rad):.2f}°; spread of single pairs "
         f"{np.degrees(result.spread_rad):.2f}°, {1e3 * result.spread_m:.1f} mm"
     )
     _conclude(result.rms_px, result.worst, result.verdict)
@@ -161,8 +289,13 @@ def stereo(arguments: argparse.Namespace) -> None:
     )
 
 
+@command(
+    arg("input", type=Path, help="file in any of the formats"),
+    arg("output", type=Path, help="file to write"),
+    arg("--format", choices=FORMATS, required=True, help="format of the output"),
+)
 def convert(arguments: argparse.Namespace) -> None:
-    """Convert intrinsics, or a stereo pose, between OpenCV's, ROS's and handcal's files."""
+    """Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal."""
     from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
 
     make_folder(arguments.output.parent)
@@ -182,116 +315,8 @@ def convert(arguments: argparse.Namespace) -> None:
     console.print(str(arguments.output), markup=False)
 
 
-def add_rig_commands(commands: Commands) -> None:
-    """Add ``handcal rig board, take, camera, stereo, convert``."""
-    from handcal.rig.camera import LensModel
-    from handcal.rig.formats import FORMATS
-    from handcal.rig.print_page import PAPERS
-    from handcal.rig.views import MAX_VIEWS
-
-    one = add_command(commands, board, json=False)
-    add_board_options(one)
-    one.add_argument("--pdf", type=Path, metavar="FILE", help="to scale, with a ruler to check")
-    one.add_argument("--paper", choices=tuple(PAPERS), default="a4", help="of the PDF")
-    one.add_argument("--png", type=Path, metavar="FILE", help="for a screen")
-    one.add_argument(
-        "--square-px", type=number(int, 4, 2000), default=100, help="squares' side in the PNG"
-    )
-
-    one = add_command(commands, take, json=False)
-    one.add_argument(
-        "source",
-        help="'realsense', the number of a camera, or a recording or video",
-    )
-    one.add_argument("--headset", metavar="SOURCE", help="the headset's camera, to take pairs")
-    one.add_argument("--output", type=Path, metavar="FOLDER", required=True, help="of the images")
-    one.add_argument(
-        "--seconds", type=number(float, 0.1, 3600.0), default=60.0, help="by the camera's time"
-    )
-    one.add_argument("--most", type=number(int, 1, MAX_VIEWS), help="images; 25, of a grid 5")
-    one.add_argument(
-        "--grid",
-        type=number(int, 60, 16384),
-        nargs=2,
-        metavar=("WIDTH", "HEIGHT"),
-        help="look for the grid on a display of this size, and keep images that are alike",
-    )
-    add_square_option(one)
-    add_board_options(one)
-    add_realsense_options(one)
-
-    one = add_command(commands, camera, json=False)
-    one.add_argument("images", type=Path, nargs="+", help="images, or folders of images")
-    _add_calibration(one, get_args(LensModel), FORMATS)
-
-    one = add_command(commands, stereo, json=False)
-    for which, whose in (("depth", "depth camera"), ("headset", "headset's camera")):
-        one.add_argument(
-            f"--{which}", type=Path, nargs="+", required=True, help=f"images by the {whose}"
-        )
-        one.add_argument(
-            f"--{which}-intrinsics",
-            type=Path,
-            metavar="FILE",
-            help="known already, as the camera itself tells; solved if absent",
-        )
-    _add_calibration(one, get_args(LensModel), FORMATS)
-
-    one = add_command(commands, convert, json=False)
-    one.add_argument("input", type=Path, help="any of the formats")
-    one.add_argument("output", type=Path, help="the file to write")
-    one.add_argument("--format", choices=FORMATS, required=True, help="of the output")
-
-
-def add_board_options(command: Parser) -> None:
-    """Add the options that say which board is used."""
-    from handcal.rig.board import Board, BoardKind
-
-    usual = Board()
-    squares = number(int, 3, 40)
-    command.add_argument("--kind", choices=get_args(BoardKind), default=usual.kind, help="of board")
-    command.add_argument(
-        "--squares",
-        type=squares,
-        nargs=2,
-        metavar=("COLUMNS", "ROWS"),
-        default=usual.squares,
-        help="squares, not inner corners",
-    )
-    side = number(float, 1.0, 1000.0)
-    command.add_argument(
-        "--square-mm", type=side, default=1e3 * usual.square_m, help="squares' side as measured"
-    )
-    command.add_argument(
-        "--marker-mm", type=side, default=1e3 * usual.marker_m, help="markers' side as measured"
-    )
-    command.add_argument("--dictionary", default=usual.dictionary, help="of the markers")
-    command.add_argument("--legacy", action="store_true", help="printed by OpenCV before 4.6")
-
-
-def add_square_option(command: Parser) -> None:
-    """Add the option that says how large a grid's squares are."""
-    command.add_argument(
-        "--square-px", type=number(int, 20, 2000), default=80, help="side of the grid's squares"
-    )
-
-
-def _add_calibration(command: Parser, lenses: tuple[str, ...], formats: tuple[str, ...]) -> None:
-    add_board_options(command)
-    command.add_argument("--lens", choices=lenses, default="full", help="model of distortion")
-    command.add_argument(
-        "--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"
-    )
-    command.add_argument("--output", type=Path, metavar="FILE", help="where to write the result")
-    command.add_argument(
-        "--format", choices=formats, default="json", help="of the result; json holds all of it"
-    )
-
-
 def board_of(arguments: argparse.Namespace) -> Board:
-    """Return the board that the options describe; HandcalError if there can be none."""
-    from handcal.rig.board import Board
-
+    """Return the board that the options describe; HandcalError if they contradict each other."""
     try:
         return Board(
             kind=arguments.kind,
@@ -306,7 +331,7 @@ def board_of(arguments: argparse.Namespace) -> Board:
 
 
 def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
-    """Return the grid that the options describe; HandcalError if the display has no room."""
+    """Return the grid that the options describe; HandcalError if the display is too small."""
     from handcal.rig.grid import Grid
 
     try:
@@ -326,8 +351,8 @@ def _views(
 
 
 def show_views(views: Iterable[View], residuals_px: Mapping[str, float]) -> None:
-    """Print what was found on each image, and how far off that is."""
-    shown = table("image", "corners", "off, px", "edges, px")
+    """Print the corners found in each image, and their residuals."""
+    shown = table("image", "corners", "residual, px", "blur, px")
     for view in views:
         found, off_px = view.found, residuals_px.get(view.name)
         shown.add_row(
@@ -362,7 +387,7 @@ def show_verdict(verdict: CalibrationVerdict) -> None:
 def _write(
     arguments: argparse.Namespace, result: dict[str, Any], in_another: Callable[[Path], None]
 ) -> None:
-    """Write a result where asked: all of it as JSON, or what another format holds."""
+    """Write a result if asked: all of it as JSON, or the part that another format holds."""
     if arguments.output is None:
         return
     make_folder(arguments.output.parent)

@@ -1,4 +1,4 @@
-"""``handcal rig grid, display, make, check, compare, migrate``: displays, and whole rig files."""
+"""``handcal rig grid, display, make, check, compare, migrate``: displays and rig files."""
 
 from __future__ import annotations
 
@@ -7,26 +7,19 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handcal.cli.output import console, progress, save, table
 from handcal.cli.rig import (
-    add_board_options,
-    add_square_option,
+    BOARD_OPTIONS,
+    GRID_OPTION,
     board_of,
     grid_of,
     show_verdict,
     show_views,
 )
-from handcal.cli.terminal import (
-    Commands,
-    Parser,
-    add_command,
-    console,
-    number,
-    progress,
-    save,
-    table,
-)
+from handcal.cli.terminal import arg, command, number, one_of
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
+from handcal.types import EYES
 
 if TYPE_CHECKING:
     from handcal.rig.display import DisplaySettings
@@ -34,8 +27,32 @@ if TYPE_CHECKING:
     from handcal.types import Intrinsics, Rig
 
 
+_METRES = number(float, 0.1, 100.0)
+_RIG_AND_OUTPUT = (
+    arg(
+        "--rig",
+        type=Path,
+        metavar="FILE",
+        help="rig file to start from (default: the shipped example)",
+    ),
+    arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+)
+
+
+@command(
+    arg(
+        "--display",
+        type=number(int, 60, 16384),
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        default=(1268, 720),
+        help="size of the display in pixels",
+    ),
+    arg("--png", type=Path, metavar="FILE", required=True, help="image to write"),
+    GRID_OPTION,
+)
 def grid(arguments: argparse.Namespace) -> None:
-    """Make the image that a display shows to the viewpoint camera, pixel for pixel."""
+    """Make the grid that a display shows to the viewpoint camera, pixel for pixel."""
     from handcal.io.images import write_png
     from handcal.rig.grid import draw_grid
 
@@ -48,8 +65,75 @@ def grid(arguments: argparse.Namespace) -> None:
     )
 
 
+@command(
+    arg("images", type=Path, nargs="+", help="images of the grid, or folders of images"),
+    arg("--eye", choices=EYES, required=True, help="eye whose display is calibrated"),
+    arg(
+        "--camera-intrinsics",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="intrinsics of the viewpoint camera",
+    ),
+    one_of(
+        arg(
+            "--stereo",
+            type=Path,
+            metavar="FILE",
+            help="pose of the viewpoint camera: JSON from 'handcal rig stereo' with the viewpoint "
+            "camera as its depth camera",
+        ),
+        arg(
+            "--tracked",
+            type=Path,
+            metavar="FILE",
+            help="poses of the board in --board-images, as tracked by the headset: JSON",
+        ),
+    ),
+    arg(
+        "--board-images",
+        type=Path,
+        nargs="+",
+        metavar="IMAGE",
+        default=(),
+        help="images of the tracked board, or folders of images",
+    ),
+    one_of(
+        arg(
+            "--distance-m",
+            type=_METRES,
+            metavar="M",
+            help="measured distance z(C0→S) of the virtual image",
+        ),
+        arg(
+            "--square-arcmin",
+            type=number(float, 1.0, 10_000.0),
+            metavar="ARCMIN",
+            help="angle that a square of the grid subtends at --nominal-distance-m, to solve "
+            "z(C0→S)",
+        ),
+    ),
+    arg(
+        "--nominal-distance-m",
+        type=_METRES,
+        metavar="M",
+        default=2.0,
+        help="nominal distance of the virtual image",
+    ),
+    arg(
+        "--view",
+        type=Path,
+        metavar="FILE",
+        help="T_V_H, from the headset rig to this eye's rendering camera as the headset reports "
+        "it: 4 rows of 4 numbers, metres, x right, y down, z forward (default: as in --rig)",
+    ),
+    arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
+    GRID_OPTION,
+    *BOARD_OPTIONS,
+    *_RIG_AND_OUTPUT,
+)
 def display(arguments: argparse.Namespace) -> None:
-    """Calibrate one eye's display from images of its grid taken by the viewpoint camera."""
+    """Calibrate one eye's display from the viewpoint camera's images of its grid."""
     import numpy as np
 
     from handcal.rig.assemble import screen_of, with_display
@@ -81,8 +165,31 @@ def display(arguments: argparse.Namespace) -> None:
     _write(arguments.output, with_display(rig, eye, result))
 
 
+@command(
+    arg(
+        "--stereo",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="JSON from 'handcal rig stereo'",
+    ),
+    arg(
+        "--depth-intrinsics",
+        type=Path,
+        metavar="FILE",
+        help="intrinsics of the depth imager, if the stereo images are the colour imager's",
+    ),
+    arg(
+        "--depth-to-color",
+        type=Path,
+        metavar="FILE",
+        help="pose from the depth to the colour imager, in the same case",
+    ),
+    arg("--name", help="name of the rig (default: unchanged)"),
+    *_RIG_AND_OUTPUT,
+)
 def make(arguments: argparse.Namespace) -> None:
-    """Put the depth camera's place, a stereo calibration, into a rig file."""
+    """Put the depth camera's pose, a stereo calibration, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
 
@@ -99,8 +206,9 @@ def make(arguments: argparse.Namespace) -> None:
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
 
 
+@command(arg("input", type=Path, help="rig file"), json=True)
 def check(arguments: argparse.Namespace) -> None:
-    """Check a rig file: every field, what a person would ask of it, and how it was calibrated."""
+    """Check a rig file: every field, its plausibility, and how it was calibrated."""
     from handcal.rig.report import report_rig
 
     rig = _read_rig(arguments.input)
@@ -115,8 +223,13 @@ def check(arguments: argparse.Namespace) -> None:
         raise HandcalError(f"{doubtful} of {len(findings)} findings are doubtful; see above")
 
 
+@command(
+    arg("a", type=Path, help="rig file"),
+    arg("b", type=Path, help="another rig file"),
+    json=True,
+)
 def compare(arguments: argparse.Namespace) -> None:
-    """Compare two rig files, and say how far apart they draw."""
+    """Compare two rig files, and show how far apart they draw."""
     from handcal.rig.compare import compare_rigs
 
     differences = compare_rigs(_read_rig(arguments.a), _read_rig(arguments.b))
@@ -127,99 +240,13 @@ def compare(arguments: argparse.Namespace) -> None:
     save(arguments.json, {"differences": [asdict(one) for one in differences]})
 
 
+@command(
+    arg("input", type=Path, help="rig file"),
+    arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+)
 def migrate(arguments: argparse.Namespace) -> None:
-    """Write a rig file of any known version as one of the newest."""
+    """Convert a rig file of any known version to the newest."""
     _write(arguments.output, _read_rig(arguments.input))
-
-
-def add_rig_file_commands(commands: Commands) -> None:
-    """Add ``handcal rig grid, display, make, check, compare, migrate``."""
-    from handcal.types import EYES
-
-    one = add_command(commands, grid, json=False)
-    side = number(int, 60, 16384)
-    one.add_argument(
-        "--display",
-        type=side,
-        nargs=2,
-        metavar=("WIDTH", "HEIGHT"),
-        default=(1268, 720),
-        help="size of the display",
-    )
-    one.add_argument("--png", type=Path, metavar="FILE", required=True, help="where to write it")
-    add_square_option(one)
-
-    one = add_command(commands, display, json=False)
-    one.add_argument("images", type=Path, nargs="+", help="images of the grid, or folders of them")
-    one.add_argument("--eye", choices=EYES, required=True, help="whose display")
-    one.add_argument("--camera-intrinsics", type=Path, required=True, help="the viewpoint camera's")
-    place = one.add_mutually_exclusive_group(required=True)
-    place.add_argument(
-        "--stereo",
-        type=Path,
-        metavar="FILE",
-        help="its place, as JSON from 'handcal rig stereo' with it as the depth camera",
-    )
-    place.add_argument(
-        "--tracked",
-        type=Path,
-        metavar="FILE",
-        help="poses of the board in the --board-images, as JSON",
-    )
-    one.add_argument(
-        "--board-images", type=Path, nargs="+", default=(), help="of the board that was tracked"
-    )
-    metres = number(float, 0.1, 100.0)
-    distance = one.add_mutually_exclusive_group(required=True)
-    distance.add_argument("--distance-m", type=metres, help="z(C0→S) as measured")
-    distance.add_argument(
-        "--square-arcmin",
-        type=number(float, 1.0, 10_000.0),
-        help="what a square of the grid subtends at the --nominal-distance-m, to solve z(C0→S)",
-    )
-    one.add_argument("--nominal-distance-m", type=metres, default=2.0, help="of the virtual image")
-    one.add_argument(
-        "--view",
-        type=Path,
-        metavar="FILE",
-        help="T_V_H, from the headset rig to this eye's rendering camera as the headset reports "
-        "it: 4 rows of 4 numbers, metres, x right, y down, z forward; as in --rig if absent",
-    )
-    one.add_argument("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out")
-    add_square_option(one)
-    add_board_options(one)
-    _add_rig_and_output(one)
-
-    one = add_command(commands, make, json=False)
-    one.add_argument("--stereo", type=Path, required=True, help="JSON from 'handcal rig stereo'")
-    one.add_argument(
-        "--depth-intrinsics",
-        type=Path,
-        help="the depth imager's own, if the stereo images are the colour imager's",
-    )
-    one.add_argument(
-        "--depth-to-color", type=Path, metavar="FILE", help="pose from depth to colour, as well"
-    )
-    one.add_argument("--name", help="of the rig; as before if absent")
-    _add_rig_and_output(one)
-
-    one = add_command(commands, check)
-    one.add_argument("input", type=Path, help="rig file")
-
-    one = add_command(commands, compare)
-    one.add_argument("a", type=Path, help="rig file")
-    one.add_argument("b", type=Path, help="rig file")
-
-    one = add_command(commands, migrate, json=False)
-    one.add_argument("input", type=Path, help="rig file")
-    one.add_argument("--output", type=Path, required=True, help="rig file to write")
-
-
-def _add_rig_and_output(command: Parser) -> None:
-    command.add_argument(
-        "--rig", type=Path, help="rig file to start from; the shipped example if absent"
-    )
-    command.add_argument("--output", type=Path, required=True, help="rig file to write")
 
 
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:

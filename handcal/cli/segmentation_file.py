@@ -1,4 +1,4 @@
-"""A segmented hand as files that people and other programs open."""
+"""A segmented hand as files for people and other programs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def write_segmentation(cloud: HandCloud, frame: Frame, folder: Path) -> None:
     ----------
     cloud : HandCloud
     frame : Frame
-        The one that `cloud` comes from.
+        The frame that `cloud` was segmented in.
     folder : Path
         Created if missing.
 

@@ -1,7 +1,4 @@
-"""``handcal study …``: studies on simulated wearers, in many processes, with a report.
-
-Commands import what they need when they run.
-"""
+"""``handcal study``: studies on simulated wearers, in many processes, with a report."""
 
 from __future__ import annotations
 
@@ -11,17 +8,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.terminal import (
-    Commands,
-    add_command,
-    console,
-    fail,
-    number,
-    progress,
-    save,
-    table,
-    until_interrupted,
-)
+from handcal.cli.output import console, progress, save, table, until_interrupted
+from handcal.cli.terminal import Option, arg, command, fail, number
 from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
@@ -30,8 +18,40 @@ if TYPE_CHECKING:
     from handcal.report.document import Report
 
 
+def _study_options(name: str) -> tuple[Option, ...]:
+    return (
+        arg(
+            "--output",
+            type=Path,
+            metavar="FOLDER",
+            default=Path(f"results/study-{name}"),
+            help="folder for this study only; an unfinished study is resumed",
+        ),
+        arg(
+            "--workers",
+            type=number(int, 1, 1024),
+            metavar="N",
+            help="number of processes (default: one per core)",
+        ),
+        arg(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Dask cluster to run on, such as tcp://HOST:PORT (default: this computer)",
+        ),
+        arg(
+            "--seed",
+            type=number(int, 0, 2**32 - 1),
+            metavar="N",
+            default=1,
+            help="random seed of the whole study",
+        ),
+        arg("--quick", action="store_true", help="few trials: do not report the figures"),
+    )
+
+
+@command(*_study_options("noise"), json=True)
 def noise(arguments: argparse.Namespace) -> None:
-    """Repeat the paper's simulation, and disturb the solvers by what it left out."""
+    """Repeat the paper's simulation, and add disturbances that it left out."""
     from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
     from handcal.lab.study.noise_report import noise_report
 
@@ -40,6 +60,23 @@ def noise(arguments: argparse.Namespace) -> None:
     _run(arguments, noise_study(settings), lambda rows: noise_report(settings, rows))
 
 
+@command(
+    arg(
+        "--wearers",
+        type=number(int, 2, 10_000),
+        metavar="N",
+        help="simulated wearers in each population (default: the study's own number)",
+    ),
+    arg(
+        "--fit-noise",
+        type=number(int, 2, 1000),
+        metavar="N",
+        help="first find the noise at which the paper's method has its published error, with N "
+        "wearers",
+    ),
+    *_study_options("methods"),
+    json=True,
+)
 def methods(arguments: argparse.Namespace) -> None:
     """Compare calibration methods on the same simulated wearers."""
     from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
@@ -67,6 +104,10 @@ def methods(arguments: argparse.Namespace) -> None:
     _run(arguments, methods_study(settings), lambda rows: methods_report(settings, rows))
 
 
+@command(
+    arg("folder", type=Path, help="folder 'dataset' of github.com/YutaItoh/HMD-Calibration"),
+    json=True,
+)
 def recorded(arguments: argparse.Namespace) -> None:
     """Run SPAAM and INDICA on the public recordings of Itoh and Klinker."""
     from handcal.lab.study.recorded import evaluate_recordings, read_recordings
@@ -84,44 +125,6 @@ def recorded(arguments: argparse.Namespace) -> None:
         )
     console.print("Mean errors of SPAAM, ours and the authors', and of INDICA's two setups, in px.")
     console.print(shown)
-
-
-def add_study_commands(commands: Commands) -> None:
-    """Add ``handcal study …``."""
-    data = add_command(commands, recorded)
-    data.add_argument("folder", type=Path, help="of github.com/YutaItoh/HMD-Calibration: dataset")
-    for command in (noise, methods):
-        one = add_command(commands, command)
-        if command is methods:
-            one.add_argument(
-                "--wearers", type=number(int, 2, 10_000), metavar="N", help="of each population"
-            )
-            one.add_argument(
-                "--fit-noise",
-                type=number(int, 2, 1000),
-                metavar="N",
-                help="search first, with so many wearers, for the noise at which the paper's "
-                "method errs as published",
-            )
-        one.add_argument(
-            "--output",
-            type=Path,
-            default=Path(f"results/study-{command.__name__}"),
-            help="folder of this study alone; one that is not done is gone on with",
-        )
-        one.add_argument(
-            "--workers",
-            type=number(int, 1, 1024),
-            metavar="N",
-            help="processes; one a core if absent",
-        )
-        one.add_argument(
-            "--scheduler", metavar="ADDRESS", help="of a Dask cluster to run on: tcp://HOST:PORT"
-        )
-        one.add_argument(
-            "--seed", type=number(int, 0, 2**32 - 1), default=1, help="of all that is random"
-        )
-        one.add_argument("--quick", action="store_true", help="few trials: only a look")
 
 
 def _run(

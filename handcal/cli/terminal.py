@@ -1,76 +1,107 @@
-"""What the commands share: how arguments are read, and results and progress shown."""
+"""Arguments and errors of the command line.
+
+Imports neither NumPy nor rich, so that ``handcal --help`` answers at once.
+"""
 
 from __future__ import annotations
 
 import argparse
 import math
 import os
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
-
-from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias
 
 from handcal.errors import HandcalError
-from handcal.io.files import make_folder, write_json
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-console = Console(soft_wrap=True, highlight=False)
+Run: TypeAlias = Callable[[argparse.Namespace], None]
+Option: TypeAlias = "Callable[[argparse._ActionsContainer], object]"
+"""Adds one or more arguments to a parser."""
+
+
+class Command(NamedTuple):
+    """A function that can be called from the command line, and its options."""
+
+    run: Run
+    options: tuple[Option, ...]
+
+    def add_to(self, parser: Parser) -> None:
+        """Add the options to the command's parser."""
+        parser.formatter_class = _Help
+        for add in self.options:
+            add(parser)
+        parser.set_defaults(command=self.run)
+
+
+def command(*options: Option, json: bool = False) -> Callable[[Run], Command]:
+    """Make a function a command with these options; with `json`, also ``--json``."""
+    if json:
+        save = arg("--json", type=Path, metavar="FILE", help="also write the results as JSON")
+        options = (*options, save)
+    return lambda run: Command(run, options)
+
+
+def arg(*names: str, **settings: Any) -> Option:
+    """Return an argument of a command, given as to argparse's ``add_argument``."""
+    return lambda parser: parser.add_argument(*names, **settings)
+
+
+def one_of(*options: Option) -> Option:
+    """Return options of which exactly one must be given."""
+
+    def add(parser: argparse._ActionsContainer) -> None:
+        group = parser.add_mutually_exclusive_group(required=True)
+        for add_option in options:
+            add_option(group)
+
+    return add
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
+    """A parser that reports an error in one line."""
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
-        """Print the help; unlike argparse, OSError if it cannot be written."""
+        """Print the help; unlike argparse, raise OSError if it cannot be written."""
         print(self.format_help(), end="", file=file)
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong with the arguments, and end."""
+        """Print the error and exit with code 2."""
         fail(f"{message}; see {self.prog} --help", 2)
 
+    # Any, since argparse overloads this method.
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the arguments; report unknown ones with the help of the command they were for."""
+        parsed, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return parsed, unknown
 
-Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
+class _Help(argparse.HelpFormatter):
+    """Shows the default of every option that has one."""
 
-class _Help(argparse.ArgumentDefaultsHelpFormatter):
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        has_default = action.default is not None and action.default is not False
-        return super()._get_help_string(action) if has_default else action.help
-
-
-def add_command(
-    commands: Commands, command: Callable[[argparse.Namespace], None], *, json: bool = True
-) -> Parser:
-    """Add a command that is called and described as its function; with `json`, ``--json`` too."""
-    text = command.__doc__
-    added: Parser = commands.add_parser(
-        command.__name__, help=text, description=text, formatter_class=_Help
-    )
-    added.set_defaults(command=command)
-    if json:
-        added.add_argument("--json", type=Path, metavar="FILE", help="write the results here too")
-    return added
+        default = action.default
+        if default is None or default is False or default in ("", (), argparse.SUPPRESS):
+            return action.help
+        shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
+        return f"{action.help} (default: {shown})"
 
 
 def fail(message: str, code: int) -> NoReturn:
-    """Say one line on standard error, and end with an exit code."""
+    """Print one line to standard error and exit with a code."""
     sys.stderr.write(f"handcal: {' '.join(message.split())}\n")
     sys.exit(code)
 
 
 @contextmanager
 def errors_in_one_line() -> Iterator[None]:
-    """End the program with one line for every foreseen error inside the block."""
+    """Turn every expected error inside the block into one line and an exit code."""
     try:
         with _flushed():
             yield
@@ -88,7 +119,7 @@ def errors_in_one_line() -> Iterator[None]:
 
 @contextmanager
 def _flushed() -> Iterator[None]:
-    """Write out what the block printed, also if it ends the program, as ``--help`` does."""
+    """Flush the output of the block, also if it exits the program, as ``--help`` does."""
     try:
         yield
     except SystemExit:
@@ -119,63 +150,7 @@ def number(kind: type[int] | type[float], low: float, high: float) -> Callable[[
             value = math.nan
         if not low <= value <= high:
             what = "whole number" if kind is int else "number"
-            raise argparse.ArgumentTypeError(f"{text!r} is no {what} from {low} to {high}")
+            raise argparse.ArgumentTypeError(f"{text!r} is not a {what} from {low} to {high}")
         return value
 
     return convert
-
-
-def save(path: Path | None, result: dict[str, Any]) -> None:
-    """Write a result as JSON, if a path is given."""
-    if path is not None:
-        make_folder(path.parent)
-        write_json(path, result)
-
-
-def table(*columns: str) -> Table:
-    """Return an empty table, its numbers to the right of a first column that gives way."""
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for place, column in enumerate(columns):
-        made.add_column(
-            column,
-            justify="right" if place else "left",
-            no_wrap=place > 0,
-            overflow="ellipsis" if place else "fold",
-        )
-    return made
-
-
-@contextmanager
-def progress() -> Iterator[Callable[[str, float], None]]:
-    """Yield a function that shows what is going on: a bar on a terminal, else plain lines."""
-    if not console.is_terminal:
-        last = ("", 0)
-
-        def say(what: str, share: float) -> None:
-            nonlocal last
-            if last != (what, int(10 * share)):
-                last = what, int(10 * share)
-                console.print(f"{100 * share:3.0f} % {what}", markup=False)
-
-        yield say
-        return
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda what, share: bar.update(task, description=what, completed=share)
-
-
-@contextmanager
-def until_interrupted() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether Ctrl+C was pressed; the second time it interrupts as ever."""
-    is_stopped = threading.Event()
-
-    def stop(*_: object) -> None:
-        is_stopped.set()
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, stop)
-    try:
-        yield is_stopped.is_set
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -208,19 +208,19 @@ def test_the_command_says_what_it_kept_and_what_it_passed_over(
     assert run(monkeypatch, videos[0], *board, "--most", 2, "--output", out) == 0
     said = capsys.readouterr().out
     assert "2 kept in " in said
-    assert "moments passed over: the board moves" in said
+    assert "moments skipped: the board moves" in said
     assert len(list(out.glob("views*-*.png"))) == 2
 
     assert run(monkeypatch, videos[0], "--output", out, "--seconds", 0.5) == 1
     heard = capsys.readouterr()
-    assert "passed over: the board is not seen" in heard.out
+    assert "skipped: the board is not seen" in heard.out
     assert "no image was kept" in heard.err
 
 
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("1", "--headset", "1"), 2, "cannot be both"),
+        (("1", "--headset", "1"), 2, "must differ"),
         (("99",), 1, "there is no camera 99"),
         (("nothing.mp4",), 1, "there is no video nothing.mp4"),
         (("nothing.db3",), 1, "there is no recording nothing.db3"),

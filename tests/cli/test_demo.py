@@ -135,7 +135,7 @@ def test_a_torn_session_is_solved_with_another_method(
     monkeypatch.setattr(sys, "argv", ["handcal", *arguments])
     main()
     assert json.loads(again.read_text())["method"] == "icp"
-    assert "last line is unfinished" in capsys.readouterr().out
+    assert "last line is incomplete" in capsys.readouterr().out
 
 
 def test_the_reprojection_error_is_that_of_the_true_eyes() -> None:

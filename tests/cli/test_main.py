@@ -248,7 +248,7 @@ def test_doctor_fails_only_for_what_must_be_mended(
     assert capsys.readouterr().out == "note     Camera: none connected\n         → plug one in\n"
     problem = Finding("scipy", Health.BROKEN, "not installed", "install it")
     monkeypatch.setattr(doctor, "examine", lambda: [note, problem])
-    assert fails("doctor") == (1, "handcal: something must be mended first; see above\n")
+    assert fails("doctor") == (1, "handcal: fix the problems listed above and try again\n")
 
 
 @pytest.mark.parametrize(
@@ -256,20 +256,23 @@ def test_doctor_fails_only_for_what_must_be_mended(
     [
         ("", "required: COMMAND; see handcal --help"),
         ("frobnicate", "invalid choice: 'frobnicate'"),
-        ("demo --seed -1", "'-1' is no whole number from 0 to 4294967295; see handcal demo --help"),
-        ("demo --seed 1.5", "'1.5' is no whole number"),
-        ("demo --alignments 0", "'0' is no whole number from 1 to 20"),
-        ("demo --loss nan", "'nan' is no number from 0.0 to 1.0"),
-        ("demo --loss 1.1", "'1.1' is no number from 0.0 to 1.0"),
+        (
+            "demo --seed -1",
+            "'-1' is not a whole number from 0 to 4294967295; see handcal demo --help",
+        ),
+        ("demo --seed 1.5", "'1.5' is not a whole number"),
+        ("demo --alignments 0", "'0' is not a whole number from 1 to 20"),
+        ("demo --loss nan", "'nan' is not a number from 0.0 to 1.0"),
+        ("demo --loss 1.1", "'1.1' is not a number from 0.0 to 1.0"),
         ("demo --eyes three", "invalid choice: 'three' (choose from 'both', 'each')"),
         ("demo --seed 1 --nonsense", "unrecognized arguments: --nonsense"),
         ("segment --color a.png", "required: --depth, --intrinsics, --output"),
         ("solve", "required: session"),
         ("solve somewhere --method fast", "invalid choice: 'fast'"),
-        ("headset --port 0", "'0' is no whole number from 1 to 65535"),
+        ("headset --port 0", "'0' is not a whole number from 1 to 65535"),
         ("headset", "required: --port"),
         ("record", "required: output"),
-        ("record a --seconds 0", "'0' is no number from 0.01"),
+        ("record a --seconds 0", "'0' is not a number from 0.01"),
         ("record a --profile 640x480", "invalid choice: '640x480'"),
         ("bench --json", "expected one argument"),
         ("doctor --json it", "unrecognized arguments"),
@@ -394,6 +397,21 @@ def test_the_program_itself_ends_with_one_line(tmp_path: Path) -> None:
     assert ended.stderr.startswith(f"handcal: {tmp_path} is no session")
     assert ended.stderr.count("\n") == 1
     assert ended.stdout == ""
+
+
+def test_opencv_adds_no_line_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "text.txt").write_text("text")
+    ended = subprocess.run(
+        [sys.executable, "-m", "handcal", "rig", "take", "text.txt", "--output", "out"],
+        cwd=tmp_path,
+        env={name: value for name, value in os.environ.items() if name != "OPENCV_LOG_LEVEL"}
+        | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("handcal: text.txt ")
+    assert ended.stderr.count("\n") == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")

@@ -130,7 +130,7 @@ def test_a_board_without_a_file_is_misuse(
     with pytest.raises(SystemExit) as ended:
         rig("board")
     assert ended.value.code == 2
-    assert "say where the board goes" in capsys.readouterr().err
+    assert "no output given; add --pdf FILE" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

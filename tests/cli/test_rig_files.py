@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.cli.rig_files import add_rig_file_commands
-from handcal.cli.terminal import Parser
+from handcal.cli.main import parse
 from handcal.display import view_of_eye
 from handcal.errors import HandcalError
 from handcal.geometry import invert, rigid
@@ -32,9 +31,7 @@ PICTURES = PictureSettings(samples=1)
 
 
 def run(*words: object) -> None:
-    parser = Parser(prog="handcal rig")
-    add_rig_file_commands(parser.add_subparsers(required=True, parser_class=Parser))
-    arguments = parser.parse_args([str(word) for word in words])
+    arguments = parse(["rig", *map(str, words)])
     arguments.command(arguments)
 
 

@@ -105,9 +105,9 @@ def test_a_folder_of_another_seed_is_refused(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--workers", "0"), "'0' is no whole number from 1 to 1024"),
-        (("--workers", "many"), "'many' is no whole number"),
-        (("--seed", "-1"), "'-1' is no whole number"),
+        (("--workers", "0"), "'0' is not a whole number from 1 to 1024"),
+        (("--workers", "many"), "'many' is not a whole number"),
+        (("--seed", "-1"), "'-1' is not a whole number"),
     ],
 )
 def test_wrong_arguments(

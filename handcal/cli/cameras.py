@@ -1,0 +1,222 @@
+"""``handcal record, replay, segment``: cameras, recordings and single images."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from handcal.camera.settings import Preset, Profile, RealSenseSettings
+from handcal.cli.output import console, progress, save, table, until_interrupted
+from handcal.cli.terminal import arg, command, number
+from handcal.errors import HandcalError
+from handcal.hand.settings import Roi
+from handcal.io.files import make_folder
+
+if TYPE_CHECKING:
+    from handcal.camera.camera import Camera
+    from handcal.cli.replay import ReplayStep
+
+
+_POSITIVE = number(float, 0.0, 1e6)
+REALSENSE_OPTIONS = (
+    arg("--serial", default="", help="serial number of the RealSense (default: the first found)"),
+    arg(
+        "--profile",
+        choices=get_args(Profile),
+        default="auto",
+        help="size of the RealSense's images; auto: the largest on offer",
+    ),
+    arg(
+        "--preset",
+        choices=get_args(Preset),
+        help="visual preset of the SDK (default: unchanged)",
+    ),
+    arg(
+        "--exposure-us",
+        type=_POSITIVE,
+        metavar="US",
+        help="exposure time of the depth camera (default: automatic)",
+    ),
+    arg(
+        "--laser-power-mw",
+        type=_POSITIVE,
+        metavar="MW",
+        help="power of the projector (default: unchanged)",
+    ),
+    arg("--spatial-filter", action="store_true", help="apply the SDK's spatial filter to depth"),
+    arg("--temporal-filter", action="store_true", help="apply the SDK's temporal filter to depth"),
+    arg("--hole-filling", action="store_true", help="apply the SDK's hole filling to depth"),
+)
+"""One for every field of `RealSenseSettings`."""
+_ROI = arg(
+    "--roi",
+    choices=get_args(Roi),
+    default="detector",
+    help="search region: detector, the hand that the detector finds in the colour image (the "
+    "nearest of several); left or right, the leftmost or rightmost of them; depth, the nearest "
+    "hand-sized object, without the detector",
+)
+
+
+@command(
+    arg("output", type=Path, help="a .db3 file, or a new folder"),
+    arg("--source", default="realsense", help="realsense, simulator, or a recording to convert"),
+    arg(
+        "--seconds",
+        type=number(float, 0.01, 86_400.0),
+        metavar="S",
+        default=60.0,
+        help="stop after this time",
+    ),
+    arg(
+        "--frames",
+        type=number(int, 1, 100_000),
+        metavar="N",
+        default=100_000,
+        help="stop after this many frames",
+    ),
+    arg(
+        "--seed",
+        type=number(int, 0, 2**32 - 1),
+        metavar="N",
+        default=1,
+        help="random seed of the simulated hand and room",
+    ),
+    *REALSENSE_OPTIONS,
+    json=True,
+)
+def record(arguments: argparse.Namespace) -> None:
+    """Record a camera into a .db3 file or a folder of images."""
+    from handcal.camera.record import RecordSettings
+    from handcal.camera.record import record as record_camera
+
+    settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
+    with _open_source(arguments) as camera, until_interrupted() as is_stopped:
+        said = f"Recording {camera.name}; press Ctrl+C to stop and keep the recording."
+        console.print(said, markup=False)
+        try:
+            with progress() as report:
+                recorded = record_camera(camera, arguments.output, settings, report, is_stopped)
+        except ValueError as error:
+            raise HandcalError(str(error)) from error
+    save(arguments.json, asdict(recorded))
+    console.print(
+        f"{recorded.frames} frames, {recorded.duration_s:.1f} s, {recorded.dropped} dropped; "
+        f"ended: {recorded.stop_reason}. Recording: {arguments.output}"
+    )
+
+
+@command(
+    arg("recording", type=Path, help=".db3 or .bag file, or a recorded folder"),
+    arg(
+        "--real-time", action="store_true", help="play at the recorded frame rate, dropping frames"
+    ),
+    _ROI,
+    json=True,
+)
+def replay(arguments: argparse.Namespace) -> None:
+    """Play a recording and segment the hand in every frame."""
+    from handcal.camera.playback import PlaybackSettings
+    from handcal.camera.recordings import open_recording
+    from handcal.cli.replay import replay as play
+    from handcal.hand.settings import SegmentSettings
+
+    shown_table = table("frame", "points", "depth, m", "rotation, °", "shift, mm", "time, ms")
+    rows: list[dict[str, Any]] = []
+    playback = PlaybackSettings(real_time=arguments.real_time)
+    with open_recording(arguments.recording, playback) as camera:
+        for step in play(camera, SegmentSettings(roi=arguments.roi)):
+            rows.append(_replay_row(step))
+            shown = list(rows[-1].values())[:-1]
+            shown_table.add_row(*map(_cell, shown))
+    console.print(shown_table)
+    save(arguments.json, {"frames": rows})
+    for row in rows:
+        if row["problem"]:
+            console.print(f"Frame {row['frame']}: {row['problem']}")
+    found = sum(not row["problem"] for row in rows)
+    console.print(f"{found} of {len(rows)} frames show a hand.")
+
+
+@command(
+    arg("--color", type=Path, metavar="FILE", required=True, help="colour image"),
+    arg(
+        "--depth",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="16-bit PNG, aligned to the colour image",
+    ),
+    arg(
+        "--intrinsics",
+        type=Path,
+        metavar="FILE",
+        required=True,
+        help="JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit",
+    ),
+    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the results"),
+    _ROI,
+)
+def segment(arguments: argparse.Namespace) -> None:
+    """Segment the hand in one image pair: cloud, contour, mask and overlay."""
+    from handcal.camera.images import read_frame
+    from handcal.cli.segmentation_file import write_segmentation
+    from handcal.hand.settings import SegmentSettings
+    from handcal.hand.shipped import make_finder
+
+    frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)
+    cloud = make_finder(SegmentSettings(roi=arguments.roi)).find(frame)
+    write_segmentation(cloud, frame, make_folder(arguments.output))
+    console.print(
+        f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
+        f"box {', '.join(map(str, cloud.box_px))} px. Results: {arguments.output}"
+    )
+
+
+def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
+    """Return the settings that the options describe."""
+    names = [field.name for field in fields(RealSenseSettings)]
+    return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
+
+
+def _open_source(arguments: argparse.Namespace) -> Camera:
+    """Open the camera that a command's ``--source`` names."""
+    from handcal.camera.realsense import RealSenseCamera
+    from handcal.camera.recordings import open_recording
+    from handcal.sim.camera import SyntheticCamera
+    from handcal.sim.hand import make_hand
+    from handcal.sim.render import World
+    from handcal.sim.room import make_room
+    from handcal.sim.sway import swaying_hand
+
+    match arguments.source:
+        case "simulator":
+            world = World(make_hand(arguments.seed), make_room(arguments.seed))
+            return SyntheticCamera(world, swaying_hand, seed=arguments.seed)
+        case "realsense":
+            return RealSenseCamera(realsense_of(arguments))
+        case path:
+            return open_recording(Path(path))
+
+
+def _replay_row(step: ReplayStep) -> dict[str, Any]:
+    import numpy as np
+
+    hand, motion = step.hand, step.motion
+    return {
+        "frame": step.frame.index,
+        "points": len(hand.points_m) if hand else None,
+        "median_depth_m": hand.median_depth_m if hand else None,
+        "turned_deg": float(np.degrees(np.linalg.norm(motion.rotation_rad))) if motion else None,
+        "moved_mm": float(1e3 * np.linalg.norm(motion.shift_m)) if motion else None,
+        "segment_ms": 1e3 * step.segment_s,
+        "problem": step.problem,
+    }
+
+
+def _cell(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

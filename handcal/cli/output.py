@@ -1,0 +1,80 @@
+"""Tables, progress bars and result files of the commands."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from handcal.io.files import make_folder, write_json
+
+console = Console(soft_wrap=True, highlight=False)
+
+
+def table(*columns: str) -> Table:
+    """Return an empty table: a first column that wraps, and right-aligned columns of numbers."""
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for place, column in enumerate(columns):
+        made.add_column(
+            column,
+            justify="right" if place else "left",
+            no_wrap=place > 0,
+            overflow="ellipsis" if place else "fold",
+        )
+    return made
+
+
+def save(path: Path | None, result: dict[str, Any]) -> None:
+    """Write a result as JSON, if there is a path; create its folder."""
+    if path is not None:
+        make_folder(path.parent)
+        write_json(path, result)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float], None]]:
+    """Yield a function that shows progress: a bar on a terminal, else plain lines."""
+    if not console.is_terminal:
+        last = ("", 0)
+
+        def say(what: str, share: float) -> None:
+            nonlocal last
+            if last != (what, int(10 * share)):
+                last = what, int(10 * share)
+                console.print(f"{100 * share:3.0f} % {what}", markup=False)
+
+        yield say
+        return
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda what, share: bar.update(task, description=what, completed=share)
+
+
+@contextmanager
+def until_interrupted() -> Iterator[Callable[[], bool]]:
+    """Yield a function that returns whether Ctrl+C was pressed; a second press interrupts."""
+    is_stopped = threading.Event()
+
+    def stop(*_: object) -> None:
+        is_stopped.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield is_stopped.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def triple(values: Iterable[float]) -> str:
+    """Return a vector's components in one cell, to a tenth."""
+    return " ".join(f"{value:.1f}" for value in values)

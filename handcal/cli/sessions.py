@@ -1,0 +1,103 @@
+"""``handcal solve, export``: stored sessions."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from handcal.cli.output import console, progress, save, table, triple
+from handcal.cli.terminal import arg, command, fail, number
+from handcal.errors import FileError
+from handcal.export.formats import FORMATS
+from handcal.types import METHODS
+
+_METRES = number(float, 1e-3, 1e6)
+
+
+@command(
+    arg("session", type=Path, help="session folder"),
+    arg("--method", choices=METHODS, help="solver (default: the session's own)"),
+    json=True,
+)
+def solve(arguments: argparse.Namespace) -> None:
+    """Solve a stored session again; the session itself is not changed."""
+    import numpy as np
+
+    from handcal.register.results import results_json
+    from handcal.session.session import Session
+    from handcal.station.solve_again import solve_again, stored_solve_settings
+
+    record = Session.open(arguments.session)
+    if record.torn_bytes:
+        console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
+    settings = stored_solve_settings(record)
+    if arguments.method:
+        settings = replace(settings, method=arguments.method)
+    results = solve_again(record, settings)
+    if results is None:
+        raise FileError(f"{arguments.session} holds no alignment to solve")
+    save(arguments.json, results_json(results))
+    shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
+    for eye, shift in results.eyes.items():
+        shown_table.add_row(
+            eye,
+            triple(1e3 * shift.shift_m),
+            triple(1e3 * np.sqrt(np.diag(shift.covariance_m2))),
+            f"{1e3 * shift.rms_m:.2f}",
+            f"{100 * shift.inlier_ratio:.0f} %",
+            results.verdicts[eye].name,
+        )
+    console.print(shown_table)
+    for eye, verdict in results.verdicts.items():
+        console.print(f"{eye}: {verdict.name}: {verdict.reason}")
+    if results.eye_distance_m is not None:
+        console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
+
+
+@command(
+    arg("session", type=Path, help="session folder"),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for the files (default: results/export/NAME)",
+    ),
+    arg(
+        "--format",
+        action="append",
+        choices=tuple(FORMATS),
+        help="format to write; may be repeated (default: all)",
+    ),
+    arg(
+        "--near-m",
+        type=_METRES,
+        metavar="M",
+        default=0.1,
+        help="near clipping plane for OpenGL, metres",
+    ),
+    arg(
+        "--far-m",
+        type=_METRES,
+        metavar="M",
+        default=100.0,
+        help="far clipping plane for OpenGL, metres",
+    ),
+)
+def export(arguments: argparse.Namespace) -> None:
+    """Export a session: report, tables, calibration, clouds, and the session as one file."""
+    from handcal.export.export import ExportSettings, export_session
+    from handcal.session.session import Session
+
+    try:
+        settings = ExportSettings(
+            tuple(arguments.format or FORMATS), arguments.near_m, arguments.far_m
+        )
+    except ValueError as error:
+        fail(str(error), 2)
+    record = Session.open(arguments.session)
+    folder = arguments.output or Path("results/export") / record.path.absolute().name
+    with progress() as report:
+        files = export_session(record, folder, settings, report, lambda: False)
+    for file in files:
+        console.print(str(file))

@@ -1,0 +1,166 @@
+"""``handcal demo, headset``: a simulated wearer."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from handcal.cli.output import console, progress, save, table, triple
+from handcal.cli.terminal import arg, command, number
+from handcal.io.files import make_folder
+
+_SEED = number(int, 0, 2**32 - 1)
+_SHARE = number(float, 0.0, 1.0)
+_PORT = number(int, 1, 65535)
+_RIG = arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)")
+_LINK = (
+    arg("--loss", type=_SHARE, metavar="P", default=0.0, help="share of datagrams lost"),
+    arg("--reorder", type=_SHARE, metavar="P", default=0.0, help="share of datagrams reordered"),
+)
+
+
+@command(
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        default=Path("results/demo"),
+        help="folder in which the session is created",
+    ),
+    arg(
+        "--seed",
+        type=_SEED,
+        metavar="N",
+        default=1,
+        help="random seed of the wearer, hand, room and noise",
+    ),
+    arg(
+        "--alignments",
+        type=number(int, 1, 20),
+        default=1,
+        metavar="K",
+        help="number of alignments; with --eyes each, of each eye",
+    ),
+    arg(
+        "--eyes",
+        choices=("both", "each"),
+        default="both",
+        help="align both eyes at once, or each eye alone",
+    ),
+    *_LINK,
+    _RIG,
+    arg(
+        "--worn-rig",
+        type=Path,
+        metavar="FILE",
+        help="true rig of the simulated headset (default: the same as --rig)",
+    ),
+    json=True,
+)
+def demo(arguments: argparse.Namespace) -> None:
+    """Calibrate a simulated wearer from start to end, and compare with the truth."""
+    from handcal.cli.demo import DemoSettings, run_demo
+
+    settings = DemoSettings(
+        seed=arguments.seed,
+        alignments=arguments.alignments,
+        eyes=arguments.eyes,
+        loss=arguments.loss,
+        reorder=arguments.reorder,
+        worn_rig=str(arguments.worn_rig or ""),
+    )
+    with progress() as report:
+        result = run_demo(settings, _rig_path(arguments.rig), make_folder(arguments.output), report)
+    save(arguments.json, result)
+    shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "error, mm", "verdict")
+    for eye, found in result["eyes"].items():
+        triples = [triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
+        shown_table.add_row(eye, *triples, f"{found['error_mm']:.1f}", found["verdict"])
+    console.print(shown_table)
+    for eye, found in result["eyes"].items():
+        console.print(f"{eye}: {found['verdict']}: {found['reason']}")
+    error, guard = result["reprojection_arcmin"], result["guard"]
+    console.print(
+        f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after\n"
+        f"Confirmations refused because the hand was rotated: {guard['rejected']}; "
+        f"largest rotation accepted: {guard['accepted_deg']:.1f}°\n"
+        f"Session: {result['session']}"
+    )
+
+
+@command(
+    arg("--port", type=_PORT, metavar="N", required=True, help="port on which the PC listens"),
+    arg(
+        "--scene-port",
+        type=_PORT,
+        metavar="N",
+        help="port of a simulated camera on this computer (default: no camera sees the wearer)",
+    ),
+    arg("--host", default="127.0.0.1", help="address of the PC"),
+    arg(
+        "--key-file",
+        type=Path,
+        metavar="FILE",
+        help="pairing key (default: the environment variable HANDCAL_PAIRING_KEY)",
+    ),
+    _RIG,
+    arg(
+        "--worn-rig",
+        type=Path,
+        metavar="FILE",
+        help="true rig of the headset (default: the same as --rig)",
+    ),
+    arg("--seed", type=_SEED, metavar="N", default=1, help="random seed of the wearer"),
+    *_LINK,
+    arg("--duplicate", type=_SHARE, metavar="P", default=0.0, help="share of datagrams duplicated"),
+    arg(
+        "--delay-ms",
+        type=number(float, 0.0, 10_000.0),
+        metavar="MS",
+        default=0.0,
+        help="delay of every datagram",
+    ),
+    arg(
+        "--clock-offset-ms",
+        type=number(float, -1e9, 1e9),
+        metavar="MS",
+        default=12345.0,
+        help="headset's clock minus the PC's",
+    ),
+    arg(
+        "--duration-s",
+        type=number(float, 0.0, 1e6),
+        metavar="S",
+        help="stop after this time (default: run until terminated)",
+    ),
+)
+def headset(arguments: argparse.Namespace) -> None:
+    """Run a virtual headset with a simulated wearer, connected by the real protocol."""
+    from handcal.link.impair import Impairment
+    from handcal.link.pairing import read_pairing_key
+    from handcal.sim.headset import HeadsetSettings, run_headset, until_terminated
+
+    settings = HeadsetSettings(
+        rig_path=str(_rig_path(arguments.rig)),
+        worn_rig_path=str(arguments.worn_rig or ""),
+        host=arguments.host,
+        port=arguments.port,
+        scene_port=arguments.scene_port,
+        seed=arguments.seed,
+        impairment=Impairment(
+            loss=arguments.loss,
+            duplicate=arguments.duplicate,
+            reorder=arguments.reorder,
+            delay_s=arguments.delay_ms / 1e3,
+            seed=arguments.seed,
+        ),
+        clock_offset_s=arguments.clock_offset_ms / 1e3,
+        duration_s=arguments.duration_s,
+    )
+    run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())
+
+
+def _rig_path(rig: Path | None) -> Path:
+    from handcal.io.resources import resource_path
+
+    return rig or resource_path("example_rig.yaml")
