@@ -1,1 +1,1 @@
-"""Widgets that any panel or page may be made of."""
+"""Widgets shared by panels, pages, dialogs and windows."""

@@ -1,4 +1,4 @@
-"""One line above everything for what went wrong, until it is mended or closed."""
+"""A one-line message about a problem, shown until it is solved or closed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from handcal_gui.widgets.sentence import sentence
 
 
 class Banner(QWidget):
-    """Shows the newest message; hidden while there is none.
+    """Shows the newest message; hidden if there is none.
 
-    A condition, which goes by itself, gives way to a message, which a person must close.
+    A message, which the user must close, takes precedence over a condition, which ends by itself.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -40,16 +40,16 @@ class Banner(QWidget):
 
     @property
     def text(self) -> str:
-        """What is shown; empty if nothing is."""
+        """The message shown; empty if there is none."""
         return self._message or self._condition
 
     def show_message(self, text: str) -> None:
-        """Show a message until it is closed or another comes."""
+        """Show a message until it is closed or replaced."""
         self._message = text
         self._refresh()
 
     def show_condition(self, text: str) -> None:
-        """Show what is wrong now; empty text takes it away."""
+        """Show a present problem; an empty text removes it."""
         if text != self._condition:
             self._condition = text
             self._refresh()

@@ -1,4 +1,4 @@
-"""What a technician may want to change of how a calibration runs."""
+"""Fields for the settings of a calibration."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _METHODS: dict[Method, str] = {
     "icp": "Rigid ICP",
 }
 _METHOD_HELP = (
-    "How the eye shift φ is solved from an alignment.\n"
-    "Consistent: exact model; copes with cut edges and a turned hand.\n"
-    "Linear: takes the hand's scale for 1, which shortens φ3.\n"
+    "Solver of the eye shift φ from an alignment.\n"
+    "Consistent: exact model; robust to cut edges and a rotated hand.\n"
+    "Linear: assumes a scale of 1, which underestimates φ3.\n"
     "As in the paper: Hu et al. 2021; slow.\n"
     "Rigid ICP: the paper's baseline."
 )
@@ -34,16 +34,16 @@ _ROIS: dict[Roi, str] = {
     "depth": "Depth alone",
 }
 _ROI_HELP = (
-    "How the hand is found.\n"
-    "Colour and depth: the hand detector says where to look first; of several hands\n"
-    "the nearest, or the one leftmost or rightmost in the camera's image.\n"
+    "Method of finding the hand.\n"
+    "Colour and depth: the hand detector selects where to search; of several hands\n"
+    "the nearest, or the leftmost or rightmost in the camera's image.\n"
     "Depth alone: the nearest hand-sized object."
 )
 _GATE_M = 0.05
 
 
 class CalibrationFields(QWidget):
-    """Rotation guard, depth gate, what finds the hand, and solver.
+    """Fields for rotation guard, depth gate, hand search and solver.
 
     Attributes
     ----------
@@ -60,13 +60,13 @@ class CalibrationFields(QWidget):
             45.0,
             0.5,
             " °",
-            "An alignment is refused while the hand is turned by more, against the cursor.",
+            "Limit of the hand's rotation from the cursor; beyond it an alignment is refused.",
         )
         self._near = number(
-            "gateNear", 0.10, 1.95, 0.05, " m", "What is nearer to the camera is not seen."
+            "gateNear", 0.10, 1.95, 0.05, " m", "Anything nearer to the camera is ignored."
         )
         self._far = number(
-            "gateFar", 0.15, 2.00, 0.05, " m", "What is farther from the camera is not seen."
+            "gateFar", 0.15, 2.00, 0.05, " m", "Anything farther from the camera is ignored."
         )
         self._roi = choice("roi", "Hand found by", _ROIS, _ROI_HELP)
         self._method = choice("method", "Solver", _METHODS, _METHOD_HELP)
@@ -94,7 +94,7 @@ class CalibrationFields(QWidget):
         self._method.setCurrentIndex(self._method.findData(settings.solve.method))
 
     def take(self, settings: CalibrationSettings) -> CalibrationSettings:
-        """Return settings with what is shown."""
+        """Return settings with the entered values."""
         return replace(
             settings,
             guard=replace(settings.guard, limit_rad=float(np.radians(self._guard.value()))),
@@ -112,7 +112,7 @@ class CalibrationFields(QWidget):
         self._form.addRow(label, field)
 
     def _push_far(self, near_m: float) -> None:
-        """Keep the gate open."""
+        """Keep the far limit beyond the near one."""
         self._far.setValue(max(self._far.value(), near_m + _GATE_M))
 
     def _push_near(self, far_m: float) -> None:

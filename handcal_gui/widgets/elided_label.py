@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 
 class ElidedLabel(QLabel):
-    """Leaves out the middle of what does not fit; the tooltip has all of it."""
+    """Elides the middle of a text that does not fit; the tooltip has the whole text."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -24,7 +24,7 @@ class ElidedLabel(QLabel):
         return QSize(0, super().minimumSizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw as much as fits."""
+        """Draw the elided text."""
         painter = QPainter(self)
         elide = Qt.TextElideMode.ElideMiddle
         text = self.fontMetrics().elidedText(self.text(), elide, self.width())

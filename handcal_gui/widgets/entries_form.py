@@ -1,4 +1,4 @@
-"""Some entries, kept in a dataclass, as fields in two columns."""
+"""A form with two columns of fields for the entries of a dataclass."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ Entries = TypeVar("Entries")
 
 
 class EntriesForm(QWidget):
-    """Shows some fields of a dataclass: paths, choices, ticks, texts and whole numbers.
+    """Shows fields of a dataclass: paths, choices, check boxes, texts and whole numbers.
 
     Parameters
     ----------
     fields : mapping of str to (str, QWidget)
-        By the dataclass's field: label and widget.
+        Label and widget of each field of the dataclass.
 
     Attributes
     ----------
@@ -65,12 +65,12 @@ class EntriesForm(QWidget):
             _show(field, getattr(entries, name))
 
     def enter(self, **values: object) -> None:
-        """Show other values of some fields, as if they had been typed."""
+        """Show other values of some fields, as if typed."""
         for name, value in values.items():
             _show(self._fields[name], value)
 
     def take(self, entries: Entries) -> Entries:
-        """Return entries with what is shown."""
+        """Return the entered values."""
         shown = {name: _value(field) for name, field in self._fields.items()}
         return cast(Entries, replace(cast(Any, entries), **shown))
 

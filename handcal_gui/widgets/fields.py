@@ -53,7 +53,7 @@ def whole_number(name: str, low: int, high: int, help_text: str) -> QSpinBox:
 
 
 def choice(name: str, label: str, options: Mapping[Option, str], help_text: str = "") -> QComboBox:
-    """Return a field for one of some options, given what each is called."""
+    """Return a field for a choice of options, given their labels."""
     field = named(QComboBox(), name, label, help_text)
     for option, text in options.items():
         field.addItem(text, option)
@@ -64,16 +64,16 @@ def choice(name: str, label: str, options: Mapping[Option, str], help_text: str 
 
 
 def button(name: str, text: str = "", label: str = "", help_text: str = "") -> QPushButton:
-    """Return a button that Enter presses, too, while it has the focus."""
+    """Return a button that Enter also presses while it has the focus."""
     return named(QPushButton(text, autoDefault=True), name, label or text, help_text)
 
 
 class MainButton(QPushButton):
-    """The one button of a page that leads on; the theme gives its class the accent colour."""
+    """The main button of a page; the theme gives this class the accent colour."""
 
 
 def main_button(name: str, text: str = "") -> MainButton:
-    """Return a page's main button: large, and what Enter presses."""
+    """Return a page's main button: large, and pressed by Enter."""
     made = named(MainButton(text, autoDefault=True), name, text)
     scale_font(made, 1.2, is_bold=True)
     made.setMinimumHeight(5 * SPACING_PX)
@@ -82,7 +82,7 @@ def main_button(name: str, text: str = "") -> MainButton:
 
 
 def tool_button() -> QToolButton:
-    """Return a tool button that stands out while it is checked, in the dark, too."""
+    """Return a tool button that stands out while checked, also in the dark theme."""
     made = QToolButton()
     made.setStyleSheet(
         "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text);"
@@ -92,7 +92,7 @@ def tool_button() -> QToolButton:
 
 
 def paragraph(name: str = "", text: str = "") -> QLabel:
-    """Return a label whose text is shown as it is, wrapped, and takes the width that there is."""
+    """Return a wrapped plain-text label that takes the available width."""
     label = QLabel(text, wordWrap=True, textFormat=Qt.TextFormat.PlainText)
     label.setObjectName(name)
     policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -102,7 +102,7 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
 
 
 def beside(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
-    """Lay widgets out in a row, without margins, to the left; one of them takes what is left."""
+    """Lay out widgets in a row without margins, from the left; one of them may stretch."""
     layout = QHBoxLayout(row)
     layout.setContentsMargins(0, 0, 0, 0)
     layout.setSpacing(SPACING_PX)
@@ -112,7 +112,7 @@ def beside(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
 
 
 def _settle(field: Spin) -> Spin:
-    """Align a number to the right, and keep its width whatever the number."""
+    """Align a number to the right, with a constant width."""
     field.setAlignment(Qt.AlignmentFlag.AlignRight)
     field.setSizePolicy(_FIXED, _FIXED)
     field.setMinimumWidth(12 * SPACING_PX)
@@ -121,11 +121,11 @@ def _settle(field: Spin) -> Spin:
 
 
 class _CalmWheel(QObject):
-    """Lets the wheel scroll the page, not the value, unless the field has the focus."""
+    """Lets the wheel scroll the page instead of the value, unless the field has the focus."""
 
     def __init__(self, field: QWidget) -> None:
         super().__init__(field)
-        field.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # which the wheel does not give
+        field.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # not by the wheel
         field.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:

@@ -1,4 +1,4 @@
-"""One line that says how it stands with something, and what to do about it."""
+"""A line that shows a finding and its remedy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WORDS = {Health.GOOD: "Good", Health.LIMITED: "Note", Health.BROKEN: "Problem"}
 
 
 class FindingLine(QWidget):
-    """Shows a finding by icon and text, with a button that mends it where one click can."""
+    """Shows a finding by icon and text, with a button to fix it where one click can."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)

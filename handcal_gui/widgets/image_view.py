@@ -1,4 +1,4 @@
-"""A picture as large as it fits, with whatever is drawn over it."""
+"""An image scaled to fit, with an overlay."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Image: TypeAlias = UInt8 | UInt16
 
 
 class ImageView(QWidget):
-    """Shows an image in its own shape, what is drawn over it, a message and a caption.
+    """Shows an image with its aspect ratio, an overlay, a message and a caption.
 
     Parameters
     ----------
     name : str
         For screen readers and, in lower case with dashes, as object name.
     colorize : callable or None
-        Makes RGB of an image of another kind, at the size it is shown at.
+        Converts another kind of image to RGB, at its displayed size.
     parent : QWidget or None
     """
 
@@ -48,34 +48,34 @@ class ImageView(QWidget):
 
     @property
     def has_image(self) -> bool:
-        """Whether there is an image to show."""
+        """True if there is an image."""
         return self._image is not None
 
     @property
     def message(self) -> str:
-        """Why there is no image, or only an old one, which is dimmed below the text."""
+        """Message about a missing or outdated image, which is dimmed behind the text."""
         return self._message
 
     @property
     def caption(self) -> str:
-        """What is to be said of the image."""
+        """Caption of the image."""
         return self._caption
 
     def show_image(self, image: Image | None) -> None:
-        """Show an image: (h, w, 3) uint8 RGB, (h, w) uint8 grey, or what `colorize` takes."""
+        """Show an image: (h, w, 3) uint8 RGB, (h, w) uint8 grey, or an input of `colorize`."""
         self._image, self._scaled = image, None
         self.update()
 
     def show_overlay(self, draw: Callable[[QPainter], None] | None) -> None:
-        """Draw over the image with a painter in its pixels, whose centres are at whole numbers.
+        """Set a function that draws over the image in its pixels, with centres at integers.
 
-        Pens should be cosmetic, or they grow with the image.
+        Pens should be cosmetic; others scale with the image.
         """
         self._overlay = draw
         self.update()
 
     def show_text(self, *, message: str = "", caption: str = "") -> None:
-        """Show a message across the dimmed image, or a caption at its foot."""
+        """Show a message across the dimmed image, or a caption below."""
         if (message, caption) != (self._message, self._caption):
             self._message, self._caption = message, caption
             self.setAccessibleDescription(message or caption)
@@ -103,7 +103,7 @@ class ImageView(QWidget):
             self._scaled = self._scale(image, size)
             self._scaled.setDevicePixelRatio(ratio)
         place = QRectF(QPointF(), QSizeF(*size) / ratio)
-        # Whole device pixels, or Qt would resample the image.
+        # Whole device pixels, so that Qt does not resample the image.
         place.moveTo(
             int((ratio * self.width() - size[0]) / 2) / ratio,
             int((ratio * self.height() - size[1]) / 2) / ratio,
@@ -126,7 +126,7 @@ class ImageView(QWidget):
         return _qimage(shrink(np.asarray(image, np.uint8), size))
 
     def _write(self, painter: QPainter, text: str, where: Qt.AlignmentFlag) -> None:
-        """Write a text, if there is any, on a box that keeps it readable over any image."""
+        """Write a text, if any, on a box that keeps it readable over any image."""
         if not text:
             return
         margin = SPACING_PX // 2
@@ -141,9 +141,9 @@ class ImageView(QWidget):
 
 
 def shrink(image: UInt8, size: tuple[int, int]) -> UInt8:
-    """Resize an image to (width, height): halved as often as it goes, then linearly.
+    """Resize an image to (width, height): halved as often as possible, then linearly.
 
-    Nearly as smooth as an average over areas, at a fifth of its time.
+    Nearly as smooth as averaging over areas, in a fifth of the time.
     """
     while image.shape[1] >= 2 * size[0] and image.shape[0] >= 2 * size[1]:
         half = image.shape[1] // 2, image.shape[0] // 2

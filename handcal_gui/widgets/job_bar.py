@@ -1,4 +1,4 @@
-"""One job at a time, with a bar for how far it is and a button to give it up."""
+"""A progress bar for one job at a time, with a button to cancel it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _WHOLE = 1000
 
 
 class JobBar(QWidget):
-    """Runs jobs one at a time; keeps its place while there is none.
+    """Runs jobs one at a time; its space stays reserved in between.
 
     Attributes
     ----------
     failed : Signal(str)
-        Why a job came to nothing, for a person to read.
+        Reason why a job failed, for the user.
     busy_changed : Signal(bool)
     """
 
@@ -44,11 +44,11 @@ class JobBar(QWidget):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a job runs."""
+        """True while a job is running."""
         return self._job is not None
 
     def run(self, doing: str, work: Work, then: Callable[[Any], object]) -> None:
-        """Give up what runs, and do something else; `then` takes what it comes to."""
+        """Cancel the running job and start another; `then` receives its result."""
         self.stop()
         self._then = then
         # Without a parent: should the bar be destroyed, the job's thread keeps the job alive.
@@ -58,19 +58,19 @@ class JobBar(QWidget):
         self._job.failed.connect(self._fail)
         self._job.cancelled.connect(self._end)
         self._doing.setText(f"{doing}…")
-        self._bar.setRange(0, 0)  # moves, until a share is told
+        self._bar.setRange(0, 0)  # busy indicator until a share is reported
         self._job.start()
         self._refresh()
 
     def cancel(self) -> None:
-        """Give up what runs, once it comes to where it can."""
+        """Cancel the running job at its next check."""
         if self._job is not None:
             self._job.cancel()
-            self._doing.setText("Being cancelled…")
+            self._doing.setText("Cancelling…")
             self._cancel.setEnabled(False)
 
     def stop(self) -> None:
-        """Give up what runs, and wait for its end."""
+        """Cancel the running job and wait for its end."""
         if self._job is not None:
             self._job.abandon()
             self._job = None

@@ -1,4 +1,4 @@
-"""A secret to be shown or copied on demand."""
+"""A field for a secret, shown or copied on demand."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from handcal_gui.widgets.fields import beside, button, named
 
 
 class KeyField(QWidget):
-    """The pairing key, hidden until asked for."""
+    """The pairing key, hidden until requested."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -17,7 +17,7 @@ class KeyField(QWidget):
             QLineEdit(readOnly=True),
             "pairingKey",
             "Pairing key",
-            "Enter this key in the headset, and nowhere else: whoever knows it can connect.",
+            "Enter this key in the headset and nowhere else: any device with it can connect.",
         )
         self._reveal = button("showKey", "Show", "Show the pairing key")
         self._reveal.setCheckable(True)
@@ -29,7 +29,7 @@ class KeyField(QWidget):
         self._show(False)
 
     def set_key(self, key: str) -> None:
-        """Hold another key, hidden at first."""
+        """Set another key, hidden at first."""
         self._key.setText(key)
         self._key.setCursorPosition(0)
         self._reveal.setChecked(False)

@@ -1,4 +1,4 @@
-"""What the things in a picture are: a sample of each, its name, and a number."""
+"""Legend entries: a colour sample, a name and a number."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ def role_color(role: str, widget: QWidget) -> QColor:
 
 
 class LegendEntry(QWidget):
-    """A sample of one thing, its name, and maybe a number that does not jump.
+    """A colour sample with a name and optionally a number of fixed width.
 
     Parameters
     ----------
     name : str
-        Of the thing.
+        Name of the entry.
     role : str
-        As `role_color` takes it.
+        See `role_color`.
     tooltip : str
     line : (float, Qt.PenStyle) or None
-        Width in pixels and style that it is drawn with; None for points.
+        Width in pixels and style of its line; None for points.
     widest : str
         The number's widest text; empty if it has none.
     """
@@ -63,7 +63,7 @@ class LegendEntry(QWidget):
         return f"{self._name.text()} {self._number.text()}"
 
     def show_name(self, name: str, role: str | None) -> None:
-        """Change what the thing is called and its colour; None hides the sample."""
+        """Change the name and the colour; None hides the sample."""
         self._name.setText(name)
         self._sample.show_role(role)
 
@@ -73,7 +73,7 @@ class LegendEntry(QWidget):
 
 
 class _Sample(QWidget):
-    """A piece of line, or of a surface of points."""
+    """A sample of a line, or of a surface of points."""
 
     def __init__(self, role: str, line: tuple[float, Qt.PenStyle] | None) -> None:
         super().__init__()

@@ -77,7 +77,7 @@ class LiveCameras(QWidget):
             source.currentIndexChanged.connect(self._refresh)
         self._lay_out()
         self._refresh()
-        self._say("No picture yet")
+        self._say("No image yet")
 
     def offer(self, numbers: Iterable[int]) -> None:
         """Offer cameras of this computer, too, by their numbers."""
@@ -118,7 +118,7 @@ class LiveCameras(QWidget):
             self._live.stop()
             self._live = None
         self.images = None
-        self._say("No picture")
+        self._say("No image")
         self.images_changed.emit()
 
     def _source(self, title: str) -> str:

@@ -13,7 +13,7 @@ def what_is_missing(snapshot: Snapshot) -> str:
     no hand is found.
     """
     if snapshot.camera.problem:
-        return "No picture"
+        return "No image"
     seen = snapshot.observation
     if seen is None or not seen.problem:
         return ""

@@ -1,4 +1,4 @@
-"""Depth as colours, and the scale that says which is which."""
+"""A colour scale for depth images."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from handcal_gui.theme import SPACING_PX
 NEAREST_M, FARTHEST_M = 0.2, 1.0
 _HOLE = (10, 10, 12)
 _GREY = 0.8
-"""By how much colours beyond the gate are greyed."""
+"""Share of grey in the colours beyond the depth gate."""
 _BAR_PX = 12
 
 
 class DepthColors:
-    """Colours of `NEAREST_M` to `FARTHEST_M`, bright to dark, grey beyond the gate; holes black.
+    """Colours from `NEAREST_M` to `FARTHEST_M`, bright to dark; grey beyond the gate, holes black.
 
     Parameters
     ----------
     gate_m : (float, float)
-        Depths at which a hand is looked for.
+        Range of depths in which a hand is searched.
     """
 
     def __init__(self, gate_m: tuple[float, float]) -> None:
@@ -34,7 +34,7 @@ class DepthColors:
         self._level_of_depth = np.zeros(65536, np.uint8)
 
     def set_scale(self, depth_scale_m: float) -> None:
-        """Say how many metres a unit of depth is."""
+        """Set the size of a unit of depth in metres."""
         if depth_scale_m != self._scale_m:
             self._scale_m = depth_scale_m
             self._level_of_depth = _level(depth_scale_m * np.arange(65536.0))
@@ -58,7 +58,7 @@ def _level(depth_m: Float64) -> UInt8:
 
 def _levels(gate_m: tuple[float, float]) -> UInt8:
     """Return (256, 3) RGB of all levels, holes first."""
-    # The darkest fifth of the map is left to holes.
+    # The darkest fifth of the map is reserved for holes.
     steps = np.linspace(255.0, 50.0, 255).astype(np.uint8)
     ramp = cv2.applyColorMap(steps[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1].astype(float)
     grey = ramp.mean(axis=1, keepdims=True)
@@ -69,7 +69,7 @@ def _levels(gate_m: tuple[float, float]) -> UInt8:
 
 
 class DepthLegend(QWidget):
-    """The scale, with the gate's ends marked."""
+    """The scale, with the limits of the gate marked."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -81,17 +81,17 @@ class DepthLegend(QWidget):
         self.setFixedWidth(_BAR_PX + SPACING_PX + width_px)
 
     def show_colors(self, depth_colors: DepthColors) -> None:
-        """Show what colours mean."""
+        """Show the scale of some colours."""
         self._colors = depth_colors
         low_m, high_m = depth_colors.gate_m
         self.setToolTip(
-            f"Depth in metres. A hand is looked for from {low_m:.2f} to {high_m:.2f} m, "
-            "in colour; what is nearer or farther is grey, what was not measured black."
+            f"Depth in metres. The hand is searched from {low_m:.2f} to {high_m:.2f} m (colour). "
+            "Grey: nearer or farther. Black: not measured."
         )
         self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw the bar from near, at the top, to far, and its marks."""
+        """Draw the bar from near, at the top, to far, with its marks."""
         if self._colors is None:
             return
         painter = QPainter(self)

@@ -1,4 +1,4 @@
-"""The segmented hand drawn over a picture."""
+"""The segmented hand drawn over an image."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from handcal_gui.theme import colors
 _MASK_ALPHA = 70
 _LINE_PX = 2.0
 _SMOOTHED_PX = 1.0
-"""By how much, as shown, the line may stray from the contour, most of whose points it spares."""
+"""Largest deviation, as displayed, of the simplified line from the contour."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandOverlay:
-    """A hand in one picture."""
+    """A hand in one image."""
 
     cloud: HandCloud
     depth_px: Float64
     image_px: Float64
-    """(M, 2); its contour in the depth image and in the picture."""
+    """(M, 2); its contour in the depth image and in the displayed image."""
     is_red: bool
-    """Whether it is turned beyond the guard."""
+    """True if it is rotated beyond the limit of the guard."""
 
     def draw(self, painter: QPainter) -> None:
-        """Draw box, mask and contour in the picture's pixels; dashed where the hand is cut."""
+        """Draw box, mask and contour in the image's pixels; cut edges are dashed."""
         if not len(self.image_px):
             return
         color = QColor(colors().red if self.is_red else colors().live)
         self._draw_mask(painter, QColor(color))
-        # A contour follows pixels anyway, and smooth lines take five times as long.
+        # A contour follows pixels anyway, and antialiasing is five times slower.
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
         strays_px = _SMOOTHED_PX / painter.deviceTransform().m11()
         for points_px, is_cut in contour_runs(self.image_px, self.cloud.contour_is_cut):
@@ -70,7 +70,7 @@ def contour_runs(points_px: Float64, is_cut: Bool) -> list[tuple[Float64, bool]]
     Returns
     -------
     list of (points_px, is_cut)
-        In order; each begins where the one before ends.
+        In order; each starts at the end of the previous one.
     """
     count = len(points_px)
     cut_edges = is_cut & np.roll(is_cut, -1)  # edge i runs from point i to the next
@@ -85,7 +85,7 @@ def contour_runs(points_px: Float64, is_cut: Bool) -> list[tuple[Float64, bool]]
 
 
 def _fit(source_px: Float64, target_px: Float64) -> QTransform:
-    """Return the scaling and shift that brings the bounding box of points to that of others."""
+    """Return the scale and shift that map the bounding box of points to that of others."""
     (x0, y0), (x1, y1) = source_px.min(axis=0), source_px.max(axis=0)
     (u0, v0), (u1, v1) = target_px.min(axis=0), target_px.max(axis=0)
     fit = QTransform.fromTranslate(u0, v0)
@@ -94,7 +94,7 @@ def _fit(source_px: Float64, target_px: Float64) -> QTransform:
 
 
 def _set_pen(painter: QPainter, color: QColor, style: Qt.PenStyle) -> None:
-    """Draw with a line as wide on every screen, whatever the size of the picture."""
+    """Set a pen whose width does not depend on the screen or the image."""
     pen = QPen(color, _LINE_PX * painter.device().devicePixelRatio(), style)
     pen.setCosmetic(True)
     painter.setPen(pen)

@@ -1,4 +1,4 @@
-"""The camera panel: what the camera sees, where the hand was found in it, and how it does."""
+"""The camera panel: the camera's images with the segmented hand, and its frame rate."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.sentence import sentence
 
-_EMPTY = "The camera's picture will appear here. Choose a camera on the start page."
-_NO_COLOR = "This camera gives no colour picture."
+_EMPTY = "The camera image will appear here. Choose a camera on the start page."
+_NO_COLOR = "This camera has no colour image."
 
 
 class Mode(StrEnum):
-    """Which pictures are shown."""
+    """The images that are shown."""
 
     COLOR = "Colour"
     DEPTH = "Depth"
@@ -48,7 +48,7 @@ class Mode(StrEnum):
 
 
 class CameraPanel(QWidget):
-    """Colour and depth with the hand drawn over them, and the camera's rate, age and losses.
+    """Shows colour and depth with the hand, and the camera's frame rate, latency and losses.
 
     Parameters
     ----------
@@ -64,16 +64,16 @@ class CameraPanel(QWidget):
         self._status = _Status()
         self._freeze = tool_button()
         self._freeze.setText("Freeze")
-        self._freeze.setToolTip("Keep the present picture (F)")
+        self._freeze.setToolTip("Freeze the image (F)")
         self._freeze.setShortcut("F")
         self._freeze.setCheckable(True)
         self._freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._mode = QComboBox()
-        self._mode.setAccessibleName("Picture shown")
-        self._mode.setToolTip("Show the colour picture, the depth picture or both")
+        self._mode.setAccessibleName("Displayed image")
+        self._mode.setToolTip("Show the colour image, the depth image or both")
         self._mode.addItems(list(Mode))
         self._mode.currentTextChanged.connect(lambda text: self._pictures.set_mode(Mode(text)))
-        save = QAction("Save picture…", self)
+        save = QAction("Save image…", self)
         save.triggered.connect(self._ask_where_to_save)
         self.addAction(save)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
@@ -83,28 +83,28 @@ class CameraPanel(QWidget):
         self.begin(SegmentSettings())
 
     def begin(self, settings: SegmentSettings) -> None:
-        """Forget what was shown, and mark the depth gate of a session's settings."""
+        """Clear the images, and mark the depth gate of a session's settings."""
         self._frame = None
         self._freeze.setChecked(False)
         self._pictures.begin(DepthColors((settings.depth_min_m, settings.depth_max_m)))
         self._pictures.show_text(message=_EMPTY)
 
     def set_mode(self, mode: Mode) -> None:
-        """Show the colour picture, the depth picture or both."""
+        """Show the colour image, the depth image or both."""
         self._mode.setCurrentText(mode)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show the newest frame, unless frozen, and how the camera does."""
+        """Show the newest frame, unless frozen, and the state of the camera."""
         if not self._freeze.isChecked() and snapshot.frame is not None:
             self._show_frame(snapshot.frame, snapshot.observation)
-        message = "No picture" if snapshot.camera.problem else "" if self._frame else _EMPTY
+        message = "No image" if snapshot.camera.problem else "" if self._frame else _EMPTY
         caption = "Frozen" if self._freeze.isChecked() else self._caption
         self._pictures.show_text(message=message, caption="" if message else caption)
         age_ms = (snapshot.t_host_ns - self._frame.t_host_ns) / 1e6 if self._frame else None
         self._status.show_status(snapshot.camera, age_ms)
 
     def save_picture(self, path: Path) -> None:
-        """Write what is shown as PNG; FileError if it cannot be written."""
+        """Save the displayed image as PNG; FileError if it cannot be written."""
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
         self._pictures.grab().save(buffer, "PNG")
@@ -140,23 +140,21 @@ class CameraPanel(QWidget):
             self._caption = _caption(seen)
 
     def _ask_where_to_save(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save picture", "picture.png", "PNG pictures (*.png)"
-        )
+        name, _ = QFileDialog.getSaveFileName(self, "Save image", "image.png", "PNG images (*.png)")
         if name:
             try:
                 self.save_picture(Path(name).with_suffix(".png"))
             except FileError as error:
-                QMessageBox.warning(self, "Save picture", str(error))
+                QMessageBox.warning(self, "Save image", str(error))
 
 
 class _Pictures(QWidget):
-    """The two pictures, beside or below each other, whichever lets them be larger."""
+    """The two images, side by side or stacked, whichever makes them larger."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._color = ImageView("Colour picture")
-        self._depth = ImageView("Depth picture", lambda depth: self._depth_colors.colorize(depth))
+        self._color = ImageView("Colour image")
+        self._depth = ImageView("Depth image", lambda depth: self._depth_colors.colorize(depth))
         self._legend = DepthLegend()
         self._depth_side = QWidget()
         depth_layout = QHBoxLayout(self._depth_side)
@@ -204,7 +202,7 @@ class _Pictures(QWidget):
         self._color.show_text(message=message, caption=caption)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Stack the pictures, of 16:9, where there is more room that way."""
+        """Stack the images if that makes them larger."""
         super().resizeEvent(event)
         width, height = 9 * self.width(), 16 * self.height()
         is_stacked = min(width, height / 2) > min(width / 2, height)
@@ -213,7 +211,7 @@ class _Pictures(QWidget):
 
 
 class _Status(QWidget):
-    """One line of numbers that do not jump, below the camera's name."""
+    """One line of numbers with fixed widths, below the camera's name."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -224,10 +222,10 @@ class _Status(QWidget):
             "camera-rate", "999.9 fps", "Frames per second over the last second"
         )
         self._age = NumberLabel(
-            "camera-age", "9999.9 ms", "Time since the frame shown arrived, in milliseconds"
+            "camera-age", "9999.9 ms", "Time since the displayed frame arrived, in milliseconds"
         )
         self._dropped = NumberLabel(
-            "camera-dropped", "99999", "Frames missing in the camera's own count since it started"
+            "camera-dropped", "99999", "Frames missing from the camera's own count since it started"
         )
         row = QHBoxLayout()
         row.setSpacing(SPACING_PX // 2)
@@ -259,7 +257,7 @@ def _age(age_ms: float | None) -> str:
 
 
 def _caption(seen: Observation) -> str:
-    """Return what is to be said of the hand."""
+    """Return a caption for the hand."""
     if seen.is_red and seen.rotation_rad is not None:
         return f"Turned by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
     return sentence(seen.problem)

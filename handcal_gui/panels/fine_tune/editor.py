@@ -1,4 +1,4 @@
-"""One eye's shift in fields and sliders, and what it does to what is drawn."""
+"""One eye's shift in fields and sliders, with its effect on the drawn target."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _DIRECTIONS = (
     "in front of the rig's viewpoint, towards the display (φ3); negative is behind",
 )
 _EFFECTS = {
-    "Right": "How far the target is drawn further to the right",
-    "Up": "How far the target is drawn further up",
-    "Size": "How much larger the target is drawn",
+    "Right": "Shift of the drawn target to the right",
+    "Up": "Upward shift of the drawn target",
+    "Size": "Enlargement of the drawn target",
 }
 
 
 class EyeShiftEditor(QWidget):
-    """Shows φ of one eye in millimetres and asks for changes.
+    """Shows φ of one eye in millimetres and emits changes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class EyeShiftEditor(QWidget):
     edited : Signal(int, float)
         Component 0 to 2, and its new value in metres.
     chosen : QRadioButton
-        The title, checked if the arrow keys move this eye.
+        The title; checked if the arrow keys move this eye.
     """
 
     edited = Signal(int, float)
@@ -78,7 +78,7 @@ class EyeShiftEditor(QWidget):
                 slider.setValue(round(_SLIDER_STEPS_PER_MM * value_mm))
 
     def show_effect(self, effect: DrawnMove | None) -> None:
-        """Show how the target moves on the display; None if that is not known."""
+        """Show the target's movement on the display; None if unknown."""
         if effect is None:
             texts = ("–", "–", "–")
         else:
@@ -91,13 +91,13 @@ class EyeShiftEditor(QWidget):
             label.setText(text)
 
     def set_step_mm(self, step_mm: float) -> None:
-        """Set by how much the fields' arrows and clicks beside a slider's handle change φ."""
+        """Set the step of the fields' arrows and of clicks beside a slider's handle."""
         for field, slider in zip(self._fields, self._sliders, strict=True):
             field.setSingleStep(step_mm)
             slider.setPageStep(round(_SLIDER_STEPS_PER_MM * step_mm))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Leave undo and redo to the panel, and the wheel, unless a field has the focus."""
+        """Leave undo and redo to the panel, and ignore the wheel unless a field has the focus."""
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
             undoes = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo)
             return any(event.matches(key) for key in undoes)
@@ -161,12 +161,12 @@ class EyeShiftEditor(QWidget):
 
 
 def _tooltip(axis: int) -> str:
-    return f"How far the eye lies {_DIRECTIONS[axis]}, in millimetres"
+    return f"Distance of the eye {_DIRECTIONS[axis]}, in millimetres"
 
 
 def _number_label(tooltip: str) -> QLabel:
     label = QLabel("–")
-    label.setToolTip(f"{tooltip} than with the φ it is compared with")
+    label.setToolTip(f"{tooltip}, relative to the φ compared with")
     label.setFont(number_font())
     label.setAlignment(Qt.AlignmentFlag.AlignRight)
     return label

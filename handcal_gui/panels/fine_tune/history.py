@@ -1,4 +1,4 @@
-"""What the eye shifts set by hand have been: undo and redo. No Qt."""
+"""Undo and redo of eye shifts set by hand. No Qt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Shifts: TypeAlias = Mapping[Eye, Float64]
 
 
 def same_shifts(one: Shifts, other: Shifts) -> bool:
-    """Whether both hold the same eyes with the same φ."""
+    """Return whether both hold the same eyes with the same φ."""
     return set(one) == set(other) and all(np.array_equal(one[eye], other[eye]) for eye in one)
 
 
@@ -26,12 +26,12 @@ def moved(shifts_m: Shifts, eyes: Sequence[Eye], axis: int, by_m: float, limit_m
     ----------
     shifts_m : mapping of eye to (3,) float64
     eyes : sequence of eye
-        Those that move.
+        The eyes to move.
     axis : {0, 1, 2}
     by_m : float
-        Less is moved where an eye would otherwise pass the limit.
+        The step; reduced if an eye would otherwise exceed the limit.
     limit_m : float
-        No component passes ± this; what is beyond already comes back to it.
+        Largest magnitude of a component; larger ones are reduced to it.
     """
     lowest_m = max(-limit_m - shifts_m[eye][axis] for eye in eyes)
     highest_m = min(limit_m - shifts_m[eye][axis] for eye in eyes)
@@ -42,12 +42,12 @@ def moved(shifts_m: Shifts, eyes: Sequence[Eye], axis: int, by_m: float, limit_m
 
 
 class ShiftHistory:
-    """The present shifts, those before, and those undone.
+    """The present shifts, the earlier ones, and the undone ones.
 
     Parameters
     ----------
     shifts_m : mapping of eye to (3,) float64
-        Where it begins; that cannot be undone.
+        Initial shifts, which cannot be undone.
     """
 
     def __init__(self, shifts_m: Shifts) -> None:
@@ -56,29 +56,29 @@ class ShiftHistory:
 
     @property
     def present(self) -> Shifts:
-        """The shifts as they are now."""
+        """The present shifts."""
         return self._steps[self._at]
 
     @property
     def can_undo(self) -> bool:
-        """Whether anything came before."""
+        """True if there is something to undo."""
         return self._at > 0
 
     @property
     def can_redo(self) -> bool:
-        """Whether anything was undone since the last change."""
+        """True if there is something to redo."""
         return self._at + 1 < len(self._steps)
 
     def change(self, shifts_m: Shifts, *, goes_on: bool = False) -> None:
-        """Make other shifts the present ones; what was undone is forgotten.
+        """Set the present shifts; undone ones are discarded.
 
         Parameters
         ----------
         shifts_m : mapping of eye to (3,) float64
-            Nothing happens if they are the present ones.
+            Ignored if equal to the present ones.
         goes_on : bool
-            Whether this goes on with the last change, as a slider being dragged does, so that both
-            are undone together.
+            True if this continues the last change, as when a slider is dragged, so that both are
+            undone together.
         """
         if same_shifts(shifts_m, self.present):
             return
@@ -86,11 +86,11 @@ class ShiftHistory:
         self._steps[self._at :] = [_frozen(shifts_m)]
 
     def undo(self) -> None:
-        """Go back by one change, if there is one."""
+        """Undo the last change, if there is one."""
         self._at -= self.can_undo
 
     def redo(self) -> None:
-        """Take back the last undo, if there is one."""
+        """Redo the last undone change, if there is one."""
         self._at += self.can_redo
 
 

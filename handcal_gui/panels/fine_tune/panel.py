@@ -1,4 +1,4 @@
-"""The fine-tune panel: φ of each eye by hand, live in the headset."""
+"""The fine-tune panel: φ of each eye set by hand, shown live in the headset."""
 
 from __future__ import annotations
 
@@ -49,26 +49,26 @@ _WHY_NOT = {
     State.ALIGN: "Confirm the alignment, solve and apply it first.",
     State.ALIGNED: "Solve and apply the alignment first.",
     State.SOLVED: "Apply the solved projections first.",
-    State.APPLYING: "The headset is taking the solved projections.",
+    State.APPLYING: "The headset is receiving the solved projections.",
 }
 _ARRIVALS = {
     Arrival.SENDING: ("wait", "Sending to the headset…"),
     Arrival.ARRIVED: ("check", "In the headset"),
-    Arrival.LATE: ("warning", "The headset has not acknowledged; see Link"),
+    Arrival.LATE: ("warning", "Not acknowledged by the headset; see Link"),
 }
 
 
 class FineTunePanel(QWidget):
-    """Lets φ be set by hand while the wearer looks.
+    """Sets φ by hand while the wearer watches.
 
     Attributes
     ----------
     reset_action : QAction
-        Sets φ as solved.
+        Sets φ to the solved one.
     shift_changed : Signal(object)
         φ of both eyes, a mapping of eye to (3,) metres, for the headset; at most 30 times a second.
     shift_settled : Signal()
-        The last φ sent has stood for 0.7 s and is to be kept.
+        The last φ sent has been unchanged for 0.7 s and is to be stored.
     """
 
     shift_changed = Signal(object)
@@ -98,28 +98,28 @@ class FineTunePanel(QWidget):
 
     @property
     def step_m(self) -> float:
-        """By how much the arrows move, in metres."""
+        """The step of the arrow keys, in metres."""
         step_m: float = self._steps.checkedAction().data()
         return step_m
 
     def set_step_m(self, step_m: float) -> None:
-        """Take the nearest of the steps that there are."""
+        """Select the nearest available step."""
         min(self._steps.actions(), key=lambda step: abs(step.data() - step_m)).trigger()
 
     def set_rig(self, rig: Rig) -> None:
-        """Begin with another wearer or headset.
+        """Start with another wearer or headset.
 
         Parameters
         ----------
         rig : Rig
-            The offline calibration whose displays draw.
+            The offline calibration of the displays.
         """
         self._rig = rig
         self._begin(_OFFLINE)
         self._refresh()
 
     def settle(self) -> None:
-        """Let the headset have φ as set, at once: nothing waits, nothing else is shown."""
+        """Send φ as set at once, and end any comparison."""
         if self._shown() is not None:
             self._stop_showing()
             self._stream.preview(self._history.present)
@@ -127,7 +127,7 @@ class FineTunePanel(QWidget):
         self._stream.flush()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show what the headset renders with, unless it was set here, and whether it has it."""
+        """Show the headset's φ, unless it was set here, and whether it has arrived."""
         results = snapshot.procedure.results
         solved = {eye: shift.shift_m for eye, shift in results.eyes.items()} if results else {}
         why_not = _why_not(snapshot)
@@ -140,7 +140,7 @@ class FineTunePanel(QWidget):
         self._say(*(("wait", why_not) if why_not else _ARRIVALS[self._stream.arrival]))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move the chosen eye by arrow keys."""
+        """Move the selected eye by arrow keys."""
         move = _MOVES.get(event.key())
         if move is None or event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
             super().keyPressEvent(event)
@@ -150,7 +150,7 @@ class FineTunePanel(QWidget):
             self._move(eye, axis, direction * self.step_m)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Leave the headset with φ as set."""
+        """End any comparison, so that the headset keeps φ as set."""
         super().hideEvent(event)
         self.settle()
 
@@ -208,7 +208,7 @@ class FineTunePanel(QWidget):
         self._refresh()
 
     def _shown(self) -> Shifts | None:
-        """Return what is shown in place of φ as set, if anything."""
+        """Return the φ shown for comparison in place of the one set, if any."""
         if self._show_solved.isChecked():
             return self._solved
         return _OFFLINE if self._show_offline.isChecked() else None
@@ -268,15 +268,19 @@ class FineTunePanel(QWidget):
         self._redo.triggered.connect(lambda: self._go(self._history.redo))
         self._both = add("Both eyes", "L", "Move both eyes by the same amount")
         self._both.setCheckable(True)
-        self.reset_action = add("Reset to solved", "", "Set φ as solved from the alignments")
+        self.reset_action = add(
+            "Reset to solved", "", "Set φ to the one solved from the alignments"
+        )
         self.reset_action.triggered.connect(lambda: self._reset(self._solved))
         self._reset_offline = add("Reset to offline", "", "Set φ to 0, the offline calibration")
         self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
         looks = QActionGroup(self)
         looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         looks.triggered.connect(self._show)
-        self._show_solved = add("Show solved", "S", "Let the headset show the solved φ meanwhile")
-        self._show_offline = add("Show offline", "B", "Let the headset show φ = 0 meanwhile")
+        self._show_solved = add(
+            "Show solved", "S", "Show the solved φ in the headset while checked"
+        )
+        self._show_offline = add("Show offline", "B", "Show φ = 0 in the headset while checked")
         for action in (self._show_solved, self._show_offline):
             action.setCheckable(True)
             looks.addAction(action)
@@ -341,14 +345,14 @@ class FineTunePanel(QWidget):
 
 
 class _QuietScrollArea(QScrollArea):
-    """Leaves the arrow keys to the panel around it."""
+    """Leaves the arrow keys to the enclosing panel."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         event.ignore()
 
 
 def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
-    """Return widgets and actions' buttons side by side; None leaves room."""
+    """Return a row of widgets and buttons for actions; None is a stretch."""
     row = QHBoxLayout()
     row.setSpacing(SPACING_PX)
     for item in items:
@@ -366,7 +370,7 @@ def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
 
 
 def _why_not(snapshot: Snapshot) -> str:
-    """Return why φ cannot be set by hand now; empty if it can."""
+    """Return the reason why φ cannot be set by hand now; empty if it can."""
     if not snapshot.link.connected:
         return snapshot.link_problem or "The headset is not connected; see Link."
     return _WHY_NOT.get(snapshot.procedure.state, "")

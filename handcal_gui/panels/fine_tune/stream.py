@@ -1,4 +1,4 @@
-"""Hand-set eye shifts on their way to the headset: not too many, and whether they have arrived."""
+"""Rate-limited sending of eye shifts set by hand, with their arrival in the headset."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LATE_NS = 2_000_000_000
 
 
 class Arrival(Enum):
-    """Where what the headset renders with stands."""
+    """The state of the last φ sent to the headset."""
 
     SENDING = "sending"
     ARRIVED = "arrived"
@@ -24,14 +24,14 @@ class Arrival(Enum):
 
 
 class ShiftStream(QObject):
-    """Sends the newest shifts, and tells its own from those that the headset gets otherwise.
+    """Sends the newest shifts, and distinguishes them from shifts sent by others.
 
     Attributes
     ----------
     sent : Signal(object)
-        Shifts to render with, at most 30 times a second.
+        Shifts to render with; at most 30 times a second.
     settled : Signal()
-        The last shifts sent are to be kept: nothing changed for 0.7 s.
+        The last shifts sent are to be stored: unchanged for 0.7 s.
     arrival : Arrival
         As of the last snapshot seen.
     """
@@ -51,18 +51,18 @@ class ShiftStream(QObject):
         self._calm.timeout.connect(self.settled)
 
     def put(self, shifts_m: Shifts) -> None:
-        """Send shifts that are to be kept, unless others follow soon."""
+        """Send shifts to be stored, unless others follow soon."""
         self.preview(shifts_m)
         self._calm.start()
 
     def preview(self, shifts_m: Shifts) -> None:
-        """Send shifts that are only to be looked at."""
+        """Send shifts only for comparison."""
         self._newest = shifts_m
         if not self._pace.isActive():
             self._pace.start()
 
     def flush(self) -> None:
-        """Do now what is waiting: send, and settle."""
+        """Send waiting shifts and store them now."""
         if self._pace.isActive():
             self._pace.stop()
             self._send()
@@ -71,10 +71,10 @@ class ShiftStream(QObject):
             self.settled.emit()
 
     def see(self, snapshot: Snapshot) -> bool:
-        """Take note of what the headset renders with; return whether that was not sent here."""
+        """Process the headset's present shifts; return whether they were sent by others."""
         procedure = snapshot.procedure
         self._seen_since += snapshot.t_host_ns > self._sent_ns
-        # The engine may have been amid the first of them when it was asked.
+        # The engine may have been processing the first of them when this was requested.
         is_answered = not self._pace.isActive() and self._seen_since > 1
         if is_answered and procedure.is_applied:
             self.arrival = Arrival.ARRIVED

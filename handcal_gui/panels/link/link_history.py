@@ -1,4 +1,4 @@
-"""Latency and losses of the last half minute."""
+"""Plots of latency and losses over the last half minute."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from handcal_gui.widgets.plots import Plot
 _LASTS_S = 30.0
 _HEIGHT_PX = 100
 _TOPS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
-"""Where the scales may end."""
+"""Allowed upper limits of the scales."""
 
 
 class LinkHistory(QWidget):
-    """Two plots beside each other."""
+    """Two plots side by side."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -44,7 +44,7 @@ class LinkHistory(QWidget):
         self.setFixedHeight(_HEIGHT_PX)
 
     def add(self, t_s: float, latency_ms: float | None, rates: LinkRates | None) -> None:
-        """Add a moment; what is not known leaves a gap."""
+        """Add a point in time; unknown values leave a gap."""
         shares = (rates.lost, rates.lost_inbound) if rates else (None, None)
         lost, lost_inbound = (nan if share is None else 100.0 * share for share in shares)
         self._moments.append((t_s, nan if latency_ms is None else latency_ms, lost, lost_inbound))
@@ -58,7 +58,7 @@ class LinkHistory(QWidget):
         _scale(self._loss, np.concatenate([losts, losts_inbound]), "%")
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Clear the plots."""
         self._moments.clear()
         for line in (self._latency_line, self._lost_line, self._lost_inbound_line):
             line.clear()
@@ -73,10 +73,10 @@ def _plot(name: str, label: str, unit: str) -> Plot:
 
 
 def _scale(plot: Plot, values: Float64, unit: str) -> None:
-    """Let the scale reach from zero to above all values."""
+    """Scale the axis from zero to above all values."""
     worst = np.max(values, where=~np.isnan(values), initial=0.0)
     top = next((top for top in _TOPS if top >= worst), _TOPS[-1])
     if plot.item.viewRange()[1][1] == top:
-        return  # an axis takes milliseconds to draw
+        return  # drawing an axis takes milliseconds
     plot.item.setYRange(0.0, top, padding=0.0)
     plot.item.getAxis("left").setTicks([[(0.0, "0"), (top, f"{top:g} {unit}")]])

@@ -1,4 +1,4 @@
-"""The numbers of the link: a column each way, and a row for each reason of a rejection."""
+"""The link's numbers: a column for each direction, and a row for each reason of rejection."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.numbers import signed
 
 RATES_S = 2.0
-"""Over so long are rates and losses taken."""
+"""Interval of rates and losses."""
 
 _OUT, _IN, _BOTH = 1, 2, 3
-"""Columns of the table; the last means both."""
+"""Columns of the table; the last spans both."""
 _WIDEST = {_OUT: "9999.9 kB/s", _IN: "9999.9 kB/s", _BOTH: "−999999.999 s ± 9.9 ms"}
 _ROWS = {
     "Latency": {_IN: "Half the median time of a round trip to the headset, in milliseconds"},
     "Clock": {
-        _BOTH: "By how much the headset's clock is ahead of this computer's, in seconds, and how "
-        "well that is known, in milliseconds"
+        _BOTH: "Headset's clock minus this computer's, in seconds, and its uncertainty, "
+        "in milliseconds"
     },
-    "Clock drift": {_IN: "How much faster the headset's clock runs, in parts per million"},
-    "Poses": {_IN: "The headset's poses in one second"},
+    "Clock drift": {_IN: "Drift of the headset's clock, in parts per million; positive is fast"},
+    "Poses": {_IN: "Poses received from the headset per second"},
     "Data": {
         _OUT: f"Kilobytes per second to the headset, over {RATES_S:g} s",
         _IN: f"Kilobytes per second from the headset, over {RATES_S:g} s",
@@ -36,25 +36,27 @@ _ROWS = {
         _OUT: f"Share of the datagrams to the headset that did not arrive, over {RATES_S:g} s",
         _IN: f"Share of the headset's datagrams that did not arrive, over {RATES_S:g} s",
     },
-    "Resent": {_OUT: "Parts of messages sent again, as they were not acknowledged in time"},
+    "Resent": {
+        _OUT: "Fragments of messages retransmitted because they were not acknowledged in time"
+    },
     "Unacknowledged": {_OUT: "Messages that the headset has not acknowledged yet"},
-    "Given up": {_OUT: "Messages that the headset did not acknowledge for too long"},
+    "Failed": {_OUT: "Messages that the headset did not acknowledge in time"},
     "Rejected": {_IN: "Datagrams that were not accepted, for the reasons below"},
 }
 """Captions, and what the numbers mean by column."""
 REJECTIONS = {
-    Rejection.UNPAIRED: "Signed with another pairing key: give the headset the key below",
-    Rejection.CORRUPT: "Damaged on the way, or not meant for handcal",
-    Rejection.REPLAYED: "Came twice or much too late; a few are normal in a wireless network",
+    Rejection.UNPAIRED: "Signed with another pairing key: enter the key below in the headset",
+    Rejection.CORRUPT: "Damaged in transit, or not meant for handcal",
+    Rejection.REPLAYED: "Arrived twice or much too late; a few are normal in a wireless network",
     Rejection.OVERSIZED: "Longer than the protocol allows: check the headset's program",
-    Rejection.WRONG_VERSION: "The headset's program speaks another version: update it",
-    Rejection.WRONG_SESSION: "Sent before the headset connected anew; a few are normal",
+    Rejection.WRONG_VERSION: "The headset's program uses another protocol version: update it",
+    Rejection.WRONG_SESSION: "Sent before the headset reconnected; a few are normal",
 }
 """What each reason means, and what to do."""
 
 
 class LinkTable(QWidget):
-    """Shows the numbers of a link; a reason of rejections only once there are some."""
+    """Shows the numbers of a link; reasons of rejection appear once they occur."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -78,7 +80,7 @@ class LinkTable(QWidget):
         self._show_rejections({})
 
     def show_link(self, link: LinkStatistics, rates: LinkRates | None) -> None:
-        """Show counters, and rates where they are known."""
+        """Show counters, and rates if known."""
         for cell, text in _texts(link, rates).items():
             self._numbers[cell].setText(text)
         self._show_rejections(link.rejected)
@@ -93,7 +95,7 @@ class LinkTable(QWidget):
     def _add_row(
         self, text: str, meanings: Mapping[int, str]
     ) -> tuple[QLabel, dict[int, NumberLabel]]:
-        """Add a row at the end; return its caption, and its numbers by column."""
+        """Append a row; return its caption, and its numbers by column."""
         row = self._grid.rowCount()
         caption = QLabel(text)
         self._grid.addWidget(caption, row, 0)
@@ -117,7 +119,7 @@ def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int
         ("Poses", _IN): _text(link.pose_rate_hz, "Hz"),
         ("Resent", _OUT): str(link.resent),
         ("Unacknowledged", _OUT): str(link.unacked),
-        ("Given up", _OUT): str(link.failed),
+        ("Failed", _OUT): str(link.failed),
         ("Rejected", _IN): str(sum(link.rejected.values())),
     }
     if rates is not None:

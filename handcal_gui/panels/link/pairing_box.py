@@ -1,4 +1,4 @@
-"""What the headset needs to find this program and be trusted by it."""
+"""The address and pairing key that the headset needs to connect."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.key_field import KeyField
 
-_RENEWING = "The headset must then be given the new one."
+_RENEWING = "The new key must then be entered in the headset."
 
 
 class PairingBox(QGroupBox):
-    """The address to connect to, and the pairing key, hidden until asked for.
+    """The address to connect to, and the pairing key, hidden until requested.
 
     Attributes
     ----------
     new_key_requested : Signal()
-        The user wants another key.
+        The user requests another key.
     """
 
     new_key_requested = Signal()

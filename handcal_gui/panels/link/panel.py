@@ -1,4 +1,4 @@
-"""The link panel: whether the headset is there, how well it is reached, and how to pair it."""
+"""The link panel: connection to the headset, its quality, and pairing."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.sentence import sentence
 
 _PERIOD_S = 0.25
-"""Numbers that change faster cannot be read."""
+"""Interval of updating the numbers; faster changes cannot be read."""
 _ICON_PX = 24
 
 
 class LinkPanel(QWidget):
-    """Shows how the link does, and the pairing.
+    """Shows the state of the link, and the pairing.
 
     Attributes
     ----------
     new_key_requested : Signal()
-        The user wants another pairing key.
+        The user requests another pairing key.
     restart_headset_requested : Signal()
-        The user wants the virtual headset started again.
+        The user requests a restart of the virtual headset.
     """
 
     new_key_requested = Signal()
@@ -53,7 +53,7 @@ class LinkPanel(QWidget):
         self._state.setObjectName("link-state")
         self._state.setWordWrap(True)
         self._restart = QPushButton("Restart headset")
-        self._restart.setToolTip("End the virtual headset's program and start it again")
+        self._restart.setToolTip("Restart the virtual headset's program")
         self._restart.clicked.connect(self.restart_headset_requested)
         self._restart.hide()
         self._table = LinkTable()
@@ -65,16 +65,16 @@ class LinkPanel(QWidget):
         self._show_state(is_connected=False, problem="Open a session on the start page.")
 
     def show_pairing(self, address: str, key: str, *, is_virtual: bool = False) -> None:
-        """Begin with another link.
+        """Start with another link.
 
         Parameters
         ----------
         address : str
-            Where the headset must connect to, host:port.
+            Address to which the headset must connect, host:port.
         key : str
             Pairing key.
         is_virtual : bool
-            Whether the headset is the virtual one, which can be restarted from here.
+            True for the virtual headset, which can be restarted from here.
         """
         self._readings.clear()
         self._history.clear()
@@ -83,7 +83,7 @@ class LinkPanel(QWidget):
         self._restart.setVisible(is_virtual)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show how the link does; numbers at a pace at which they can be read."""
+        """Show the state of the link, with numbers at a readable rate."""
         link, t_s = snapshot.link, 1e-9 * snapshot.t_host_ns
         self._show_state(is_connected=link.connected, problem=snapshot.link_problem)
         if self._readings and 0.0 <= t_s - self._readings[-1][0] < _PERIOD_S:

@@ -1,4 +1,4 @@
-"""What one eye sees through its display, drawn: the world, the hand, and what is drawn over it."""
+"""One eye's view through its display: the world, the hand, and the drawn outlines."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ LINES = {
     "cursor": ("cursor", (2.0, Qt.PenStyle.SolidLine)),
     "offline": ("muted", (1.0, Qt.PenStyle.DotLine)),
 }
-"""Colour of each kind of outline, and width in pixels and style of its line; wider ones take Qt ten
-times as long, and their halos make them plain enough."""
+"""Colour of each kind of outline, and width in pixels and style of its line; wider lines are ten
+times slower in Qt, and halos make these visible."""
 _HALO_PX = 4.5
 _MOST_POINTS = 120
-"""Of each outline, since Qt takes a microsecond and more for each."""
+"""Most points of each outline, as Qt takes a microsecond or more for each."""
 _MARGIN = 0.12
 _WIDEST_CROP = 1.8
-"""A crop is kept while the hand stays in it and it is at most so many times as wide or high."""
+"""A crop is kept while it contains the hand and is at most this many times as wide or high."""
 
 
 class EyeCanvas(QWidget):
@@ -52,11 +52,11 @@ class EyeCanvas(QWidget):
 
     @property
     def crop_px(self) -> QRectF:
-        """The part of the display that is shown, in its pixels; more where there is room."""
+        """The part of the display that is shown, in its pixels; more if there is space."""
         return self._crop
 
     def show_view(self, view: EyeView | None, message: str = "") -> None:
-        """Show a view, or, over its dimmed image if it has one, why there is none."""
+        """Show a view, or a message over its dimmed image."""
         if view is self._view and message == self._message:
             return
         if view is not self._view:
@@ -74,7 +74,7 @@ class EyeCanvas(QWidget):
         self.update()
 
     def show_offline(self, is_shown: bool) -> None:
-        """Show or hide what the offline projection would draw."""
+        """Show or hide the outline drawn with the offline projection."""
         self._is_offline_shown = is_shown
         self.update()
 
@@ -134,7 +134,7 @@ class EyeCanvas(QWidget):
         return to_widget.translate(-crop.center().x(), -crop.center().y())
 
     def _choose_crop(self) -> None:
-        """Crop to the hand, but leave the picture where it is while that still fits."""
+        """Crop to the hand, but keep the present crop while it still fits."""
         if self._view is None:
             return
         display = _display(self._view)
@@ -165,7 +165,7 @@ def _is_close(crop: QRectF, hand: QRectF) -> bool:
 
 
 def _closed(outline_px: Float64) -> QPolygonF:
-    """Return an outline as a closed line, thinned."""
+    """Return an outline as a closed line with fewer points."""
     thinned = outline_px[:: max(1, len(outline_px) // _MOST_POINTS)].tolist()
     return QPolygonF([QPointF(x, y) for x, y in [*thinned, thinned[0]]])
 
@@ -177,7 +177,7 @@ def _pen(color: QColor | str, width_px: float, style: Qt.PenStyle = Qt.PenStyle.
 
 
 def _qimage(view: EyeView) -> QImage:
-    """Return the view's image in the format that Qt scales fastest; a null one without image."""
+    """Return the view's image in the format that Qt scales fastest; a null image without one."""
     if view.image is None:
         return QImage()
     height, width = view.image.shape[:2]

@@ -1,4 +1,4 @@
-"""The wearer's view panel: hand and cursor as each eye sees them through its display."""
+"""The wearer's view panel: hand and cursor seen by each eye through its display."""
 
 from __future__ import annotations
 
@@ -14,27 +14,30 @@ from handcal_gui.widgets.missing import what_is_missing
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
 _TITLES: dict[Eye, str] = {"left": "Left eye", "right": "Right eye"}
-_EMPTY = "What this eye sees will appear here. Hold a hand up before the depth camera."
+_EMPTY = "This eye's view will appear here. Hold a hand in front of the depth camera."
 _CLOSED = "Closed: this alignment is for the other eye."
 _ERROR = (
     "Mean distance between the hand's outline as the eye sees it and as {}, "
     "in the display's pixels and in minutes of arc (′)"
 )
 _LEGEND = {
-    "hand": ("Hand", "The hand, and the target of a trial, as the eye sees them"),
-    "drawn": ("Drawn", "Hand and target as the headset draws them: on the others if φ is right"),
-    "cursor": ("Cursor", "The frozen hand as the headset draws it"),
+    "hand": ("Hand", "The hand, and the target of a trial, as seen by the eye"),
+    "drawn": (
+        "Drawn",
+        "Hand and target as drawn by the headset; they cover the others if φ is right",
+    ),
+    "cursor": ("Cursor", "The frozen hand as drawn by the headset"),
     "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
 }
 
 _NUMBER_SCALE = 0.85
-"""Both eyes' numbers fit side by side into a narrow dock."""
+"""Font scale at which both eyes' numbers fit side by side into a narrow dock."""
 
 
 class WearerViewPanel(QWidget):
-    """Both eyes side by side: what calibration did is seen here.
+    """Both eyes side by side, to show the effect of the calibration.
 
-    With the simulator the pictures are what the true eyes see; with a real headset they are
+    With the simulator the images show the view of the true eyes; with a real headset they are
     predicted from the solved eye shift.
     """
 
@@ -48,7 +51,7 @@ class WearerViewPanel(QWidget):
         }
         whole, before = QCheckBox("Whole display"), QCheckBox("Before calibration")
         whole.setObjectName("wearer-view-whole")
-        whole.setToolTip("Show all of each display instead of the part that holds the hand")
+        whole.setToolTip("Show each whole display instead of the part with the hand")
         before.setObjectName("wearer-view-before")
         before.setToolTip(_LEGEND["offline"][1])
         before.toggled.connect(self._entries["offline"].setVisible)
@@ -59,7 +62,7 @@ class WearerViewPanel(QWidget):
         self._lay_out(whole, before)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show what the eyes see, which eye is closed, or why there is nothing to see."""
+        """Show the eyes' views, the closed eye, or a message."""
         procedure, missing = snapshot.procedure, what_is_missing(snapshot)
         for eye, column in self._eyes.items():
             is_closed = procedure.cursor is not None and eye not in procedure.eyes
@@ -87,7 +90,7 @@ class WearerViewPanel(QWidget):
 
 
 class _EyeColumn(QWidget):
-    """One eye's title, picture and errors."""
+    """One eye's title, view and errors."""
 
     def __init__(self, title: str) -> None:
         super().__init__()
@@ -107,7 +110,7 @@ class _EyeColumn(QWidget):
         self.show_view(None, "", is_solved=False)
 
     def show_view(self, view: EyeView | None, message: str, *, is_solved: bool) -> None:
-        """Show a view, or why there is none; errors only where the eye's place is known."""
+        """Show a view or a message; errors only if the eye's position is known."""
         self.canvas.show_view(view, message or ("" if view else _EMPTY))
         self._title.setText(f"{self._name}{_origin(view, is_solved=is_solved)}")
         is_known = view is not None and (view.is_true or is_solved) and not message
@@ -116,7 +119,7 @@ class _EyeColumn(QWidget):
 
 
 def _origin(view: EyeView | None, *, is_solved: bool) -> str:
-    """Return where the knowledge of the eye's place comes from."""
+    """Return the source of the eye's position."""
     if view is None:
         return ""
     if view.is_true:
@@ -125,7 +128,7 @@ def _origin(view: EyeView | None, *, is_solved: bool) -> str:
 
 
 class _ErrorRow(QWidget):
-    """By how much a drawn outline misses the hand."""
+    """The distance of a drawn outline from the hand."""
 
     def __init__(self, name: str, tooltip: str) -> None:
         super().__init__()
@@ -140,7 +143,7 @@ class _ErrorRow(QWidget):
         layout.addWidget(self._arcmin)
 
     def emphasise(self) -> None:
-        """Stand out from the rows beside."""
+        """Emphasise this row."""
         for label in self.findChildren(QLabel):
             font = label.font()
             font.setBold(True)

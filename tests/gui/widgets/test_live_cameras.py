@@ -62,7 +62,7 @@ def test_what_both_see_is_shown_until_it_is_stopped(qtbot: QtBot, pair: Pair) ->
     qtbot.waitUntil(lambda: pair.levels == [50, 90])
     pair.widget.stop()
     assert pair.levels == []
-    assert [view.message for view in pair.widget.findChildren(ImageView)] == 2 * ["No picture"]
+    assert [view.message for view in pair.widget.findChildren(ImageView)] == 2 * ["No image"]
     assert not any(camera.is_open for camera in pair.cameras.values())
     pair.choose(0, "Camera 1")
     pair.choose(1, "Camera 0")

@@ -33,7 +33,7 @@ def panel(qtbot: QtBot) -> CameraPanel:
 
 
 def view(panel: CameraPanel, name: str) -> ImageView:
-    found = panel.findChild(ImageView, f"{name}-picture")
+    found = panel.findChild(ImageView, f"{name}-image")
     assert found is not None
     return found
 
@@ -150,7 +150,7 @@ def test_colour_from_another_camera_has_the_hand_elsewhere(
 def test_a_camera_without_colour_says_so(panel: CameraPanel, snapshot: Maker, shots: Shots) -> None:
     depth_only = replace(shots.frame, color=None, color_intrinsics=None)
     panel.show_snapshot(snapshot(frame=depth_only))
-    assert view(panel, "colour").message == "This camera gives no colour picture."
+    assert view(panel, "colour").message == "This camera has no colour image."
     assert not view(panel, "depth").message
 
 
@@ -168,7 +168,7 @@ def test_an_unplugged_camera_leaves_its_last_picture_dimmed(
             t_host_ns=NOW_NS + 20_000_000_000,
         )
     )
-    assert view(panel, "colour").message == "No picture"
+    assert view(panel, "colour").message == "No image"
     assert text(panel, "camera-age") == "20 s"
     dimmed = picture(panel)
     assert dimmed != before

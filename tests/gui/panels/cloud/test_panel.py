@@ -103,7 +103,7 @@ def test_unplugged_camera_takes_the_hand_away(panel: CloudPanel, snapshot: MakeS
     panel.show_snapshot(
         snapshot(State.SHOW_HAND, observation=None, camera={"problem": "the camera is gone"})
     )
-    assert _view(panel).accessibleDescription() == "No picture"
+    assert _view(panel).accessibleDescription() == "No image"
     assert _count(_view(panel), colors().live) == 0
 
 

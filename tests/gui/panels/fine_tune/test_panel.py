@@ -114,7 +114,7 @@ def test_shows_what_the_headset_renders_with(
         (State.ALIGN, "Confirm the alignment"),
         (State.ALIGNED, "Solve"),
         (State.SOLVED, "Apply"),
-        (State.APPLYING, "taking"),
+        (State.APPLYING, "receiving"),
     ],
 )
 def test_cannot_be_used_amid_an_alignment(
@@ -397,7 +397,7 @@ def test_a_silent_headset_is_told(
     field(panel, "left", 1).setValue(4.0)
     late_ns = time.monotonic_ns() + 3_000_000_000
     panel.show_snapshot(snapshot(State.APPLIED, procedure={"is_applied": False}, t_host_ns=late_ns))
-    assert "not acknowledged" in status(panel)
+    assert "Not acknowledged" in status(panel)
 
 
 def test_every_field_has_a_name_and_an_explanation(panel: FineTunePanel) -> None:

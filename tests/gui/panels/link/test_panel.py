@@ -70,7 +70,7 @@ def test_it_tells_how_the_link_does(panel: LinkPanel, snapshot: Maker) -> None:
     assert text(panel, "clock-3") == "−5.000 s ± 0.3 ms"
     assert text(panel, "clock-drift-2") == "−12.0 ppm"
     assert text(panel, "unacknowledged-1") == "2"
-    assert text(panel, "given-up-1") == "1"
+    assert text(panel, "failed-1") == "1"
     assert text(panel, "resent-1") == "7"
     assert text(panel, "lost-1") == text(panel, "data-1") == "–", "one reading gives no rate"
 

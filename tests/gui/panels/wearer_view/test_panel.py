@@ -96,7 +96,7 @@ def test_eye_that_is_closed_says_so(panel: WearerViewPanel, snapshot: MakeSnapsh
             "No hand",
         ),
         ({"observation": {"hand": None, "problem": "no pose yet"}}, "No pose yet"),
-        ({"observation": None, "camera": {"problem": "no camera is connected"}}, "No picture"),
+        ({"observation": None, "camera": {"problem": "no camera is connected"}}, "No image"),
     ],
 )
 def test_problem_takes_the_place_of_the_view(
