@@ -46,6 +46,16 @@ class FuseSettings:
     """How exactly a wearer matches the size, relative."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Fused:
+    """Estimates from several alignments, for each eye that took part in any."""
+
+    shifts: Mapping[Eye, EyeShift]
+    covariances_after_another_m2: Mapping[Eye, Float64]
+    """each (3, 3); covariances to expect after one more alignment that is as informative as those
+    so far are on average, and agrees with them as well."""
+
+
 def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> EyeShift:
     """Return the estimate with the eye box as prior: what is hardly known is drawn to C0."""
     prior = np.eye(3) / settings.eye_box_sigma_m**2
@@ -59,7 +69,7 @@ def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> Ey
 
 def fuse_alignments(
     solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
-) -> dict[Eye, EyeShift]:
+) -> Fused:
     """Fuse solved alignments into one estimate for each eye that took part in any.
 
     Parameters
@@ -76,46 +86,26 @@ def fuse_alignments(
     HandError
         If a cursor lies wholly beside cut edges.
     """
-    rows, disagreement = _observe_all(solved, rig, settings)
-    estimate_m, joint_m2 = _combine(rows, disagreement, settings)
-    return {
-        eye: _summarise(
-            [shifts[eye] for _, shifts in solved if eye in shifts],
-            estimate_m[_of(eye)],
-            joint_m2[_of(eye), _of(eye)],
-        )
-        for eye in _took_part(solved)
-    }
-
-
-def covariances_after_another(
-    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
-) -> dict[Eye, Float64]:
-    """Return each eye's covariance (3, 3) in m² to expect after one more alignment.
-
-    One that tells as much as those so far do on average, and agrees with them as well. Takes and
-    raises what `fuse_alignments` does.
-    """
-    rows, disagreement = _observe_all(solved, rig, settings)
-    # The same information as of so many alignments more is that of so much less noise.
-    noise = disagreement * len(rows) / (len(rows) + 1)
-    _, joint_m2 = _combine(rows, noise, settings)
-    return {eye: joint_m2[_of(eye), _of(eye)] for eye in _took_part(solved)}
-
-
-def _observe_all(
-    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
-) -> tuple[list[Observed], float]:
-    """Return what every alignment saw, and by how much their noise is to be inflated."""
     if not solved:
         raise ValueError("at least one alignment is needed")
     rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
-    estimate_m, _ = _combine(rows, 1.0, settings)
-    return rows, _disagreement(rows, estimate_m)
-
-
-def _took_part(solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]]) -> list[Eye]:
-    return [eye for eye in EYES if any(eye in shifts for _, shifts in solved)]
+    disagreement = _disagreement(rows, _combine(rows, 1.0, settings)[0])
+    estimate_m, joint_m2 = _combine(rows, disagreement, settings)
+    # One more average alignment adds as much information as this much less noise.
+    less_noise = disagreement * len(rows) / (len(rows) + 1)
+    _, after_another_m2 = _combine(rows, less_noise, settings)
+    of_eye = {
+        eye: found
+        for eye in EYES
+        if (found := [shifts[eye] for _, shifts in solved if eye in shifts])
+    }
+    return Fused(
+        {
+            eye: _summarise(shifts, estimate_m[_of(eye)], joint_m2[_of(eye), _of(eye)])
+            for eye, shifts in of_eye.items()
+        },
+        {eye: after_another_m2[_of(eye), _of(eye)] for eye in of_eye},
+    )
 
 
 def _of(eye: Eye) -> slice:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from handcal.errors import CancelledError
-from handcal.register.fuse import FuseSettings, covariances_after_another, fuse_alignments
+from handcal.register.fuse import FuseSettings, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
     VerdictSettings,
@@ -84,19 +84,19 @@ def solve_session(
         report(f"Solving alignment {done + 1} of {len(alignments)}", done / len(alignments))
         solved.append(solve_alignment(alignment, rig, settings.method, checkpoint))
     pairs = list(zip(alignments, solved, strict=True))
-    shifts = fuse_alignments(pairs, rig, settings.fuse)
-    after_another_m2 = covariances_after_another(pairs, rig, settings.fuse)
+    fused = fuse_alignments(pairs, rig, settings.fuse)
     return Results(
         method=settings.method,
         alignments=tuple(solved),
-        shifts=shifts,
-        verdicts=judge(rig, shifts, settings.verdict),
-        eye_distance_m=eye_distance_m(rig, shifts),
+        shifts=fused.shifts,
+        verdicts=judge(rig, fused.shifts, settings.verdict),
+        eye_distance_m=eye_distance_m(rig, fused.shifts),
         expected_after_another_arcmin={
             eye: expected_error_arcmin(
-                rig.eyes[eye], replace(shift, covariance_m2=after_another_m2[eye])
+                rig.eyes[eye],
+                replace(shift, covariance_m2=fused.covariances_after_another_m2[eye]),
             )
-            for eye, shift in shifts.items()
+            for eye, shift in fused.shifts.items()
         },
     )
 

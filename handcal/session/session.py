@@ -26,6 +26,7 @@ from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
+from handcal.display import as_shifts
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.io.files import make_folder, read_json, read_limited, write_atomic, write_json
@@ -40,7 +41,7 @@ from handcal.session.journal import (
     journal_line,
     read_journal,
 )
-from handcal.session.state import History, SessionEvent, Shelf, clean_wearer, read_shifts
+from handcal.session.state import History, SessionEvent, Shelf, clean_wearer
 from handcal.session.trial import Trial, trial_json
 from handcal.types import Alignment, Eye, Float64, Rig
 
@@ -424,7 +425,7 @@ def _read_notes(path: Path) -> str:
 
 
 def _lists(shifts_m: Mapping[Eye, ArrayLike]) -> dict[Eye, list[float]]:
-    return {eye: shift_m.tolist() for eye, shift_m in read_shifts(shifts_m).items()}
+    return {eye: shift_m.tolist() for eye, shift_m in as_shifts(shifts_m).items()}
 
 
 def _alignment_path(path: Path, number: int) -> Path:

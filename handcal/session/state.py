@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike
-
+from handcal.display import as_shifts
 from handcal.session.journal import Event
 from handcal.session.trial import Trial, read_trial
-from handcal.types import EYES, Eye, Float64, readonly
+from handcal.types import Eye, Float64
 
 MAX_ALIGNMENTS = 100
 MAX_TRIALS = 1000
@@ -148,10 +146,10 @@ class History:
             case SessionEvent.SOLVED:
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
             case SessionEvent.APPLIED if "shift_m" in data:  # version 1 did not tell
-                self.applied_shift_m |= read_shifts(data["shift_m"])
+                self.applied_shift_m |= as_shifts(data["shift_m"])
                 self.is_applied = self.is_solved
             case SessionEvent.FINE_TUNED:
-                self.fine_tuned = read_shifts(data["shift_m"])
+                self.fine_tuned = as_shifts(data["shift_m"])
                 self.applied_shift_m |= self.fine_tuned
         if name.startswith("alignment_"):
             self.is_solved = self.is_applied = False
@@ -179,20 +177,3 @@ def clean_wearer(name: str) -> str:
     if any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name):
         raise ValueError("a wearer's name may hold no line breaks or control characters")
     return name
-
-
-def read_shifts(shifts_m: Mapping[Any, ArrayLike]) -> dict[Eye, Float64]:
-    """Return φ of each eye as (3,) arrays.
-
-    Raises
-    ------
-    ValueError
-        For an unknown eye, or a φ that is not three finite numbers.
-    """
-    unknown = set(shifts_m) - set(EYES)
-    if unknown:
-        raise ValueError(f"an eye is left or right, not {unknown.pop()!r}")
-    read = {eye: readonly(shifts_m[eye], np.float64, (3,)) for eye in EYES if eye in shifts_m}
-    if not all(np.isfinite(shift_m).all() for shift_m in read.values()):
-        raise ValueError("φ must be finite")
-    return read

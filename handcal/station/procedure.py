@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
-from handcal.display import projection_matrix, view_of_eye
+from handcal.display import as_shifts, projection_matrix, view_of_eye
 from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
 from handcal.geometry import invert, transform
 from handcal.hand.settings import SegmentSettings
@@ -37,7 +37,7 @@ from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.session.session import Session, SessionRecord
-from handcal.session.state import MAX_ALIGNMENTS, Shelf, read_shifts
+from handcal.session.state import MAX_ALIGNMENTS, Shelf
 from handcal.types import (
     EYES,
     Alignment,
@@ -52,9 +52,10 @@ from handcal.types import (
 MAX_HAND_SET_SHIFT_M = 0.030
 """Each component of a φ set by hand: beyond the eye box, whose size it is."""
 
-_LATEST_CONFIRMATION_S = 1.0
-_MIDDLE_OF_EVERY = 8  # points; a median of all takes half a millisecond
-"""Hands are kept for so long, lest a confirmation sent again finds its frame gone."""
+_KEEP_HANDS_S = 1.0
+"""Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""
+_MEDIAN_STRIDE = 8
+"""Every eighth point is enough for the median; all of them take half a millisecond."""
 
 
 class State(StrEnum):
@@ -121,8 +122,8 @@ class Observation:
     """The hand in the step's own frame, whether or not its place is known."""
     rotation_rad: Float64 | None = None
     """(3,); from the cursor to the live hand, about D's axes, while aligning."""
-    is_red: bool = False
-    """Whether that is beyond the guard's limit."""
+    is_over_limit: bool = False
+    """True if that rotation exceeds the guard's limit."""
     segment_ms: float | None = None
     guard_ms: float | None = None
     """What those stages took."""
@@ -450,7 +451,7 @@ class Calibration:
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED):
             raise ProcedureError(f"φ cannot be set by hand now ({self.state}): solve and apply")
-        shifts = read_shifts(shifts_m)
+        shifts = as_shifts(shifts_m)
         for eye, shift_m in shifts.items():
             if np.abs(shift_m).max() > MAX_HAND_SET_SHIFT_M:
                 limit_mm = 1e3 * MAX_HAND_SET_SHIFT_M
@@ -515,7 +516,7 @@ class Calibration:
 
     def _forget_hands(self) -> None:
         """Let go of what is too old for a confirmation, and for telling whether it is steady."""
-        kept_s = self._settings.steady_s + _LATEST_CONFIRMATION_S
+        kept_s = self._settings.steady_s + _KEEP_HANDS_S
         oldest_ns = self._seen_ns - round(1e9 * kept_s)
         while self._hands and self._hands[0].t_host_ns < oldest_ns:
             self._hands.popleft()
@@ -536,7 +537,7 @@ class Calibration:
                 problem = str(error)
             else:
                 points_W_m = transform(T_W_D, cloud.points_m)
-                middle_W_m = np.median(points_W_m[::_MIDDLE_OF_EVERY], axis=0)
+                middle_W_m = np.median(points_W_m[::_MEDIAN_STRIDE], axis=0)
                 hand = PlacedHand(cloud, t_ns, T_W_D, points_W_m, middle_W_m)
                 self._hands.append(hand)
             self._unplaced.popleft()
@@ -582,12 +583,12 @@ class Calibration:
             rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
         except HandError as error:
             return replace(observation, hand=None, problem=str(error))
-        is_red = self._is_over(rotation_W)
-        self._link.send_live_hand(hand.points_W_m, is_red)
+        is_over_limit = self._is_over_limit(rotation_W)
+        self._link.send_live_hand(hand.points_W_m, is_over_limit)
         return replace(
             observation,
             rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
-            is_red=is_red,
+            is_over_limit=is_over_limit,
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
 
@@ -602,7 +603,7 @@ class Calibration:
             self._refuse(f"{error}. Align and confirm again.", "no hand")
             return
         angle_deg = float(np.degrees(np.linalg.norm(rotation_W)))
-        if self._is_over(rotation_W):
+        if self._is_over_limit(rotation_W):
             self.refused += 1
             limit_deg = np.degrees(self._settings.guard.limit_rad)
             advice = turn_advice(hand.T_W_D[:3, :3].T @ rotation_W)
@@ -644,7 +645,7 @@ class Calibration:
         refused = {"reason": reason, "angle_deg": angle_deg, "cursor_id": self._cursor_id}
         self._store(lambda session: session.record("refused", **refused))
 
-    def _is_over(self, rotation: Float64) -> bool:
+    def _is_over_limit(self, rotation: Float64) -> bool:
         return float(np.linalg.norm(rotation)) > self._settings.guard.limit_rad
 
     def _clear_cursor(self) -> None:

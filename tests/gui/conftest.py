@@ -125,7 +125,7 @@ def snapshot(
 ) -> Callable[..., Snapshot]:
     """Return a maker of snapshots: of a state, aligning by default, with changes to it.
 
-    ``snapshot(State.ALIGN, observation={"is_red": True}, camera={"dropped": 3}, number=2)``
+    ``snapshot(State.ALIGN, observation={"is_over_limit": True}, camera={"dropped": 3}, number=2)``
     changes fields of the parts `observation`, `procedure`, `camera` and `link`, and of the
     snapshot itself; ``observation=None`` leaves it out.
     """

@@ -217,14 +217,18 @@ def test_a_hand_lost_is_said_and_nothing_can_be_made_of_it(live: Technician, stu
 def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> None:
     make_cursor(live, studio)
     studio.camera.shows = "turned"
-    live.wait(lambda: live.snapshot.observation is not None and live.snapshot.observation.is_red)
+    live.wait(
+        lambda: live.snapshot.observation is not None and live.snapshot.observation.is_over_limit
+    )
     studio.headset.confirm()
     live.wait(lambda: live.snapshot.procedure.refused == 1)
     assert "more than 9°" in live.child(QLabel, "wizardNote").text()
     assert live.record.alignments == ()
     studio.camera.shows = "live"
     live.wait(
-        lambda: live.snapshot.observation is not None and not live.snapshot.observation.is_red
+        lambda: (
+            live.snapshot.observation is not None and not live.snapshot.observation.is_over_limit
+        )
     )
     live.qtbot.wait(300)
     studio.headset.confirm()

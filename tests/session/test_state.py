@@ -1,12 +1,11 @@
 import contextlib
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.session.journal import Event
-from handcal.session.state import History, SessionEvent, Shelf, read_shifts
+from handcal.session.state import History, SessionEvent, Shelf
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))
@@ -56,11 +55,3 @@ def test_an_event_of_others_changes_nothing_but_that_it_goes_on() -> None:
     assert history.is_finished
     history.take(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
     assert not history.is_finished
-
-
-def test_shifts_are_read_only_and_in_the_order_of_the_eyes() -> None:
-    read = read_shifts({"right": [1, 2, 3], "left": [0, 0, 0]})
-    assert list(read) == ["left", "right"]
-    np.testing.assert_array_equal(read["right"], [1.0, 2.0, 3.0])
-    with pytest.raises(ValueError, match="read-only"):
-        read["right"][0] = 0.0

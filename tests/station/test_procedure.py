@@ -253,11 +253,11 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
 
     seen = stage.see(T_D_NEAR)
     assert seen.state is State.ALIGN
-    assert not seen.is_red
+    assert not seen.is_over_limit
     assert seen.rotation_rad is not None
     assert np.linalg.norm(seen.rotation_rad) < np.radians(1.0)
     eventually(lambda: stage.shown().live_W_m is not None)
-    assert not stage.shown().live_red
+    assert not stage.shown().is_over_limit
     stage.press()
     assert stage.see(T_D_NEAR).state is State.ALIGNED
     results = calibration.solve()
@@ -292,11 +292,11 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
 ) -> None:
     stage.make_cursor()
     seen = stage.see(T_D_TURNED)
-    assert seen.is_red
+    assert seen.is_over_limit
     assert seen.rotation_rad is not None
     # About the camera's z axis, as the hand was turned about its own, which nearly is that.
     np.testing.assert_allclose(np.degrees(seen.rotation_rad), [0.0, 3.0, 14.7], atol=1.0)
-    eventually(lambda: stage.shown().live_red)
+    eventually(lambda: stage.shown().is_over_limit)
     stage.press()
     assert stage.see(T_D_TURNED).state is State.ALIGN
     assert stage.calibration.refused == 1

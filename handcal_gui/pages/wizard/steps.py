@@ -210,7 +210,7 @@ class Wizard:
     def _align(self, snapshot: Snapshot) -> View:
         procedure, seen = snapshot.procedure, snapshot.observation
         hand = _hand_check(snapshot)
-        is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_red
+        is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
         limit_deg = np.degrees(procedure.guard_limit_rad)
         cursor = procedure.cursor
         # A second press of what made the cursor must not confirm a hand that has not moved.

@@ -117,7 +117,7 @@ class CloudPanel(QWidget):
             return
         self._pairs.setEnabled(True)
         axes = _live_axes(cursor, placed)
-        is_red = seen is not None and seen.is_red
+        is_red = seen is not None and seen.is_over_limit
         role = "red" if is_red else "live"
         self._show(
             None if cursor is None else _Cloud("Cursor", "cursor", axes.mm(cursor.points_W_m)),

@@ -77,12 +77,12 @@ class RotationPanel(QWidget):
             self._show_nothing("? No hand", sentence(observation.problem) or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
-        if angle_rad < _STRAIGHT_RAD and not observation.is_red:
+        if angle_rad < _STRAIGHT_RAD and not observation.is_over_limit:
             self._dial.show_angle(angle_rad, self._limit_rad, "✓ Hold still")
             self._hand.show_turn("")
             self._advice.setText(_STRAIGHT)
             return
-        word = "▲ Turn back" if observation.is_red else "✓ Near enough"
+        word = "▲ Turn back" if observation.is_over_limit else "✓ Near enough"
         advice = turn_advice(observation.rotation_rad)
         self._dial.show_angle(angle_rad, self._limit_rad, word)
         self._hand.show_turn(advice.axis, positive=advice.angle_rad > 0)

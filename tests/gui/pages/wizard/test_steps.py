@@ -142,7 +142,7 @@ def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
 
 def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) -> None:
     refusal = "Your hand is turned by 14.0°, more than 9°."
-    seen = {"is_red": True}
+    seen = {"is_over_limit": True}
     view = Wizard().view(
         snapshot(procedure={"eyes": ("left",), "refusal": refusal}, observation=seen)
     )
