@@ -177,7 +177,7 @@ def test_a_simulated_hand_segmented(roi: Any, golden: dict[str, Any]) -> None:
 
 def test_the_example_session_exported(tmp_path: Path, golden: dict[str, Any]) -> None:
     record = Session.open(resource_path("example_session"))
-    export_session(record, tmp_path, ExportSettings(), lambda *_: None, lambda: False)
+    export_session(record, tmp_path, ExportSettings())
     texts = sorted(path for pattern in TEXTS for path in tmp_path.rglob(pattern))
     names = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*"))
     check("export-files", names, golden)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -13,6 +13,7 @@ from handcal.camera.camera import Camera
 from handcal.camera.recordings import record_frames
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.files import make_folder
+from handcal.progress import Progress
 from handcal.types import Frame
 
 _POLL_S = 0.2
@@ -50,8 +51,7 @@ def record(
     camera: Camera,
     path: Path,
     settings: RecordSettings,
-    report: Callable[[str, float], None],
-    is_stopped: Callable[[], bool],
+    progress: Progress = Progress(),
 ) -> Recorded:
     """Record a camera until it ends or fails, a limit is reached, or it is stopped.
 
@@ -64,10 +64,8 @@ def record(
     path : Path
         A ``.db3`` file, which replaces another once complete, or a new folder.
     settings : RecordSettings
-    report : callable
-        Given what is being done and the share done, for every frame.
-    is_stopped : callable
-        Asked for every frame.
+    progress : Progress
+        Reported to for every frame; cancelling it ends the recording and keeps it.
 
     Raises
     ------
@@ -78,7 +76,7 @@ def record(
     ValueError
         If `path` has another suffix than ``.db3``, or the camera changes.
     """
-    take = _Take(camera, make_folder(path.absolute().parent), settings, report, is_stopped)
+    take = _Take(camera, make_folder(path.absolute().parent), settings, progress)
     first = next(take.frames, None)
     if first is None:
         raise CameraError(f"nothing was recorded: {take.stop_reason}")
@@ -90,12 +88,7 @@ class _Take:
     """The frames of one recording, and what is to be said of them."""
 
     def __init__(
-        self,
-        camera: Camera,
-        disk: Path,
-        settings: RecordSettings,
-        report: Callable[[str, float], None],
-        is_stopped: Callable[[], bool],
+        self, camera: Camera, disk: Path, settings: RecordSettings, progress: Progress
     ) -> None:
         self.stop_reason = ""
         self.dropped = 0
@@ -103,13 +96,12 @@ class _Take:
         self.frames = self._until_limit(self._from_first_color(self._live(camera)))
         self._disk = disk
         self._settings = settings
-        self._report = report
-        self._is_stopped = is_stopped
+        self._progress = progress
 
     def _live(self, camera: Camera) -> Iterator[Frame]:
         """Yield frames until the camera ends or the recording is stopped."""
         heard_s = time.monotonic()
-        while not self._is_stopped():
+        while not self._progress.is_cancelled():
             try:
                 frame = camera.read(_POLL_S)
             except CameraTimeoutError as error:
@@ -145,7 +137,7 @@ class _Take:
             self.dropped += max(0, frame.index - previous.index - 1)
             self.duration_s = (frame.t_camera_ns - first.t_camera_ns) * 1e-9
             share = max(self.duration_s / settings.duration_s, count / settings.frames)
-            self._report("recording", min(1.0, share))
+            self._progress.show(min(1.0, share), "recording")
             yield frame
             if share >= 1.0:
                 self.stop_reason = "as long as asked for"

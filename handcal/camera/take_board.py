@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from glob import escape
@@ -13,6 +13,7 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
+from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
 from handcal.rig.choose import ChooseSettings, ViewChooser
@@ -53,8 +54,7 @@ def take_views(
     folders: Sequence[Path],
     board: Board,
     settings: TakeSettings,
-    report: Callable[[str, float], None],
-    is_stopped: Callable[[], bool] = lambda: False,
+    progress: Progress = Progress(),
 ) -> Taken:
     """Take images of a board by itself: of one camera, or of the two of pairs.
 
@@ -66,10 +66,8 @@ def take_views(
         Where each one's images go; those that are there stay.
     board : Board
     settings : TakeSettings
-    report : callable
-        Told what is being done, and the share done.
-    is_stopped : callable
-        Asked at every moment; what is kept by then stays.
+    progress : Progress
+        Reported to at every moment; cancelling it ends the search and keeps the images so far.
 
     Raises
     ------
@@ -83,12 +81,12 @@ def take_views(
     next_ns = 0
     for images, t_ns in _moments(cameras):
         share = 1e-9 * t_ns / settings.seconds
-        if chooser.is_done or share > 1.0 or is_stopped():
+        if chooser.is_done or share > 1.0 or progress.is_cancelled():
             break
         if t_ns < next_ns:
             continue
         next_ns = t_ns + round(1e9 * settings.every_s)
-        report(f"{verdicts['']} views kept", share)
+        progress.show(share, f"{verdicts['']} views kept")
         why_not = chooser.look(see_board(images, board))
         if not why_not:
             keep_images(images, folders)

@@ -127,6 +127,7 @@ def solve(arguments: argparse.Namespace) -> None:
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
+    from handcal.progress import Progress
     from handcal.session.session import Session
 
     try:
@@ -138,7 +139,7 @@ def export(arguments: argparse.Namespace) -> None:
     record = Session.open(arguments.session)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
     with progress() as report:
-        files = export_session(record, folder, settings, report, lambda: False)
+        files = export_session(record, folder, settings, Progress(report))
     for file in files:
         console.print(str(file))
 
@@ -171,6 +172,7 @@ def record(arguments: argparse.Namespace) -> None:
     """Record a camera: into a .db3 file through librealsense, or into a folder of images."""
     from handcal.camera.record import RecordSettings
     from handcal.camera.record import record as record_camera
+    from handcal.progress import Progress
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
     with _open_source(arguments) as camera, until_interrupted() as is_stopped:
@@ -178,7 +180,9 @@ def record(arguments: argparse.Namespace) -> None:
         console.print(said, markup=False)
         try:
             with progress() as report:
-                recorded = record_camera(camera, arguments.output, settings, report, is_stopped)
+                recorded = record_camera(
+                    camera, arguments.output, settings, Progress(report, is_stopped)
+                )
         except ValueError as error:
             raise HandcalError(str(error)) from error
     save(arguments.json, asdict(recorded))

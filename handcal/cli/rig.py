@@ -66,6 +66,7 @@ def take(arguments: argparse.Namespace) -> None:
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.take_board import TakeSettings, keep_imager, take_views
     from handcal.camera.view_source import open_view_source
+    from handcal.progress import Progress
     from handcal.rig.choose import ALIKE, ChooseSettings
 
     sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
@@ -91,7 +92,7 @@ def take(arguments: argparse.Namespace) -> None:
         is_stopped = stack.enter_context(until_interrupted())
         report = stack.enter_context(progress())
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
-        taken = take_views(cameras, folders, board, settings, report, is_stopped)
+        taken = take_views(cameras, folders, board, settings, Progress(report, is_stopped))
     for why, count in taken.passed_over.items():
         console.print(f"{count} of {taken.looked_at} moments passed over: {why}")
     if not taken.kept:

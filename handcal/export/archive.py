@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from handcal.errors import FileError
+from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 
 MAX_ARCHIVE_BYTES = 4 * 2**30
@@ -15,7 +16,7 @@ _CHUNK_BYTES = 2**19
 
 
 def write_archive(
-    path: Path, record: SessionRecord, excluded: Path, checkpoint: Callable[[float], None]
+    path: Path, record: SessionRecord, excluded: Path, progress: Progress = Progress()
 ) -> None:
     """Write a session's folder as a zip file, under its own name.
 
@@ -28,8 +29,8 @@ def write_archive(
     record : SessionRecord
     excluded : Path
         A folder that is left out if it lies in the session's: where exports go.
-    checkpoint : callable
-        Told the share done, every half megabyte at the latest; what it raises ends the writing.
+    progress : Progress
+        Reported to every half megabyte at the latest.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def write_archive(
                             target.write(chunk)
                             left_bytes -= len(chunk)
                             done_bytes += len(chunk)
-                            checkpoint(done_bytes / total_bytes)
+                            progress.at(done_bytes / total_bytes)
             stream.flush()
             os.fsync(stream.fileno())
     except OSError as error:

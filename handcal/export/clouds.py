@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from handcal.export.outcome import Outcome
 from handcal.io.files import make_folder, write_ply
+from handcal.progress import Progress
 
 
-def write_clouds(folder: Path, outcome: Outcome, checkpoint: Callable[[float], None]) -> None:
+def write_clouds(folder: Path, outcome: Outcome, progress: Progress = Progress()) -> None:
     """Write ``alignment-N-cursor.ply`` and ``alignment-N-hand.ply`` for each alignment.
 
     Points are doubles in W, in metres; `is_cut` is 1 beside a cut edge. The hand's
@@ -23,7 +23,7 @@ def write_clouds(folder: Path, outcome: Outcome, checkpoint: Callable[[float], N
     solved = outcome.results.alignments if outcome.results else ()
     numbered = zip(record.alignment_numbers, record.alignments, solved, strict=True)
     for done, (number, alignment, shifts) in enumerate(numbered):
-        checkpoint(done / len(solved))
+        progress.at(done / len(solved))
         write_ply(
             folder / f"alignment-{number}-cursor.ply",
             alignment.cursor_m,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from handcal.display import projection_matrix
+from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
@@ -64,16 +65,14 @@ class Outcome:
         return Projection(eye, P, display.width_px, display.height_px)
 
 
-def conclude(
-    record: SessionRecord, checkpoint: Callable[[float], None] = lambda _share: None
-) -> Outcome:
+def conclude(record: SessionRecord, progress: Progress = Progress()) -> Outcome:
     """Solve a session's alignments again, with its own settings.
 
     Parameters
     ----------
     record : SessionRecord
-    checkpoint : callable
-        Told the share done, before each alignment; what it raises ends the solving.
+    progress : Progress
+        Reported to before each alignment.
 
     Raises
     ------
@@ -81,7 +80,7 @@ def conclude(
         If its settings are unreadable or an alignment cannot be solved.
     """
     settings = stored_solve_settings(record)
-    results = solve_again(record, settings, lambda _what, share: checkpoint(share))
+    results = solve_again(record, settings, progress)
     return Outcome(
         record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
     )

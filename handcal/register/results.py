@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from handcal.errors import CancelledError
+from handcal.progress import Progress
 from handcal.register.fuse import FuseSettings, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
@@ -51,8 +51,7 @@ def solve_session(
     alignments: Sequence[Alignment],
     rig: Rig,
     settings: SolveSettings,
-    report: Callable[[str, float], object] = lambda *_: None,
-    is_cancelled: Callable[[], bool] = lambda: False,
+    progress: Progress = Progress(),
 ) -> Results:
     """Solve, fuse and judge alignments; equal input gives equal output, bit for bit.
 
@@ -61,10 +60,8 @@ def solve_session(
     alignments : sequence of Alignment
     rig : Rig
     settings : SolveSettings
-    report : callable
-        Told before each alignment what is going on and which share of the whole is done.
-    is_cancelled : callable
-        Asked before each alignment, and by the slow methods before each iteration.
+    progress : Progress
+        Reported to before each alignment; the slow methods can be cancelled before each iteration.
 
     Raises
     ------
@@ -73,16 +70,10 @@ def solve_session(
     CancelledError
         If it was cancelled.
     """
-
-    def checkpoint() -> None:
-        if is_cancelled():
-            raise CancelledError("solving was cancelled")
-
     solved = []
     for done, alignment in enumerate(alignments):
-        checkpoint()
-        report(f"Solving alignment {done + 1} of {len(alignments)}", done / len(alignments))
-        solved.append(solve_alignment(alignment, rig, settings.method, checkpoint))
+        progress.at(done / len(alignments), f"Solving alignment {done + 1} of {len(alignments)}")
+        solved.append(solve_alignment(alignment, rig, settings.method, progress.check))
     pairs = list(zip(alignments, solved, strict=True))
     fused = fuse_alignments(pairs, rig, settings.fuse)
     return Results(

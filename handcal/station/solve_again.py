@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
+from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import CalibrationSettings
@@ -18,10 +17,7 @@ def stored_solve_settings(record: SessionRecord) -> SolveSettings:
 
 
 def solve_again(
-    record: SessionRecord,
-    settings: SolveSettings,
-    report: Callable[[str, float], object] = lambda *_: None,
-    is_cancelled: Callable[[], bool] = lambda: False,
+    record: SessionRecord, settings: SolveSettings, progress: Progress = Progress()
 ) -> Results | None:
     """Return what a session's alignments say; None if there are none.
 
@@ -29,8 +25,8 @@ def solve_again(
     ----------
     record : SessionRecord
     settings : SolveSettings
-    report, is_cancelled : callable
-        As `solve_session` takes them.
+    progress : Progress
+        As in `solve_session`.
 
     Raises
     ------
@@ -42,6 +38,6 @@ def solve_again(
     if not record.alignments:
         return None
     try:
-        return solve_session(record.alignments, record.rig, settings, report, is_cancelled)
+        return solve_session(record.alignments, record.rig, settings, progress)
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject
 
+from handcal.progress import Progress
 from handcal.register.results import SolveSettings, solve_session
 from handcal.types import Alignment, Method, Rig
-from handcal_gui.engine.jobs import IsCancelled, Job, Report
+from handcal_gui.engine.jobs import Job
 from handcal_gui.panels.results.panel import ResultsPanel
 
 
@@ -53,9 +54,9 @@ class Comparison(QObject):
         alignments, rig = self._alignments, self._rig
         settings = replace(self._settings, method=method)
 
-        def work(report: Report, is_cancelled: IsCancelled) -> object:
+        def work(progress: Progress) -> object:
             assert rig is not None
-            return solve_session(alignments, rig, settings, report, is_cancelled)
+            return solve_session(alignments, rig, settings, progress)
 
         self._job = Job(work)
         self._job.succeeded.connect(self._panel.show_comparison)

@@ -8,11 +8,12 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
+from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal_gui.control.compare import Comparison
-from handcal_gui.engine.jobs import IsCancelled, Job, Report
+from handcal_gui.engine.jobs import Job
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.window import MainWindow
 
@@ -60,10 +61,10 @@ class Review(QObject):
         """Read and solve a session, then show it."""
         self.close()
 
-        def work(report: Report, is_cancelled: IsCancelled) -> _Stored:
+        def work(progress: Progress) -> _Stored:
             record = Session.open(path)
             settings = stored_solve_settings(record)
-            results = solve_again(record, settings, report, is_cancelled)
+            results = solve_again(record, settings, progress)
             return _Stored(record, settings, results)
 
         self._job = Job(work)

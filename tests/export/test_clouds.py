@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from handcal.export.clouds import write_clouds
 from handcal.export.outcome import Outcome
+from handcal.progress import Progress
 
 KINDS = {"double": "<f8", "uchar": "u1"}
 
@@ -22,7 +23,7 @@ def read(path: Path) -> NDArray[Any]:
 
 def test_clouds_and_residuals_come_back(tmp_path: Path, outcome: Outcome) -> None:
     shares: list[float] = []
-    write_clouds(tmp_path / "clouds", outcome, shares.append)
+    write_clouds(tmp_path / "clouds", outcome, Progress(lambda _what, share: shares.append(share)))
     assert shares == [0.0, 0.5]
     assert sorted(path.name for path in (tmp_path / "clouds").iterdir()) == [
         f"alignment-{number}-{which}.ply" for number in (1, 3) for which in ("cursor", "hand")

@@ -10,6 +10,7 @@ import pytest
 from handcal.display import projection_matrix
 from handcal.errors import FileError
 from handcal.export.outcome import Outcome, conclude
+from handcal.progress import Progress
 from handcal.register.results import results_json
 from handcal.session.session import SessionRecord
 
@@ -55,7 +56,7 @@ def test_without_alignments_there_is_only_the_offline_calibration(empty: Session
 
 def test_it_tells_how_far_it_is(record: SessionRecord) -> None:
     shares: list[float] = []
-    conclude(record, shares.append)
+    conclude(record, Progress(lambda _what, share: shares.append(share)))
     assert shares == [0.0, 0.5]
 
 
