@@ -19,11 +19,10 @@ def write_clouds(folder: Path, outcome: Outcome, progress: Progress = Progress()
     partner on the cursor, NaN for an outlier.
     """
     make_folder(folder)
-    record = outcome.record
-    solved = outcome.results.alignments if outcome.results else ()
-    numbered = zip(record.alignment_numbers, record.alignments, solved, strict=True)
-    for done, (number, alignment, shifts) in enumerate(numbered):
+    solved = outcome.results.alignments if outcome.results else {}
+    for done, (number, shifts) in enumerate(solved.items()):
         progress.at(done / len(solved))
+        alignment = outcome.record.alignments[number]
         write_ply(
             folder / f"alignment-{number}-cursor.ply",
             alignment.cursor_m,

@@ -13,9 +13,9 @@ from handcal.session.trial import Trial
 from handcal.types import Eye, Float64
 
 
-def convergence_rows(numbers: Sequence[int], results: Results) -> Iterator[Row]:
+def convergence_rows(results: Results) -> Iterator[Row]:
     """Yield a row for every iteration of every alignment and eye."""
-    for number, shifts in zip(numbers, results.alignments, strict=True):
+    for number, shifts in results.alignments.items():
         for eye, shift in shifts.items():
             for iteration, rms_m in enumerate(np.sqrt(shift.history_m2), 1):
                 yield {
@@ -62,10 +62,10 @@ def overlay_rows(
                     }
 
 
-def running_mean_rows(numbers: Sequence[int], trials: Sequence[Trial]) -> Iterator[Row]:
+def running_mean_rows(trials: Mapping[int, Trial]) -> Iterator[Row]:
     """Yield a row for every trial, with the mean of the eye's trials so far."""
     errors: dict[Eye, list[float]] = {}
-    for number, trial in zip(numbers, trials, strict=True):
+    for number, trial in trials.items():
         so_far = errors.setdefault(trial.eye, [])
         so_far.append(float(trial.error_arcmin.mean()))
         yield {

@@ -5,7 +5,7 @@ Left and right differ in colour, marker and line, so that the report also reads 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -40,10 +40,10 @@ _MASK_PX, _GAP_PX = 500, 9
 _AROUND_DISPLAY = 0.12
 
 
-def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Results) -> None:
+def draw_convergence(axes: Sequence[Axes], results: Results) -> None:
     """Draw how the registration error of each alignment fell, one pair of axes for each eye."""
     for ax, eye in zip(axes, EYES, strict=True):
-        for number, shifts in zip(numbers, results.alignments, strict=True):
+        for number, shifts in results.alignments.items():
             if eye in shifts:
                 rms_mm = 1e3 * np.sqrt(shifts[eye].history_m2)
                 steps = np.arange(1, len(rms_mm) + 1)
@@ -66,7 +66,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
             offset = -0.12 if eye == "left" else 0.12
             each = {
                 place + offset: shifts[eye]
-                for place, shifts in enumerate(results.alignments, 1)
+                for place, shifts in enumerate(results.alignments.values(), 1)
                 if eye in shifts
             }
             if eye in results.shifts:
@@ -87,7 +87,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
                 ax.plot(tuned + offset, tuned_mm, MARKERS[eye], color=COLORS[eye], mfc="none")
         ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
         ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
-        numbers = outcome.record.alignment_numbers
+        numbers = list(results.alignments)
         names: dict[float, str] = {
             index + 1: str(numbers[index]) for index in range(0, count, -(-count // 6))
         }
@@ -98,10 +98,10 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
     axes[0].legend(fontsize=6.5, frameon=False)
 
 
-def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results) -> None:
+def draw_ellipses(axes: Sequence[Axes], results: Results) -> None:
     """Draw φ1 and φ2 of every alignment and fused with their 1σ ellipses, axes for each eye."""
     for ax, eye in zip(axes, EYES, strict=True):
-        for number, shifts in zip(numbers, results.alignments, strict=True):
+        for number, shifts in results.alignments.items():
             if eye in shifts:
                 _ellipse(ax, shifts[eye], "0.45", linewidth=0.8)
                 x_mm, y_mm, _ = 1e3 * shifts[eye].shift_m
@@ -200,7 +200,7 @@ def draw_overlay(ax: Axes, display: EyeDisplay, outlines: Mapping[str, Sequence[
     ax.set_aspect("equal")
 
 
-def draw_trial_errors(axes: Sequence[Axes], trials: Sequence[Trial]) -> None:
+def draw_trial_errors(axes: Sequence[Axes], trials: Collection[Trial]) -> None:
     """Draw box plots of the corners' errors by distance and eye: in pixels, and in arcminutes."""
     depths_m = sorted({trial.target_depth_m for trial in trials})
     for ax, name, unit in zip(axes, ("error_px", "error_arcmin"), ("px", "arcmin"), strict=True):
@@ -232,12 +232,12 @@ def draw_trial_errors(axes: Sequence[Axes], trials: Sequence[Trial]) -> None:
     axes[0].legend(fontsize=6.5, frameon=False)
 
 
-def draw_running_mean(ax: Axes, numbers: Sequence[int], trials: Sequence[Trial]) -> None:
+def draw_running_mean(ax: Axes, trials: Mapping[int, Trial]) -> None:
     """Draw each trial's mean error and the mean of all so far, by eye."""
     for eye in EYES:
         errors = {
             number: float(trial.error_arcmin.mean())
-            for number, trial in zip(numbers, trials, strict=True)
+            for number, trial in trials.items()
             if trial.eye == eye
         }
         if errors:

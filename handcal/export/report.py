@@ -58,7 +58,7 @@ def _sections(outcome: Outcome) -> Iterator[Section]:
         yield _solution(outcome, results)
         yield _alignments(outcome, results)
         yield _shift_plots(outcome, results)
-        yield _convergence(outcome, results)
+        yield _convergence(results)
         yield _residuals(outcome, results)
         yield _overlays(outcome)
     if record.trials:
@@ -206,10 +206,8 @@ def _alignments(outcome: Outcome, results: Results) -> Section:
                 f"{100 * shift.inlier_ratio:.0f}",
                 str(shift.iterations),
             ]
-            for number, alignment, shifts in zip(
-                record.alignment_numbers, record.alignments, results.alignments, strict=True
-            )
-            for eye, shift in shifts.items()
+            for number, alignment in record.alignments.items()
+            for eye, shift in results.alignments[number].items()
         ],
         "Each alignment solved alone, without priors; eyes: those open. One alignment with both "
         "eyes open shows one hand displacement for both; fusing shares it out between them.",
@@ -218,7 +216,6 @@ def _alignments(outcome: Outcome, results: Results) -> Section:
 
 
 def _shift_plots(outcome: Outcome, results: Results) -> Section:
-    numbers = outcome.record.alignment_numbers
     rows = list(parameter_rows(outcome))
     return Section(
         "φ of each alignment, and fused",
@@ -235,7 +232,7 @@ def _shift_plots(outcome: Outcome, results: Results) -> Section:
                 "ellipses",
                 "Grey: each alignment by its number; coloured: fused. Ellipses are 1σ (39 % of "
                 "cases); the cross at 0 is the viewpoint of the offline calibration.",
-                lambda axes: figures.draw_ellipses(axes, numbers, results),
+                lambda axes: figures.draw_ellipses(axes, results),
                 rows,
                 height_mm=68.0,
                 columns=2,
@@ -244,13 +241,12 @@ def _shift_plots(outcome: Outcome, results: Results) -> Section:
     )
 
 
-def _convergence(outcome: Outcome, results: Results) -> Section:
-    numbers = outcome.record.alignment_numbers
+def _convergence(results: Results) -> Section:
     figure = Figure(
         "convergence",
         "Root mean square distance of the pairs at each iteration.",
-        lambda axes: figures.draw_convergence(axes, numbers, results),
-        list(convergence_rows(numbers, results)),
+        lambda axes: figures.draw_convergence(axes, results),
+        list(convergence_rows(results)),
         height_mm=55.0,
         columns=2,
     )
@@ -259,7 +255,9 @@ def _convergence(outcome: Outcome, results: Results) -> Section:
 
 def _residuals(outcome: Outcome, results: Results) -> Section:
     record = outcome.record
-    residuals_m = [shift.residuals_m for each in results.alignments for shift in each.values()]
+    residuals_m = [
+        shift.residuals_m for each in results.alignments.values() for shift in each.values()
+    ]
     most_mm = 1e3 * float(np.nanpercentile(np.concatenate(residuals_m), 98))
 
     def draw(number: int, cells: Mapping[Eye, ResidualCells], axes: Sequence[Axes]) -> None:
@@ -274,11 +272,10 @@ def _residuals(outcome: Outcome, results: Results) -> Section:
         "The hand as the eye faces it, in E, mm; colour: mean residual in cells of "
         f"{figures.CELL_MM:g} mm; grey: only outliers, or points that belong to a cut edge."
     ]
-    for number, alignment, shifts in zip(
-        record.alignment_numbers, record.alignments, results.alignments, strict=True
-    ):
+    for number, alignment in record.alignments.items():
         cells = {
-            eye: figures.residual_cells(alignment, eye, shift) for eye, shift in shifts.items()
+            eye: figures.residual_cells(alignment, eye, shift)
+            for eye, shift in results.alignments[number].items()
         }
         rows = list(residual_rows(number, cells))
         drawn = partial(draw, number, cells)
@@ -291,7 +288,7 @@ def _overlays(outcome: Outcome) -> Section:
     record = outcome.record
     newest = {
         eye: (number, alignment)
-        for number, alignment in zip(record.alignment_numbers, record.alignments, strict=True)
+        for number, alignment in record.alignments.items()
         for eye in alignment.eyes
     }
     items: list[Item] = [
@@ -323,7 +320,7 @@ def _overlay(outcome: Outcome, eye: Eye, number: int, alignment: Alignment) -> F
 
 def _user_test(outcome: Outcome) -> Section:
     record = outcome.record
-    statistics = summarise(record.trials)
+    statistics = summarise(record.trials.values())
     groups = {"all": statistics.total} if statistics.total else {}
     groups |= {f"{eye} eye": errors for eye, errors in statistics.by_eye.items()}
     groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
@@ -343,17 +340,16 @@ def _user_test(outcome: Outcome) -> Section:
     boxes = Figure(
         "trial-errors",
         "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
-        lambda axes: figures.draw_trial_errors(axes, record.trials),
-        list(trial_rows(record.trial_numbers, record.trials)),
+        lambda axes: figures.draw_trial_errors(axes, record.trials.values()),
+        list(trial_rows(record.trials)),
         height_mm=62.0,
         columns=2,
     )
-    numbers = record.trial_numbers
     running = Figure(
         "running-mean",
         "Points: mean error of each trial; lines: mean of all so far.",
-        lambda axes: figures.draw_running_mean(axes[0], numbers, record.trials),
-        list(running_mean_rows(numbers, record.trials)),
+        lambda axes: figures.draw_running_mean(axes[0], record.trials),
+        list(running_mean_rows(record.trials)),
         height_mm=48.0,
     )
     return Section("User test", [table, _interval(outcome), boxes, running])
@@ -362,13 +358,13 @@ def _user_test(outcome: Outcome) -> Section:
 def _interval(outcome: Outcome) -> str:
     """Return how sure the mean error is."""
     trials = outcome.record.trials
-    calibrations = calibration_numbers(trials)
+    calibrations = list(calibration_numbers(trials).values())
     if len(set(calibrations)) < 2:
         return (
             "All trials judge one calibration, so how far another would differ is not known: no "
             "interval is given for the mean."
         )
-    errors = [float(trial.error_arcmin.mean()) for trial in trials]
+    errors = [float(trial.error_arcmin.mean()) for trial in trials.values()]
     found = mean_interval(errors, calibrations)
     return (
         f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
@@ -400,7 +396,7 @@ def _trials(outcome: Outcome) -> Section:
                 f"{trial.error_px.mean():.2f}",
                 f"{trial.error_arcmin.mean():.2f}",
             ]
-            for number, trial in zip(record.trial_numbers, record.trials, strict=True)
+            for number, trial in record.trials.items()
         ],
     )
     return Section("Trials", [table])

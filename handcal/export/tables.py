@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,16 +68,15 @@ def write_parameters(path: Path, outcome: Outcome) -> None:
 
 def write_trials(path: Path, outcome: Outcome) -> None:
     """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    record = outcome.record
-    _write(path, _TRIALS, outcome, trial_rows(record.trial_numbers, record.trials))
+    _write(path, _TRIALS, outcome, trial_rows(outcome.record.trials))
 
 
 def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
     """Yield a row for every φ of each eye."""
     record, results = outcome.record, outcome.results
     if results is not None:
-        numbered = zip(record.alignment_numbers, record.alignments, results.alignments, strict=True)
-        for number, alignment, shifts in numbered:
+        for number, shifts in results.alignments.items():
+            alignment = record.alignments[number]
             for eye, shift in shifts.items():
                 yield {
                     "source": "alignment",
@@ -133,9 +132,9 @@ def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
     }
 
 
-def trial_rows(numbers: Sequence[int], trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
-    """Yield a row for every corner of every trial, given with their numbers."""
-    for number, trial in zip(numbers, trials, strict=True):
+def trial_rows(trials: Mapping[int, Trial]) -> Iterator[dict[str, Any]]:
+    """Yield a row for every corner of every trial."""
+    for number, trial in trials.items():
         for corner in range(len(trial.corners_E_m)):
             x_m, y_m, z_m = map(float, trial.corners_E_m[corner])
             yield {

@@ -35,8 +35,8 @@ class Results:
     """What all alignments so far say."""
 
     method: Method
-    alignments: tuple[Mapping[Eye, EyeShift], ...]
-    """Each alignment alone, without prior."""
+    alignments: Mapping[int, Mapping[Eye, EyeShift]]
+    """Each alignment alone, without prior, by number."""
     shifts: Mapping[Eye, EyeShift]
     """Fused; what the headset shall render with."""
     verdicts: Mapping[Eye, Verdict]
@@ -48,7 +48,7 @@ class Results:
 
 
 def solve_session(
-    alignments: Sequence[Alignment],
+    alignments: Mapping[int, Alignment] | Sequence[Alignment],
     rig: Rig,
     settings: SolveSettings,
     progress: Progress = Progress(),
@@ -57,7 +57,8 @@ def solve_session(
 
     Parameters
     ----------
-    alignments : sequence of Alignment
+    alignments : mapping of int to Alignment, or sequence of Alignment
+        By number; those of a sequence are numbered from 1.
     rig : Rig
     settings : SolveSettings
     progress : Progress
@@ -70,15 +71,18 @@ def solve_session(
     CancelledError
         If it was cancelled.
     """
-    solved = []
-    for done, alignment in enumerate(alignments):
+    numbered = (
+        alignments if isinstance(alignments, Mapping) else dict(enumerate(alignments, start=1))
+    )
+    solved = {}
+    for done, (number, alignment) in enumerate(numbered.items()):
         progress.at(done / len(alignments), f"Solving alignment {done + 1} of {len(alignments)}")
-        solved.append(solve_alignment(alignment, rig, settings.method, progress.check))
-    pairs = list(zip(alignments, solved, strict=True))
+        solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
+    pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
     fused = fuse_alignments(pairs, rig, settings.fuse)
     return Results(
         method=settings.method,
-        alignments=tuple(solved),
+        alignments=solved,
         shifts=fused.shifts,
         verdicts=judge(rig, fused.shifts, settings.verdict),
         eye_distance_m=eye_distance_m(rig, fused.shifts),
@@ -105,7 +109,7 @@ def results_json(results: Results) -> dict[str, Any]:
         "eye_distance_m": results.eye_distance_m,
         "alignments": [
             {eye: _shift_json(shift) for eye, shift in shifts.items()}
-            for shifts in results.alignments
+            for shifts in results.alignments.values()
         ],
     }
 

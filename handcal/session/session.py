@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from numpy.typing import ArrayLike
 
@@ -41,7 +41,7 @@ from handcal.session.journal import (
     journal_line,
     read_journal,
 )
-from handcal.session.state import History, SessionEvent, Shelf, clean_wearer
+from handcal.session.state import Kind, SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import Trial, trial_json
 from handcal.types import Alignment, Eye, Float64, Rig
 
@@ -60,16 +60,12 @@ class SessionRecord:
     """Name or code; empty if not told."""
     notes: str
     events: tuple[Event, ...]
-    alignments: tuple[Alignment, ...]
-    """Those not deleted, in the order in which they were saved."""
-    alignment_numbers: tuple[int, ...]
-    """Theirs, by which they can be deleted."""
-    deleted: Mapping[int, Alignment]
-    """The others, by number; they can be restored."""
-    trials: tuple[Trial, ...]
-    trial_numbers: tuple[int, ...]
+    alignments: Mapping[int, Alignment]
+    """The alignments that are not deleted, by number, in the order in which they were saved."""
+    deleted_alignments: Mapping[int, Alignment]
+    trials: Mapping[int, Trial]
     deleted_trials: Mapping[int, Trial]
-    """Likewise, trials of the user test."""
+    """Trials of the user test, likewise."""
     results: dict[str, Any] | None
     """The newest; None if none were saved since an alignment was deleted or restored."""
     is_solved: bool
@@ -120,7 +116,7 @@ class Session(Closable):
         except BaseException:
             self.close()
             raise
-        self._history = _replay(path, record.events)
+        self._state = _replay(path, record.events)
         self._journal = JournalWriter(
             path / "journal.jsonl",
             JournalContent(record.events, record.journal_bytes, record.torn_bytes),
@@ -190,30 +186,28 @@ class Session(Closable):
         if not (path / "journal.jsonl").is_file():
             raise FileError(f"{path} is no session; give the folder that holds its journal.jsonl")
         journal = read_journal(path / "journal.jsonl")
-        history = _replay(path, journal.events)
-        if history.rig_sha256 != _sha256(_rig_bytes(path)):
+        state = _replay(path, journal.events)
+        if state.rig_sha256 != _sha256(_rig_bytes(path)):
             raise FileError(f"{path / 'rig.yaml'} is damaged: its checksum is not the journal's")
-        known = _alignments_by_number(before) if before else {}
+        known = {**before.alignments, **before.deleted_alignments} if before else {}
         results, notes = path / "results.json", path / "notes.txt"
         return SessionRecord(
             path=path,
             rig=read_rig(path / "rig.yaml"),
             settings=read_json(path / "settings.json"),
-            wearer=history.wearer,
+            wearer=state.wearer,
             notes=_read_notes(notes) if notes.exists() else "",
             events=journal.events,
-            alignments=tuple(_read_alignments(path, history.alignments.kept, known).values()),
-            alignment_numbers=tuple(history.alignments.kept),
-            deleted=MappingProxyType(_read_alignments(path, history.alignments.deleted, known)),
-            trials=tuple(history.trials.kept.values()),
-            trial_numbers=tuple(history.trials.kept),
-            deleted_trials=MappingProxyType(history.trials.deleted),
+            alignments=_read_alignments(path, state.alignments.active, known),
+            deleted_alignments=_read_alignments(path, state.alignments.deleted, known),
+            trials=MappingProxyType(state.trials.active),
+            deleted_trials=MappingProxyType(state.trials.deleted),
             results=read_json(results) if results.exists() else None,
-            is_solved=history.is_solved and results.exists(),
-            is_applied=history.is_applied and results.exists(),
-            applied_shift_m=MappingProxyType(history.applied_shift_m),
-            fine_tuned=history.fine_tuned and MappingProxyType(history.fine_tuned),
-            is_finished=history.is_finished,
+            is_solved=state.is_solved and results.exists(),
+            is_applied=state.is_applied and results.exists(),
+            applied_shift_m=MappingProxyType(state.applied_shift_m),
+            fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
+            is_finished=state.is_finished,
             journal_bytes=journal.complete_bytes,
             torn_bytes=journal.torn_bytes,
         )
@@ -240,43 +234,13 @@ class Session(Closable):
         FileError
             If it cannot be written, is too large, or the session has had too many.
         """
-        number = self._next_number(self._history.alignments)
+        number = self._next_number("alignment")
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
         write_atomic(_alignment_path(self.path, number), data)
         self._append(SessionEvent.ALIGNMENT_SAVED, {"number": number, "sha256": _sha256(data)})
         return number
-
-    def delete_alignment(self, number: int) -> None:
-        """Leave out an alignment, and the results with it.
-
-        Raises
-        ------
-        FileError
-            If the folder cannot be written.
-        ValueError
-            If there is none of that number.
-        """
-        shelf = self._history.alignments
-        shelf.require(number, shelf.kept)
-        self._remove_results()
-        self._append(SessionEvent.ALIGNMENT_DELETED, {"number": number})
-
-    def restore_alignment(self, number: int) -> None:
-        """Take back the deletion of an alignment; the results go all the same.
-
-        Raises
-        ------
-        FileError
-            If the folder cannot be written.
-        ValueError
-            If none of that number is deleted.
-        """
-        shelf = self._history.alignments
-        shelf.require(number, shelf.deleted)
-        self._remove_results()
-        self._append(SessionEvent.ALIGNMENT_RESTORED, {"number": number})
 
     def save_trial(self, trial: Trial) -> int:
         """Store a trial of the user test, as of now, and return its number, from 1.
@@ -286,37 +250,27 @@ class Session(Closable):
         FileError
             If the journal cannot be written, or the session has had too many.
         """
-        number = self._next_number(self._history.trials)
+        number = self._next_number("trial")
         self._append(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
         return number
 
-    def delete_trial(self, number: int) -> None:
-        """Leave out a trial.
+    def delete(self, kind: Kind, number: int) -> None:
+        """Mark an alignment or a trial as deleted; results go with an alignment.
 
         Raises
         ------
         FileError
-            If the journal cannot be written.
+            If the folder cannot be written.
         ValueError
-            If there is none of that number.
+            If there is none of this number.
         """
-        shelf = self._history.trials
-        shelf.require(number, shelf.kept)
-        self._append(SessionEvent.TRIAL_DELETED, {"number": number})
+        self._state.items(kind).require_active(number)
+        self._change(kind, "deleted", number)
 
-    def restore_trial(self, number: int) -> None:
-        """Take back the deletion of a trial.
-
-        Raises
-        ------
-        FileError
-            If the journal cannot be written.
-        ValueError
-            If none of that number is deleted.
-        """
-        shelf = self._history.trials
-        shelf.require(number, shelf.deleted)
-        self._append(SessionEvent.TRIAL_RESTORED, {"number": number})
+    def restore(self, kind: Kind, number: int) -> None:
+        """Restore a deleted alignment or trial; raises and removes results as `delete`."""
+        self._state.items(kind).require_deleted(number)
+        self._change(kind, "restored", number)
 
     def save_results(self, results: Mapping[str, Any]) -> None:
         """Replace the results, those of all alignments; FileError if they cannot be written."""
@@ -365,49 +319,49 @@ class Session(Closable):
         """Let other programs write to the session; safe to call twice."""
         self._lock.release()
 
-    def _next_number(self, shelf: Shelf[Any]) -> int:
+    def _next_number(self, kind: Kind) -> int:
         try:
-            return shelf.next_number()
+            return self._state.items(kind).next_number()
         except ValueError as error:
             raise FileError(f"{self.path} is full: {error}; start another session") from error
 
-    def _remove_results(self) -> None:
-        results = self.path / "results.json"
-        try:
-            results.unlink(missing_ok=True)
-        except OSError as error:
-            raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
+    def _change(self, kind: Kind, what: Literal["deleted", "restored"], number: int) -> None:
+        if kind == "alignment":  # the results are those of other alignments
+            results = self.path / "results.json"
+            try:
+                results.unlink(missing_ok=True)
+            except OSError as error:
+                raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
+        self._append(SessionEvent(f"{kind}_{what}"), {"number": number})
 
     def _append(self, event: str, data: dict[str, Any]) -> None:
-        self._history.take(self._journal.append(event, data))
+        self._state.apply(self._journal.append(event, data))
         self.revision += 1
 
 
-def _replay(path: Path, events: Sequence[Event]) -> History:
+def _replay(path: Path, events: Sequence[Event]) -> SessionState:
     """Return what the events of a session's journal add up to; FileError if they do not."""
     journal = path / "journal.jsonl"
     if not events or events[0].name != SessionEvent.CREATED:
         raise FileError(f"{journal} does not begin as the journal of a session")
-    history = History()
+    state = SessionState()
     for event in events:
         try:
-            history.take(event)
+            state.apply(event)
         except ValueError as error:
             raise FileError(f"{journal}: line {event.number}: {error}") from error
-    return history
-
-
-def _alignments_by_number(record: SessionRecord) -> dict[int, Alignment]:
-    return {**dict(zip(record.alignment_numbers, record.alignments, strict=True)), **record.deleted}
+    return state
 
 
 def _read_alignments(
     path: Path, checksums: Mapping[int, str], known: Mapping[int, Alignment]
-) -> dict[int, Alignment]:
-    return {
-        number: known.get(number) or _read_alignment(_alignment_path(path, number), sha256)
-        for number, sha256 in checksums.items()
-    }
+) -> Mapping[int, Alignment]:
+    return MappingProxyType(
+        {
+            number: known.get(number) or _read_alignment(_alignment_path(path, number), sha256)
+            for number, sha256 in checksums.items()
+        }
+    )
 
 
 def _read_alignment(path: Path, sha256: str) -> Alignment:

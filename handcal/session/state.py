@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from handcal.display import as_shifts
 from handcal.session.journal import Event
@@ -15,6 +15,9 @@ from handcal.types import Eye, Float64
 MAX_ALIGNMENTS = 100
 MAX_TRIALS = 1000
 MAX_WEARER_CHARACTERS = 100
+
+Kind: TypeAlias = Literal["alignment", "trial"]
+"""Items of a session that can be deleted and restored."""
 
 Item = TypeVar("Item")
 
@@ -37,60 +40,64 @@ class SessionEvent(StrEnum):
     FINISHED = "finished"
 
 
-class Shelf(Generic[Item]):
-    """Numbered things that can be deleted and restored.
+class NumberedItems(Generic[Item]):
+    """Items numbered from 1 that can be deleted and restored; a number is never given twice.
 
     Attributes
     ----------
-    kept, deleted : dict of int to item
+    active, deleted : dict of int to item
     """
 
-    def __init__(self, kind: str, limit: int) -> None:
-        self.kept: dict[int, Item] = {}
+    def __init__(self, kind: Kind, limit: int) -> None:
+        self.active: dict[int, Item] = {}
         self.deleted: dict[int, Item] = {}
         self._kind = kind
         self._limit = limit
 
     def next_number(self) -> int:
-        """Return the number of the next, from 1; ValueError if there are too many."""
-        number = 1 + max((*self.kept, *self.deleted), default=0)
+        """Return the number of the next item; ValueError if there are too many."""
+        number = 1 + max((*self.active, *self.deleted), default=0)
         if number > self._limit:
             raise ValueError(f"no room for more than {self._limit} {self._kind}s")
         return number
 
     def save(self, number: int, item: Item) -> None:
-        """Take a new one; ValueError unless it has the next number."""
+        """Add an item; ValueError unless its number is the next one."""
         if number != self.next_number():
             raise ValueError(f"{self._kind} {number} is not the next")
-        self.kept[number] = item
+        self.active[number] = item
 
-    def require(self, number: int, where: Mapping[int, Item]) -> None:
-        """Raise ValueError if there is none of that number in `kept` or in `deleted`."""
-        if number not in where:
-            state = "deleted " if where is self.deleted else ""
-            raise ValueError(f"there is no {state}{self._kind} {number}")
+    def require_active(self, number: int) -> None:
+        """Raise ValueError unless there is an active item of this number."""
+        if number not in self.active:
+            raise ValueError(f"there is no {self._kind} {number}")
+
+    def require_deleted(self, number: int) -> None:
+        """Raise ValueError unless there is a deleted item of this number."""
+        if number not in self.deleted:
+            raise ValueError(f"there is no deleted {self._kind} {number}")
 
     def delete(self, number: int) -> None:
-        """Put one aside; ValueError if there is none."""
-        self.require(number, self.kept)
-        self.deleted[number] = self.kept.pop(number)
+        """Delete an active item; ValueError if there is none."""
+        self.require_active(number)
+        self.deleted[number] = self.active.pop(number)
 
     def restore(self, number: int) -> None:
-        """Put one back in its place; ValueError if none of that number is deleted."""
-        self.require(number, self.deleted)
-        self.kept = dict(sorted({**self.kept, number: self.deleted.pop(number)}.items()))
+        """Restore a deleted item to its place; ValueError if there is none."""
+        self.require_deleted(number)
+        self.active = dict(sorted({**self.active, number: self.deleted.pop(number)}.items()))
 
 
-class History:
-    """What there is after the events so far.
+class SessionState:
+    """The state of a session after the events applied so far.
 
     Attributes
     ----------
     rig_sha256 : str
     wearer : str
-    alignments : Shelf of str
+    alignments : NumberedItems of str
         Checksums.
-    trials : Shelf of Trial
+    trials : NumberedItems of Trial
     is_solved, is_applied, is_finished : bool
     applied_shift_m : dict of eye to (3,) float64
     fine_tuned : dict of eye to (3,) float64, or None
@@ -100,15 +107,19 @@ class History:
     def __init__(self) -> None:
         self.rig_sha256 = ""
         self.wearer = ""
-        self.alignments = Shelf[str]("alignment", MAX_ALIGNMENTS)
-        self.trials = Shelf[Trial]("trial", MAX_TRIALS)
+        self.alignments = NumberedItems[str]("alignment", MAX_ALIGNMENTS)
+        self.trials = NumberedItems[Trial]("trial", MAX_TRIALS)
         self.is_solved = False
         self.is_applied = False
         self.is_finished = False
         self.applied_shift_m: dict[Eye, Float64] = {}
         self.fine_tuned: dict[Eye, Float64] | None = None
 
-    def take(self, event: Event) -> None:
+    def items(self, kind: Kind) -> NumberedItems[Any]:
+        """Return the alignments or the trials."""
+        return self.alignments if kind == "alignment" else self.trials
+
+    def apply(self, event: Event) -> None:
         """Go on by an event; one that is not the session's own changes nothing.
 
         Raises
@@ -117,14 +128,14 @@ class History:
             If the event lacks something, or cannot follow those before it.
         """
         try:
-            self._take(event.name, event.data, event.time)
+            self._apply(event.name, event.data, event.time)
         except KeyError as error:
             raise ValueError(f"{event.name} lacks {error}") from error
         except (TypeError, AttributeError, OverflowError) as error:
             raise ValueError(f"{event.name} holds something wrong: {error}") from error
         self.is_finished = event.name == SessionEvent.FINISHED
 
-    def _take(self, name: str, data: dict[str, Any], time: str) -> None:
+    def _apply(self, name: str, data: dict[str, Any], time: str) -> None:
         match name:
             case SessionEvent.CREATED:
                 self.rig_sha256 = data["rig_sha256"]
@@ -132,7 +143,7 @@ class History:
             case SessionEvent.ALIGNMENT_SAVED:
                 self.alignments.save(_number(data), data["sha256"])
             case SessionEvent.ALIGNMENT_DROPPED:
-                self.alignments.kept.pop(_number(data))
+                self.alignments.active.pop(_number(data))
             case SessionEvent.ALIGNMENT_DELETED:
                 self.alignments.delete(_number(data))
             case SessionEvent.ALIGNMENT_RESTORED:

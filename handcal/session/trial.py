@@ -6,7 +6,7 @@ the real one; where its corners are drawn then is taken for the truth.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,7 +122,7 @@ def make_trial(
     )
 
 
-def summarise(trials: Sequence[Trial]) -> TrialStatistics:
+def summarise(trials: Collection[Trial]) -> TrialStatistics:
     """Return statistics of trials; JSON-able with `dataclasses.asdict`."""
     return TrialStatistics(
         total=_errors(trials) if trials else None,
@@ -131,17 +131,19 @@ def summarise(trials: Sequence[Trial]) -> TrialStatistics:
     )
 
 
-def calibration_numbers(trials: Sequence[Trial]) -> tuple[int, ...]:
-    """Return which calibration each of a session's trials judges, from 1.
+def calibration_numbers(trials: Mapping[int, Trial]) -> dict[int, int]:
+    """Return the number, from 1, of the calibration that each of a session's trials judges.
 
     A calibration is what has a calibrated φ of its own; the first of the left eye is that of the
     right eye too, and so on, as both are aligned together.
     """
     known: dict[Eye, dict[bytes, int]] = {eye: {} for eye in EYES}
-    return tuple(
-        known[trial.eye].setdefault(trial.calibrated_shift_m.tobytes(), 1 + len(known[trial.eye]))
-        for trial in trials
-    )
+    return {
+        number: known[trial.eye].setdefault(
+            trial.calibrated_shift_m.tobytes(), 1 + len(known[trial.eye])
+        )
+        for number, trial in trials.items()
+    }
 
 
 def trial_json(trial: Trial) -> dict[str, Any]:
@@ -168,14 +170,14 @@ def read_trial(data: Mapping[str, Any], time: str) -> Trial:
         raise ValueError(f"the trial holds something else than numbers: {error}") from error
 
 
-def _by(trials: Sequence[Trial], name: str) -> dict[Any, ErrorStatistics]:
+def _by(trials: Collection[Trial], name: str) -> dict[Any, ErrorStatistics]:
     return {
         value: _errors([trial for trial in trials if getattr(trial, name) == value])
         for value in sorted({getattr(trial, name) for trial in trials})
     }
 
 
-def _errors(trials: Sequence[Trial]) -> ErrorStatistics:
+def _errors(trials: Collection[Trial]) -> ErrorStatistics:
     px = np.concatenate([trial.error_px for trial in trials])
     arcmin = np.concatenate([trial.error_arcmin for trial in trials])
     return ErrorStatistics(

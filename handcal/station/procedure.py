@@ -37,7 +37,7 @@ from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.session.session import Session, SessionRecord
-from handcal.session.state import MAX_ALIGNMENTS, Shelf
+from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
 from handcal.types import (
     EYES,
     Alignment,
@@ -190,7 +190,7 @@ class Calibration:
         self._cursor_id = 0
         self._guard: RotationGuard | None = None
         self._confirmation: Confirmation | None = None
-        self._shelf = Shelf[Alignment]("alignment", MAX_ALIGNMENTS)
+        self._items = NumberedItems[Alignment]("alignment", MAX_ALIGNMENTS)
         self._unstored: deque[Callable[[Session], object]] = deque()
         self._shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
         self._sent: dict[Eye, Outgoing] = {}
@@ -200,14 +200,9 @@ class Calibration:
         self._send_projections(self._shift_m)
 
     @property
-    def alignments(self) -> tuple[Alignment, ...]:
-        """Those not deleted, in the order in which they were made."""
-        return tuple(self._shelf.kept.values())
-
-    @property
-    def alignment_numbers(self) -> tuple[int, ...]:
-        """Numbers of `alignments`, the same as in the session."""
-        return tuple(self._shelf.kept)
+    def alignments(self) -> Mapping[int, Alignment]:
+        """The alignments that are not deleted, by their number in the session."""
+        return MappingProxyType(dict(self._items.active))
 
     @property
     def cursor(self) -> PlacedHand | None:
@@ -276,7 +271,7 @@ class Calibration:
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
         try:
-            self._shelf.next_number()
+            self._items.next_number()
         except ValueError as error:
             raise ProcedureError(f"{error} in a session; start another") from error
         hand = self._hands[-1]
@@ -321,7 +316,7 @@ class Calibration:
             If the session cannot be written; the alignment is given up all the same.
         """
         if self.state in (State.ALIGNED, State.SOLVED):
-            self.delete_alignment(self.alignment_numbers[-1])
+            self.delete_alignment(max(self._items.active))
         elif self.state is State.ALIGN:
             self._show_hand_again()
         else:
@@ -340,9 +335,9 @@ class Calibration:
             If the session cannot be written; the alignment is left out all the same.
         """
         self._require_settled()
-        self._shelf.delete(number)
+        self._items.delete(number)
         self._forget_results()
-        self._store(lambda session: session.delete_alignment(number))
+        self._store(lambda session: session.delete("alignment", number))
 
     def restore_alignment(self, number: int) -> None:
         """Take back the deletion of an alignment; the results go all the same.
@@ -350,9 +345,9 @@ class Calibration:
         Raises as `delete_alignment`.
         """
         self._require_settled()
-        self._shelf.restore(number)
+        self._items.restore(number)
         self._forget_results()
-        self._store(lambda session: session.restore_alignment(number))
+        self._store(lambda session: session.restore("alignment", number))
 
     def solve(self) -> Results:
         """Solve all alignments so far.
@@ -472,8 +467,8 @@ class Calibration:
 
     def _resume(self, record: SessionRecord) -> None:
         """Go on where a session ended: what was on its way then has to be done again."""
-        self._shelf.kept = dict(zip(record.alignment_numbers, record.alignments, strict=True))
-        self._shelf.deleted = dict(record.deleted)
+        self._items.active = dict(record.alignments)
+        self._items.deleted = dict(record.deleted_alignments)
         self._shift_m |= record.applied_shift_m
         if record.is_solved:
             try:
@@ -626,7 +621,7 @@ class Calibration:
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._shift_m),
         )
-        self._shelf.save(self._shelf.next_number(), alignment)
+        self._items.save(self._items.next_number(), alignment)
         self.state = State.ALIGNED
         self.refusal = ""
         self._store(lambda session: session.save_alignment(alignment))

@@ -29,8 +29,8 @@ class Procedure:
     refused: int
     """Confirmations refused so far."""
     guard_limit_rad: float
-    alignments: tuple[Alignment, ...]
-    """Those not deleted, even while the session cannot take them."""
+    alignments: Mapping[int, Alignment]
+    """Those not deleted, by number, even while the session cannot take them."""
     results: Results | None
     """Of all alignments; None while there are none, or alignments have changed since."""
     applied_shift_m: Mapping[Eye, Float64]

@@ -26,6 +26,7 @@ from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
+from handcal.session.state import Kind
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.eyes import TrueEyes
@@ -182,6 +183,32 @@ class Station(Closable):
             self.calibration.applied_shift_m[eye],
         )
         return self.session.save_trial(trial)
+
+    def delete(self, kind: Kind, number: int) -> None:
+        """Delete an alignment or a trial; it can be restored.
+
+        Raises
+        ------
+        ProcedureError
+            While alignments cannot be changed.
+        ValueError
+            If there is none of this number.
+        FileError
+            If a trial's deletion cannot be written; that of an alignment is kept until it can.
+        """
+        if kind == "trial":
+            self.session.delete(kind, number)
+        else:
+            with suppress(FileError):
+                self.calibration.delete_alignment(number)
+
+    def restore(self, kind: Kind, number: int) -> None:
+        """Restore a deleted alignment or trial; raises as `delete`."""
+        if kind == "trial":
+            self.session.restore(kind, number)
+        else:
+            with suppress(FileError):
+                self.calibration.restore_alignment(number)
 
     def show_target(self, eye: Eye, depth_m: float) -> None:
         """Let the headset draw the target of a trial for one eye, until φ is no longer judged.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 from PySide6.QtCore import QObject
@@ -25,14 +25,14 @@ class Comparison(QObject):
     def __init__(self, panel: ResultsPanel) -> None:
         super().__init__(panel)
         self._panel = panel
-        self._alignments: Sequence[Alignment] = ()
+        self._alignments: Mapping[int, Alignment] = {}
         self._rig: Rig | None = None
         self._settings = SolveSettings()
         self._job: Job | None = None
         panel.compare_requested.connect(self._start)
         panel.compare_cancelled.connect(self._give_up)
 
-    def use(self, alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> None:
+    def use(self, alignments: Mapping[int, Alignment], rig: Rig, settings: SolveSettings) -> None:
         """Compare these from now on."""
         self._alignments, self._rig, self._settings = alignments, rig, settings
 

@@ -183,25 +183,15 @@ class Live(QObject):
 
     def _connect_session(self) -> None:
         session, trials = self._window.panels.session, self._window.panels.trials
-        session.delete_alignment_requested.connect(
-            lambda number: self._calibrate(
-                "delete the alignment", lambda c: c.delete_alignment(number)
-            )
-        )
-        session.restore_alignment_requested.connect(
-            lambda number: self._calibrate(
-                "restore the alignment", lambda c: c.restore_alignment(number)
-            )
-        )
         for panel in (session, trials):
-            panel.delete_trial_requested.connect(
-                lambda number: self._ask(
-                    "delete the trial", lambda s: s.session.delete_trial(number)
+            panel.delete_requested.connect(
+                lambda kind, number: self._ask(
+                    f"delete the {kind}", lambda s: s.delete(kind, number)
                 )
             )
-            panel.restore_trial_requested.connect(
-                lambda number: self._ask(
-                    "restore the trial", lambda s: s.session.restore_trial(number)
+            panel.restore_requested.connect(
+                lambda kind, number: self._ask(
+                    f"restore the {kind}", lambda s: s.restore(kind, number)
                 )
             )
         session.notes_changed.connect(self._save_notes)

@@ -107,15 +107,14 @@ class Review(QObject):
         panels = self._window.panels
         note = "" if stored.results else "It holds no alignment yet."
         self._page.show_session(record, stored.results, note)
-        numbered = dict(zip(record.alignment_numbers, record.alignments, strict=True))
-        panels.results.show_results(stored.results, numbered, record.rig)
+        panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
         if stored.results is not None:
-            last = record.alignments[-1]
-            residuals_m = stored.results.alignments[-1][last.eyes[0]].residuals_m
+            number, last = list(record.alignments.items())[-1]
+            residuals_m = stored.results.alignments[number][last.eyes[0]].residuals_m
             panels.cloud.show_alignment(last, residuals_m)
             self._comparison.use(record.alignments, record.rig, stored.settings)
         self._window.show_page("review")

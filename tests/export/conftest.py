@@ -46,7 +46,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
         kept = [make_alignment(1, EYES), make_alignment(2, ("left",))]
         session.save_alignment(kept[0])
         session.save_alignment(make_alignment(3, EYES))
-        session.delete_alignment(2)
+        session.delete("alignment", 2)
         session.save_alignment(kept[1])
         session.record("refused", reason="turned", angle_deg=12.0)
         results = solve_session(kept, RIG, SolveSettings())

@@ -164,7 +164,7 @@ def test_a_new_export_replaces_the_old_one_of_its_formats(
     tmp_path: Path, record: SessionRecord
 ) -> None:
     export_session(record, tmp_path, ExportSettings(("csv", "ply")))
-    fewer = replace(record, alignments=record.alignments[:1], alignment_numbers=(1,))
+    fewer = replace(record, alignments={1: record.alignments[1]})
     export_session(fewer, tmp_path, ExportSettings(("ply",)))
     assert set(tree(tmp_path)) == {
         "clouds/alignment-1-cursor.ply",
@@ -181,8 +181,8 @@ def test_a_session_without_alignments_is_exported_too(tmp_path: Path, empty: Ses
 
 
 def test_what_cannot_be_solved_is_not_exported(tmp_path: Path, record: SessionRecord) -> None:
-    bare = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
-    broken = replace(record, alignments=(bare,), alignment_numbers=(1,))
+    bare = replace(record.alignments[1], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
+    broken = replace(record, alignments={1: bare})
     with pytest.raises(FileError, match="cannot be solved"):
         export_session(broken, tmp_path / "out", ExportSettings())
     assert not list(tmp_path.iterdir())

@@ -61,6 +61,6 @@ def test_it_tells_how_far_it_is(record: SessionRecord) -> None:
 
 
 def test_what_cannot_be_solved_is_refused_in_one_line(record: SessionRecord) -> None:
-    few = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
+    few = replace(record.alignments[1], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
     with pytest.raises(FileError, match=r"one cannot be solved: hand_m has 5 points"):
-        conclude(replace(record, alignments=(few,), alignment_numbers=(1,)))
+        conclude(replace(record, alignments={1: few}))

@@ -57,7 +57,7 @@ def test_it_says_what_was_found(pages: list[Figure], outcome: Outcome) -> None:
     assert "=P-07, $x_" in found
     assert "50 % humidity: $\\frac{1}{2" in found
     assert "1335" in found
-    assert f"{outcome.record.trials[0].error_arcmin.mean():.2f}" in found
+    assert f"{outcome.record.trials[1].error_arcmin.mean():.2f}" in found
     headings = ["Eye shift φ", "Alignments", "Convergence", "User test", "Notes", "Definitions"]
     large = [text for page in pages for text in page.texts if text.get_fontsize() == 12.5]
     assert [text.get_text() for text in large if text.get_text() in headings] == headings
@@ -77,12 +77,12 @@ def test_nothing_overlaps_or_leaves_its_page(pages: list[Figure]) -> None:
 
 def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: Outcome) -> None:
     def said(trials: Sequence[Trial]) -> str:
-        record = replace(outcome.record, trials=tuple(trials))
+        record = replace(outcome.record, trials=dict(enumerate(trials, 1)))
         report = session_report(replace(outcome, record=record))
         (test,) = (section for section in report.sections if section.title == "User test")
         return next(item for item in test.items if isinstance(item, str))
 
-    trials = list(outcome.record.trials)
+    trials = list(outcome.record.trials.values())
     assert "no interval" in said(trials)
     again = replace(trials[-1], calibrated_shift_m=np.zeros(3), error_arcmin=np.full(4, 20.0))
     first = np.mean([trial.error_arcmin.mean() for trial in trials[:-1]])

@@ -42,7 +42,7 @@ def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
         ("yes", "yes"),
     ]
     assert outcome.results is not None
-    alone, fused = outcome.results.alignments[1]["left"], outcome.results.shifts["right"]
+    alone, fused = outcome.results.alignments[3]["left"], outcome.results.shifts["right"]
     assert triple(rows[2], "phi{}_mm") == (1e3 * alone.shift_m).tolist()
     assert triple(rows[4], "sigma{}_mm") == np.sqrt(np.diag(1e6 * fused.covariance_m2)).tolist()
     assert float(rows[4]["covariance23_mm2"]) == 1e6 * fused.covariance_m2[1, 2]
@@ -59,7 +59,7 @@ def test_trials_hold_every_corner(tmp_path: Path, outcome: Outcome) -> None:
     rows = read(tmp_path / "t.csv")
     trials = outcome.record.trials
     assert len(rows) == 4 * len(trials)
-    row, trial = rows[4 * 2 + 3], trials[2]
+    row, trial = rows[4 * 2 + 3], trials[3]
     assert (row["trial"], row["corner"], row["eye"]) == ("3", "4", trial.eye)
     assert float(row["target_depth_m"]) == trial.target_depth_m
     assert [float(row["truth_x_px"]), float(row["truth_y_px"])] == trial.truth_px[3].tolist()

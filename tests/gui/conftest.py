@@ -361,7 +361,7 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
         refusal="",
         refused=0,
         guard_limit_rad=float(np.radians(9.0)),
-        alignments=(),
+        alignments={},
         results=results if is_solved else None,
         applied_shift_m=applied_m,
         is_applied=state is not State.APPLYING,

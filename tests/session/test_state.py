@@ -5,28 +5,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.session.journal import Event
-from handcal.session.state import History, SessionEvent, Shelf
+from handcal.session.state import NumberedItems, SessionEvent, SessionState
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))
-def test_a_shelf_keeps_everything_once_and_in_order(operations: list[tuple[str, int]]) -> None:
-    shelf = Shelf[str]("thing", 5)
+def test_items_are_kept_once_and_in_order(operations: list[tuple[str, int]]) -> None:
+    items = NumberedItems[str]("trial", 5)
     saved = 0
     for operation, number in operations:
         with contextlib.suppress(ValueError):
             if operation == "save":
-                shelf.save(number, f"thing {number}")
+                items.save(number, f"trial {number}")
                 saved += 1
             else:
-                getattr(shelf, operation)(number)
-        assert sorted([*shelf.kept, *shelf.deleted]) == list(range(1, saved + 1))
-        assert list(shelf.kept) == sorted(shelf.kept)
-        assert all(item == f"thing {number}" for number, item in shelf.kept.items())
+                getattr(items, operation)(number)
+        assert sorted([*items.active, *items.deleted]) == list(range(1, saved + 1))
+        assert list(items.active) == sorted(items.active)
+        assert all(item == f"trial {number}" for number, item in items.active.items())
     assert saved <= 5
 
 
 def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
-    history = History()
+    state = SessionState()
     for name, data, problem in (
         (SessionEvent.ALIGNMENT_SAVED, {"number": 2, "sha256": "x"}, "alignment 2 is not the next"),
         (SessionEvent.ALIGNMENT_DELETED, {"number": 1}, "there is no alignment 1"),
@@ -36,22 +36,22 @@ def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
         (SessionEvent.CREATED, {"rig_sha256": "x", "wearer": 3}, "holds something wrong"),
     ):
         with pytest.raises(ValueError, match=problem):
-            history.take(Event(1, "", name, data))
+            state.apply(Event(1, "", name, data))
 
 
 @pytest.mark.parametrize("number", [True, 1.0, "1", None])
 @pytest.mark.parametrize("event", [SessionEvent.ALIGNMENT_SAVED, SessionEvent.ALIGNMENT_DELETED])
 def test_what_equals_a_number_but_is_none_is_refused(number: object, event: SessionEvent) -> None:
-    history = History()
+    state = SessionState()
     if event == SessionEvent.ALIGNMENT_DELETED:
-        history.take(Event(1, "", SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}))
+        state.apply(Event(1, "", SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}))
     with pytest.raises(ValueError, match="a number is whole"):
-        history.take(Event(2, "", event, {"number": number, "sha256": "x"}))
+        state.apply(Event(2, "", event, {"number": number, "sha256": "x"}))
 
 
 def test_an_event_of_others_changes_nothing_but_that_it_goes_on() -> None:
-    history = History()
-    history.take(Event(1, "", SessionEvent.FINISHED, {}))
-    assert history.is_finished
-    history.take(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
-    assert not history.is_finished
+    state = SessionState()
+    state.apply(Event(1, "", SessionEvent.FINISHED, {}))
+    assert state.is_finished
+    state.apply(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
+    assert not state.is_finished

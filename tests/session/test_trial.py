@@ -133,5 +133,6 @@ def test_trials_of_one_calibration_are_told_from_others() -> None:
         for eye in EYES
         for depth_m in (0.4, 0.6)
     ]
-    assert calibration_numbers(trials) == (1, 1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1)
-    assert calibration_numbers([]) == ()
+    of_calibration = (1, 1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1)
+    assert calibration_numbers(dict(enumerate(trials))) == dict(enumerate(of_calibration))
+    assert calibration_numbers({}) == {}

@@ -81,7 +81,7 @@ def test_each_corner_is_an_error(user_test: UserTest) -> None:
 
 def test_errors_are_those_of_the_trials(user_test: UserTest) -> None:
     result = evaluate_user_test(user_test)
-    trials = [trial for record in user_test.sessions.values() for trial in record.trials]
+    trials = [trial for record in user_test.sessions.values() for trial in record.trials.values()]
     arcmin = np.concatenate([trial.error_arcmin for trial in trials])
     assert result.total.arcmin.mean == pytest.approx(arcmin.mean())
     assert result.total.arcmin.median == pytest.approx(np.median(arcmin))

@@ -34,13 +34,15 @@ def actions(view: View) -> list[Action]:
 
 
 def aligned(record: SessionRecord, alignment: Alignment, *eyes: tuple[Eye, ...]) -> SessionRecord:
-    return replace(record, alignments=tuple(replace(alignment, eyes=those) for those in eyes))
+    return replace(
+        record, alignments={n: replace(alignment, eyes=those) for n, those in enumerate(eyes, 1)}
+    )
 
 
 @pytest.fixture
 def start(snapshot: Maker, record: SessionRecord) -> Snapshot:
     """Return a station just opened: everything connected, a hand held still, nothing aligned."""
-    return snapshot(State.SHOW_HAND, record=replace(record, alignments=()))
+    return snapshot(State.SHOW_HAND, record=replace(record, alignments={}))
 
 
 @pytest.mark.parametrize(

@@ -134,7 +134,7 @@ def test_finished_alignment_shows_residuals_on_a_scale(
     scale = panel.findChild(ResidualScale)
     assert scale is not None
     assert not scale.isVisible()
-    panel.show_alignment(alignments[0], results.alignments[0]["left"].residuals_m)
+    panel.show_alignment(alignments[0], results.alignments[1]["left"].residuals_m)
     assert scale.isVisible()
     assert _legend(panel) == ["Cursor 600", "Hand 600"]
     assert _count(_view(panel), colors().live) == 0
