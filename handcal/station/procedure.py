@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
 from handcal.display import as_shifts, projection_matrix, view_of_eye
-from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
+from handcal.errors import HandcalError, HandError
 from handcal.geometry import invert, transform
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
@@ -38,6 +38,7 @@ from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
+from handcal.station.hands import PlacedHand, RecentHands
 from handcal.types import (
     EYES,
     Alignment,
@@ -51,11 +52,6 @@ from handcal.types import (
 
 MAX_HAND_SET_SHIFT_M = 0.030
 """Each component of a φ set by hand: beyond the eye box, whose size it is."""
-
-_KEEP_HANDS_S = 1.0
-"""Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""
-_MEDIAN_STRIDE = 8
-"""Every eighth point is enough for the median; all of them take half a millisecond."""
 
 
 class State(StrEnum):
@@ -89,21 +85,6 @@ class CalibrationSettings:
     """The hand is steady if it moved less than this for so long."""
     apply_timeout_s: float = 5.0
     """The headset has so long to acknowledge projections (`Calibration.poll_applied`)."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlacedHand:
-    """A hand cloud with its place in the world."""
-
-    cloud: HandCloud
-    t_host_ns: int
-    """Of its exposure, host's monotonic clock."""
-    T_W_D: Float64
-    """(4, 4)."""
-    points_W_m: Float64
-    """(N, 3); the cloud's surface."""
-    middle_W_m: Float64
-    """(3,); its median, to a millimetre."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,9 +164,9 @@ class Calibration:
         self._settings = settings or CalibrationSettings()
         self._clock = FrameClock(self._settings.camera_latency_s)
         self._finder = make_finder(self._settings.segment)
-        self._hands: deque[PlacedHand] = deque()
-        self._unplaced: deque[tuple[HandCloud, int]] = deque()
-        self._seen_ns = 0
+        self._hands = RecentHands(
+            link.pose_at_host_ns, rig.T_H_D, self._settings.steady_s, self._settings.steady_m
+        )
         self._cursor: PlacedHand | None = None
         self._cursor_id = 0
         self._guard: RotationGuard | None = None
@@ -230,20 +211,19 @@ class Calibration:
             If the session cannot be written; the alignment is kept in memory.
         """
         started_s = time.perf_counter()
-        self._seen_ns = self._clock.exposure_ns(frame)
+        t_host_ns = self._clock.exposure_ns(frame)
         problem = ""
         cloud: HandCloud | None = None
         try:
             cloud = self._finder.find(frame)
-            self._unplaced.append((cloud, self._seen_ns))
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
-        self._forget_hands()
-        hand, not_placed = self._place_hands()
+        hand, not_placed = self._hands.add(cloud, t_host_ns)
         problem = "" if hand else problem or not_placed
+        is_steady = self._hands.steady() is not None
         observation = Observation(
-            self.state, hand, problem, self._is_steady(), cloud, segment_ms=segment_ms
+            self.state, hand, problem, is_steady, cloud, segment_ms=segment_ms
         )
         if self.state is State.ALIGN:
             observation = self._guide(observation)
@@ -266,7 +246,8 @@ class Calibration:
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED, State.ALIGN):
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
-        if not self._is_steady():
+        hand = self._hands.steady()
+        if hand is None:
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
@@ -274,7 +255,6 @@ class Calibration:
             self._items.next_number()
         except ValueError as error:
             raise ProcedureError(f"{error} in a session; start another") from error
-        hand = self._hands[-1]
         self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
         self._cursor = hand
         self._cursor_id += 1
@@ -297,13 +277,12 @@ class Calibration:
         """
         if self.state is not State.ALIGN:
             raise ProcedureError(f"there is no cursor to confirm ({self.state})")
-        tolerance_ns = 1e9 * self._settings.match_tolerance_s
-        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > tolerance_ns:
+        hand = self._hands.newest(self._settings.match_tolerance_s)
+        if hand is None:
             raise ProcedureError("hold the hand under the cursor, in view of the camera")
-        t_ns = self._hands[-1].t_host_ns
-        T_W_H = self._hands[-1].T_W_D @ invert(self.rig.T_H_D)
+        T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
         T_E_W = {eye: view_of_eye(self.rig.eyes[eye], T_W_H) for eye in EYES}
-        self._confirmation = Confirmation(t_ns, t_ns, T_E_W, self._cursor_id)
+        self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, T_E_W, self._cursor_id)
 
     def redo(self) -> None:
         """Give up the present cursor, or the last alignment and the results with it.
@@ -509,55 +488,6 @@ class Calibration:
             self._sent[eye] = self._link.send_projection(projection)
         return [self._sent[eye] for eye in shifts_m]
 
-    def _forget_hands(self) -> None:
-        """Let go of what is too old for a confirmation, and for telling whether it is steady."""
-        kept_s = self._settings.steady_s + _KEEP_HANDS_S
-        oldest_ns = self._seen_ns - round(1e9 * kept_s)
-        while self._hands and self._hands[0].t_host_ns < oldest_ns:
-            self._hands.popleft()
-        while self._unplaced and self._unplaced[0][1] < oldest_ns:
-            self._unplaced.popleft()
-
-    def _place_hands(self) -> tuple[PlacedHand | None, str]:
-        """Place the clouds whose pose has come by now; return the newest, or why there is none."""
-        hand, problem = None, ""
-        while self._unplaced:
-            cloud, t_ns = self._unplaced[0]
-            try:
-                T_W_D = self._link.pose_at_host_ns(t_ns) @ self.rig.T_H_D
-            except PosePendingError as error:
-                problem = str(error)
-                break
-            except PoseError as error:
-                problem = str(error)
-            else:
-                points_W_m = transform(T_W_D, cloud.points_m)
-                middle_W_m = np.median(points_W_m[::_MEDIAN_STRIDE], axis=0)
-                hand = PlacedHand(cloud, t_ns, T_W_D, points_W_m, middle_W_m)
-                self._hands.append(hand)
-            self._unplaced.popleft()
-        return hand, problem
-
-    def _placed_until_ns(self) -> int:
-        """Return the time of the newest frame whose hand, as those of all before, has its place."""
-        if not self._unplaced:
-            return self._seen_ns
-        return self._hands[-1].t_host_ns if self._hands else 0
-
-    def _is_steady(self) -> bool:
-        """Tell whether a hand is in view, placed, and has hardly moved for a while."""
-        steady_ns = round(1e9 * self._settings.steady_s)
-        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > steady_ns:
-            return False
-        since_ns = self._seen_ns - steady_ns
-        before = [hand.middle_W_m for hand in self._hands if hand.t_host_ns <= since_ns]
-        after = [hand.middle_W_m for hand in self._hands if hand.t_host_ns > since_ns]
-        # From the last before on, so that a slow camera shows enough of them too.
-        places = before[-1:] + after
-        return (
-            bool(before and after) and float(np.ptp(places, axis=0).max()) < self._settings.steady_m
-        )
-
     def _guide(self, observation: Observation) -> Observation:
         """Show the live hand in its colour and take a confirmation."""
         if observation.hand is not None:
@@ -566,7 +496,7 @@ class Calibration:
             if confirmation.cursor_id == self._cursor_id:
                 self._confirmation = confirmation
         waiting = self._confirmation
-        if waiting is not None and self._placed_until_ns() >= waiting.t_host_ns:
+        if waiting is not None and self._hands.placed_until_ns() >= waiting.t_host_ns:
             self._confirmation = None
             self._take(waiting)
         return observation
@@ -592,7 +522,7 @@ class Calibration:
         assert self._cursor is not None
         assert self._guard is not None
         try:
-            hand = self._hand_at(confirmation.t_host_ns)
+            hand = self._hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
             rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
         except HandError as error:
             self._refuse(f"{error}. Align and confirm again.", "no hand")
@@ -626,14 +556,6 @@ class Calibration:
         self.refusal = ""
         self._store(lambda session: session.save_alignment(alignment))
 
-    def _hand_at(self, t_host_ns: int) -> PlacedHand:
-        """Return the hand nearest in time."""
-        tolerance_ns = 1e9 * self._settings.match_tolerance_s
-        near = [hand for hand in self._hands if abs(hand.t_host_ns - t_host_ns) <= tolerance_ns]
-        if not near:
-            raise HandError("The camera did not see your hand")
-        return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
-
     def _refuse(self, prompt: str, reason: str, angle_deg: float | None = None) -> None:
         self.refusal = prompt
         self._link.send_prompt(prompt, self.eyes)
@@ -648,7 +570,6 @@ class Calibration:
         self.refusal = ""
         # The wearer lowers the hand now: only what is seen from here on may become a cursor.
         self._hands.clear()
-        self._unplaced.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
 

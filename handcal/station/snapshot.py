@@ -10,7 +10,8 @@ from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal.station.procedure import Observation, PlacedHand, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import Observation, State
 from handcal.station.wearer_view import EyeView
 from handcal.types import Alignment, Eye, Float64, Frame
 

@@ -32,7 +32,8 @@ from handcal.sim.camera import SyntheticCamera
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
-from handcal.station.procedure import Calibration, PlacedHand, ProcedureError, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import Calibration, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.wearer_view import EyeView, see

@@ -34,7 +34,8 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.station.procedure import CalibrationSettings, Observation, PlacedHand, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import CalibrationSettings, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.wearer_view import EyeView, see

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, 
 
 from handcal.geometry import invert, transform
 from handcal.register.pairs import matched_pairs
-from handcal.station.procedure import PlacedHand
+from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.panels.cloud.cloud_view import CloudView

@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.register.guard import turn_advice
-from handcal.station.procedure import Observation, PlacedHand, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import Observation, State
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.types import Float64
 from handcal_gui.panels.rotation.dial import RotationDial
