@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
 from handcal.io.files import make_folder, write_ply
 from handcal.progress import Progress
 
 
-def write_clouds(folder: Path, outcome: Outcome, progress: Progress = Progress()) -> None:
+def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Progress()) -> None:
     """Write ``alignment-N-cursor.ply`` and ``alignment-N-hand.ply`` for each alignment.
 
     Points are doubles in W, in metres; `is_cut` is 1 beside a cut edge. The hand's

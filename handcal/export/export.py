@@ -10,7 +10,7 @@ from handcal.export.archive import write_archive
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
 from handcal.export.formats import FORMATS, Format
-from handcal.export.outcome import Outcome, conclude
+from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
 from handcal.progress import Progress
@@ -67,7 +67,7 @@ def export_session(
     formats = [name for name in FORMATS if name in settings.formats]
     with Staging(folder) as staging:
         parts = 1 + len(formats)
-        outcome = conclude(record, progress.part(0.0, 1.0 / parts))
+        outcome = load_outcome(record, progress.part(0.0, 1.0 / parts))
         for done, name in enumerate(formats, 1):
             part = progress.part(done / parts, (done + 1) / parts, FORMATS[name].title)
             part.at(0.0)
@@ -78,7 +78,7 @@ def export_session(
 
 def _write(
     name: Format,
-    outcome: Outcome,
+    outcome: SessionOutcome,
     place: Path,
     folder: Path,
     settings: ExportSettings,

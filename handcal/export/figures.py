@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from handcal.display import eye_projection
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
 from handcal.geometry import project, transform
 from handcal.register.results import Results
 from handcal.session.trial import Trial
@@ -55,7 +55,7 @@ def draw_convergence(axes: Sequence[Axes], results: Results) -> None:
             ax.legend(title="alignment", fontsize=6.5, title_fontsize=6.5, frameon=False)
 
 
-def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> None:
+def draw_shifts(axes: Sequence[Axes], outcome: SessionOutcome, results: Results) -> None:
     """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
     count = len(results.alignments)
     room = max(1.0, 0.4 * count)  # for the names below

@@ -23,7 +23,7 @@ _MAX_CHARACTERS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class SessionOutcome:
     """A session and its results, with what a stored session does not keep: residuals, histories."""
 
     record: SessionRecord
@@ -65,7 +65,7 @@ class Outcome:
         return Projection(eye, P, display.width_px, display.height_px)
 
 
-def conclude(record: SessionRecord, progress: Progress = Progress()) -> Outcome:
+def load_outcome(record: SessionRecord, progress: Progress = Progress()) -> SessionOutcome:
     """Solve a session's alignments again, with its own settings.
 
     Parameters
@@ -81,7 +81,7 @@ def conclude(record: SessionRecord, progress: Progress = Progress()) -> Outcome:
     """
     settings = stored_solve_settings(record)
     results = solve_again(record, settings, progress)
-    return Outcome(
+    return SessionOutcome(
         record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
     )
 

@@ -17,7 +17,7 @@ from handcal.export.figure_rows import (
     running_mean_rows,
 )
 from handcal.export.figures import ResidualCells
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, SessionOutcome
 from handcal.export.tables import parameter_rows, trial_rows
 from handcal.register.results import Results
 from handcal.register.verdict import expected_error_arcmin
@@ -40,7 +40,7 @@ _VERDICTS: Mapping[VerdictName, str] = {
 }
 
 
-def session_report(outcome: Outcome) -> Report:
+def session_report(outcome: SessionOutcome) -> Report:
     """Return the report of a session."""
     return Report(
         title="Eye-display calibration",
@@ -50,7 +50,7 @@ def session_report(outcome: Outcome) -> Report:
     )
 
 
-def _sections(outcome: Outcome) -> Iterator[Section]:
+def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     record, results = outcome.record, outcome.results
     yield _summary(outcome)
     yield _shifts(outcome)
@@ -74,7 +74,7 @@ def _sections(outcome: Outcome) -> Iterator[Section]:
     yield Section("Definitions", [facts(DEFINITIONS)], starts_page=True)
 
 
-def _verdict(outcome: Outcome) -> str:
+def _verdict(outcome: SessionOutcome) -> str:
     """Return the verdict in one sentence."""
     if outcome.results is None:
         return "Nothing is solved: the session holds no alignment."
@@ -89,7 +89,7 @@ def _verdict(outcome: Outcome) -> str:
     return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _summary(outcome: Outcome) -> Section:
+def _summary(outcome: SessionOutcome) -> Section:
     record = outcome.record
     return Section(
         "",
@@ -113,7 +113,7 @@ def _summary(outcome: Outcome) -> Section:
     )
 
 
-def _shifts(outcome: Outcome) -> Section:
+def _shifts(outcome: SessionOutcome) -> Section:
     table = Table(
         [
             Column("eye", "left"),
@@ -143,7 +143,7 @@ def _shifts(outcome: Outcome) -> Section:
     return Section("Eye shift φ", items)
 
 
-def _solution(outcome: Outcome, results: Results) -> Section:
+def _solution(outcome: SessionOutcome, results: Results) -> Section:
     table = Table(
         [
             Column("eye", "left"),
@@ -173,7 +173,7 @@ def _solution(outcome: Outcome, results: Results) -> Section:
     return Section("How it was solved", items)
 
 
-def _alignments(outcome: Outcome, results: Results) -> Section:
+def _alignments(outcome: SessionOutcome, results: Results) -> Section:
     record = outcome.record
     times = {
         event.data.get("number"): event.time
@@ -215,7 +215,7 @@ def _alignments(outcome: Outcome, results: Results) -> Section:
     return Section("Alignments", [table])
 
 
-def _shift_plots(outcome: Outcome, results: Results) -> Section:
+def _shift_plots(outcome: SessionOutcome, results: Results) -> Section:
     rows = list(parameter_rows(outcome))
     return Section(
         "φ of each alignment, and fused",
@@ -253,7 +253,7 @@ def _convergence(results: Results) -> Section:
     return Section("Convergence", [figure])
 
 
-def _residuals(outcome: Outcome, results: Results) -> Section:
+def _residuals(outcome: SessionOutcome, results: Results) -> Section:
     record = outcome.record
     residuals_m = [
         shift.residuals_m for each in results.alignments.values() for shift in each.values()
@@ -283,7 +283,7 @@ def _residuals(outcome: Outcome, results: Results) -> Section:
     return Section("Residuals on the hand", items)
 
 
-def _overlays(outcome: Outcome) -> Section:
+def _overlays(outcome: SessionOutcome) -> Section:
     """Return each eye's newest alignment as the eye saw it."""
     record = outcome.record
     newest = {
@@ -301,7 +301,7 @@ def _overlays(outcome: Outcome) -> Section:
     return Section("Hand and cursor through the display", items)
 
 
-def _overlay(outcome: Outcome, eye: Eye, number: int, alignment: Alignment) -> Figure:
+def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignment) -> Figure:
     display = outcome.record.rig.eyes[eye]
     shifts_m = {"before": np.zeros(3), "after": outcome.final_shift_m(eye)}
     outlines = {
@@ -318,7 +318,7 @@ def _overlay(outcome: Outcome, eye: Eye, number: int, alignment: Alignment) -> F
     return Figure(f"overlay-{eye}", "", draw, rows, height_mm=58.0, columns=2)
 
 
-def _user_test(outcome: Outcome) -> Section:
+def _user_test(outcome: SessionOutcome) -> Section:
     record = outcome.record
     statistics = summarise(record.trials.values())
     groups = {"all": statistics.total} if statistics.total else {}
@@ -355,7 +355,7 @@ def _user_test(outcome: Outcome) -> Section:
     return Section("User test", [table, _interval(outcome), boxes, running])
 
 
-def _interval(outcome: Outcome) -> str:
+def _interval(outcome: SessionOutcome) -> str:
     """Return how sure the mean error is."""
     trials = outcome.record.trials
     calibrations = list(calibration_numbers(trials).values())
@@ -372,7 +372,7 @@ def _interval(outcome: Outcome) -> str:
     )
 
 
-def _trials(outcome: Outcome) -> Section:
+def _trials(outcome: SessionOutcome) -> Section:
     record = outcome.record
     table = Table(
         [
@@ -413,7 +413,7 @@ def _error_cells(errors: ErrorStatistics) -> list[str]:
     ]
 
 
-def _shift_cells(outcome: Outcome, eye: Eye, origin: Origin) -> list[str]:
+def _shift_cells(outcome: SessionOutcome, eye: Eye, origin: Origin) -> list[str]:
     if origin == "solved" and outcome.results is not None:
         return _with_sigma(outcome.results.shifts[eye])
     return [_mm(value) for value in outcome.shifts_m[eye][origin]]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, SessionOutcome
 from handcal.io.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.rows import rows_csv
@@ -58,7 +58,7 @@ _TRIALS = (
 )
 
 
-def write_parameters(path: Path, outcome: Outcome) -> None:
+def write_parameters(path: Path, outcome: SessionOutcome) -> None:
     """Write each eye's φ: a row for every alignment, for all fused, and for what was set by hand.
 
     Columns: docs/export.md.
@@ -66,12 +66,12 @@ def write_parameters(path: Path, outcome: Outcome) -> None:
     _write(path, _PARAMETERS, outcome, parameter_rows(outcome))
 
 
-def write_trials(path: Path, outcome: Outcome) -> None:
+def write_trials(path: Path, outcome: SessionOutcome) -> None:
     """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
     _write(path, _TRIALS, outcome, trial_rows(outcome.record.trials))
 
 
-def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
+def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
     """Yield a row for every φ of each eye."""
     record, results = outcome.record, outcome.results
     if results is not None:
@@ -105,7 +105,7 @@ def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
             }
 
 
-def _place(outcome: Outcome, eye: Eye, origin: Origin) -> dict[str, Any]:
+def _place(outcome: SessionOutcome, eye: Eye, origin: Origin) -> dict[str, Any]:
     return {
         "eye": eye,
         "final": _yes(outcome.final(eye) == origin),
@@ -113,7 +113,7 @@ def _place(outcome: Outcome, eye: Eye, origin: Origin) -> dict[str, Any]:
     }
 
 
-def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
+def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
     covariance_mm2 = 1e6 * shift.covariance_m2
     return {
         "method": outcome.settings.method,
@@ -166,7 +166,7 @@ def _yes(truth: bool) -> str:
 
 
 def _write(
-    path: Path, columns: tuple[str, ...], outcome: Outcome, rows: Iterable[Mapping[str, Any]]
+    path: Path, columns: tuple[str, ...], outcome: SessionOutcome, rows: Iterable[Mapping[str, Any]]
 ) -> None:
     whose = {"session": outcome.name, "wearer": outcome.record.wearer}
     write_atomic(path, rows_csv(({**whose, **row} for row in rows), columns))

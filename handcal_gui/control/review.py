@@ -27,7 +27,7 @@ class _Stored:
     results: Results | None
 
 
-class Review(QObject):
+class ReviewController(QObject):
     """Opens one stored session after the other, read-only.
 
     Parameters

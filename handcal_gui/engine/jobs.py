@@ -58,23 +58,25 @@ class Job(Worker):
         """Have the work stop, and wait for it; nothing more is heard of it."""
         self.cancel()
         self.wait()
-        self._forget_all()
+        self._discard_pending()
 
     def _run(self) -> None:
         try:
             done = self._work(Progress(self._report, self._cancelled.is_set))
         except CancelledError:
-            self._say(self.cancelled.emit)
+            self._emit_later(self.cancelled.emit)
         except HandcalError as error:
-            self._say(self.failed.emit, str(error))
+            self._emit_later(self.failed.emit, str(error))
         except Exception as error:
             _LOG.exception("a job broke down")
-            self._say(self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})")
+            self._emit_later(
+                self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})"
+            )
         else:
-            self._say(self.succeeded.emit, done)
+            self._emit_later(self.succeeded.emit, done)
 
     def _report(self, doing: str, share: float) -> None:
         """Emit the progress if it has changed visibly, as signals from a thread queue up."""
         if self._reported != (doing, int(_STEPS * share)):
             self._reported = doing, int(_STEPS * share)
-            self._say(self.progressed.emit, doing, share)
+            self._emit_later(self.progressed.emit, doing, share)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from handcal.export.outcome import Outcome, conclude
+from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.io.settings import settings_json
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
@@ -72,5 +72,5 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
 
 
 @pytest.fixture(scope="session")
-def outcome(record: SessionRecord) -> Outcome:
-    return conclude(record)
+def outcome(record: SessionRecord) -> SessionOutcome:
+    return load_outcome(record)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.export.clouds import write_clouds
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
 from handcal.progress import Progress
 
 KINDS = {"double": "<f8", "uchar": "u1"}
@@ -21,7 +21,7 @@ def read(path: Path) -> NDArray[Any]:
     return np.frombuffer(body, [(name, KINDS[kind]) for kind, name in fields])
 
 
-def test_clouds_and_residuals_come_back(tmp_path: Path, outcome: Outcome) -> None:
+def test_clouds_and_residuals_come_back(tmp_path: Path, outcome: SessionOutcome) -> None:
     shares: list[float] = []
     write_clouds(tmp_path / "clouds", outcome, Progress(lambda _what, share: shares.append(share)))
     assert shares == [0.0, 0.5]

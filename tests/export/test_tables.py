@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, SessionOutcome
 from handcal.export.tables import write_parameters, write_trials
 from handcal.types import Eye, Float64
 
@@ -24,7 +24,7 @@ def triple(row: dict[str, str], name: str) -> list[float]:
 
 
 def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
-    tmp_path: Path, outcome: Outcome
+    tmp_path: Path, outcome: SessionOutcome
 ) -> None:
     write_parameters(tmp_path / "p.csv", outcome)
     rows = read(tmp_path / "p.csv")
@@ -54,7 +54,7 @@ def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
     assert rows[5]["sigma1_mm"] == ""
 
 
-def test_trials_hold_every_corner(tmp_path: Path, outcome: Outcome) -> None:
+def test_trials_hold_every_corner(tmp_path: Path, outcome: SessionOutcome) -> None:
     write_trials(tmp_path / "t.csv", outcome)
     rows = read(tmp_path / "t.csv")
     trials = outcome.record.trials
@@ -68,7 +68,7 @@ def test_trials_hold_every_corner(tmp_path: Path, outcome: Outcome) -> None:
 
 
 def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
-    tmp_path: Path, outcome: Outcome
+    tmp_path: Path, outcome: SessionOutcome
 ) -> None:
     wearer = 'a,"b"\r\n=1+1 φ'
     write_trials(
@@ -81,7 +81,7 @@ def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
-def test_no_text_becomes_a_formula(tmp_path: Path, outcome: Outcome, start: str) -> None:
+def test_no_text_becomes_a_formula(tmp_path: Path, outcome: SessionOutcome, start: str) -> None:
     wearer = f'{start}HYPERLINK("x")'
     write_parameters(
         tmp_path / "p.csv", replace(outcome, record=replace(outcome.record, wearer=wearer))
@@ -89,7 +89,7 @@ def test_no_text_becomes_a_formula(tmp_path: Path, outcome: Outcome, start: str)
     assert {row["wearer"] for row in read(tmp_path / "p.csv")} == {f"'{wearer}"}
 
 
-def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: Outcome) -> None:
+def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcome) -> None:
     shifts_m: dict[Eye, dict[Origin, Float64]] = {
         "left": {"fine_tuned": np.full(3, -0.001), "offline": np.zeros(3)},
         "right": {},

@@ -83,7 +83,7 @@ def test_a_hand_whose_pose_is_lost_is_left_out(hands: RecentHands, poses: Poses)
     assert hands.newest(1.0) is first
 
 
-@pytest.mark.parametrize(("step_m", "is_steady"), [(0.0005, True), (0.002, False)])
+@pytest.mark.parametrize(("step_m", "is_steady"), [(0.0005, True), (0.006, False)])
 def test_a_hand_is_steady_if_it_hardly_moved_for_a_while(
     hands: RecentHands, step_m: float, is_steady: bool
 ) -> None:
