@@ -1,4 +1,4 @@
-"""Record what any camera sees, until told to stop."""
+"""Record any camera until a limit is reached or the recording is stopped."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class RecordSettings:
-    """When a recording ends by itself."""
+    """Limits of a recording."""
 
     duration_s: float = 60.0
-    """By the camera's time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute."""
+    """In camera time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute."""
     frames: int = 100_000
     silent_s: float = 5.0
-    """A camera silent for so long has ended."""
+    """A camera that sends no frame for this time has ended."""
     free_bytes: int = 2**30
-    """Left free on the disk."""
+    """Disk space to leave free."""
     lead_frames: int = 30
-    """So many frames at most are left out at the beginning, until one has colour: cameras pair
-    their first images badly."""
+    """Most frames skipped at the beginning, until one has colour: cameras pair their first images
+    badly."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What was recorded."""
+    """Summary of a recording."""
 
     frames: int
     dropped: int
-    """Frames missing in between by the camera's own count."""
+    """Missing frames, by the camera's frame numbers."""
     duration_s: float
-    """From the first to the last frame, by the camera's time."""
+    """From the first to the last frame, in camera time."""
     stop_reason: str
 
 
@@ -55,14 +55,14 @@ def record(
 ) -> Recorded:
     """Record a camera until it ends or fails, a limit is reached, or it is stopped.
 
-    Whatever ends it, what was recorded by then is kept.
+    The frames recorded so far are kept in all cases.
 
     Parameters
     ----------
     camera : Camera
         Stays open.
     path : Path
-        A ``.db3`` file, which replaces another once complete, or a new folder.
+        A ``.db3`` file, which replaces an existing one when complete, or a new folder.
     settings : RecordSettings
     progress : Progress
         Reported to for every frame; cancelling it ends the recording and keeps it.
@@ -70,11 +70,11 @@ def record(
     Raises
     ------
     CameraError
-        If the camera gives no frame at all, or librealsense cannot write the file.
+        If the camera sends no frame, or librealsense cannot write the file.
     FileError
         If the folder is not empty or cannot be written.
     ValueError
-        If `path` has another suffix than ``.db3``, or the camera changes.
+        If `path` has a suffix other than ``.db3``, or the camera changes.
     """
     take = _Take(camera, make_folder(path.absolute().parent), settings, progress)
     first = next(take.frames, None)
@@ -85,7 +85,7 @@ def record(
 
 
 class _Take:
-    """The frames of one recording, and what is to be said of them."""
+    """The frames of one recording, with counts and the reason for its end."""
 
     def __init__(
         self, camera: Camera, disk: Path, settings: RecordSettings, progress: Progress
@@ -120,7 +120,7 @@ class _Take:
         self.stop_reason = "stopped"
 
     def _from_first_color(self, frames: Iterator[Frame]) -> Iterator[Frame]:
-        """Begin with a frame that has colour; with the very first if none of the next has."""
+        """Begin with the first frame that has colour, or the first of all if none has."""
         lead: list[Frame] = []
         for frame in frames:
             lead = [frame] if frame.color is not None else [*lead, frame]

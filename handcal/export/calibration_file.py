@@ -1,6 +1,6 @@
-"""The calibration as numbers for other programs: FileStorage YAML, and JSON in four conventions.
+"""The calibration for other programs: FileStorage YAML, and JSON in four conventions.
 
-docs/export.md describes every field. Numbers survive exactly in both.
+docs/export.md describes every field. Both formats preserve numbers exactly.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CALIBRATION_VERSION = 1
 
 
 def write_calibration_yaml(path: Path, outcome: SessionOutcome) -> None:
-    """Write each eye's final calibration, what it is made of, in OpenCV's FileStorage YAML."""
+    """Write each eye's final calibration and its parts in OpenCV's FileStorage YAML."""
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.write("handcal_calibration", CALIBRATION_VERSION)
     for name, text in _whose(outcome).items():
@@ -138,7 +138,7 @@ def _solution(
 
 
 def _openxr(projection: Projection) -> dict[str, Any]:
-    """Return XrView's fields, or null and why there are none."""
+    """Return the fields of XrView, or null and the reason."""
     try:
         pose, fov = openxr_view(projection)
     except ValueError as error:

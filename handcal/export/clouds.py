@@ -14,7 +14,7 @@ from handcal.progress import Progress
 def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Progress()) -> None:
     """Write ``alignment-N-cursor.ply`` and ``alignment-N-hand.ply`` for each alignment.
 
-    Points are doubles in W, in metres; `is_cut` is 1 beside a cut edge. The hand's
+    Points are doubles in W, in metres; `is_cut` is 1 at a cut edge. The hand's
     `residual_left_m` and `residual_right_m`, where solved, are each point's distance to its
     partner on the cursor, NaN for an outlier.
     """

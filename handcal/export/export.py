@@ -1,4 +1,4 @@
-"""A session's export: the formats asked for, made together and put in place at once."""
+"""Export of a session: all requested formats are written, then published together."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from handcal.session.session import SessionRecord
 
 @dataclass(frozen=True, slots=True)
 class ExportSettings:
-    """What is exported."""
+    """Settings of an export."""
 
     formats: tuple[Format, ...] = tuple(FORMATS)
-    """Some of `FORMATS`."""
+    """A selection of `FORMATS`."""
     near_m: float = 0.1
     far_m: float = 100.0
     """Clipping distances of the OpenGL and Unity matrices."""
@@ -46,13 +46,13 @@ def export_session(
     """Export a session into a folder, and return the files.
 
     The files appear together when all are complete, and replace those of an earlier export of the
-    same formats; whatever goes wrong before leaves the folder as it was.
+    same formats; after an error the folder is unchanged.
 
     Parameters
     ----------
     record : SessionRecord
     folder : Path
-        Created if needed. Two sessions need two folders: the names of the files are fixed.
+        Created if needed. Use one folder for each session: file names are fixed.
     settings : ExportSettings
     progress : Progress
         Reported to many times a second; while solving, before each alignment.
@@ -84,7 +84,7 @@ def _write(
     settings: ExportSettings,
     progress: Progress,
 ) -> None:
-    """Write the files of one format into `place`, which are meant for `folder`."""
+    """Write the files of one format, destined for `folder`, into `place`."""
     match name:
         case "report" | "html":
             for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf", "jinja2"):

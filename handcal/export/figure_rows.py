@@ -1,4 +1,4 @@
-"""The raw numbers behind the session report's figures; those of φ and trials are the tables'."""
+"""The raw data of the session report's figures; those of φ and trials are in `tables`."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[R
 def overlay_rows(
     number: int, eye: Eye, outlines: Mapping[str, Mapping[str, Sequence[Float64]]]
 ) -> Iterator[Row]:
-    """Yield a row for every corner of the outlines, by when and of what they are."""
+    """Yield a row for every corner of the outlines, by calibration and object."""
     for when, of_what in outlines.items():
         for what, closed in of_what.items():
             for place, outline in enumerate(closed, 1):

@@ -1,6 +1,6 @@
-"""The report's figures, each drawn into axes that it is given.
+"""The figures of the report, each drawn into given axes.
 
-Left and right differ in colour, marker and line, so that the report also reads in grey.
+Left and right differ in colour, marker and line, so that the report is readable in grey too.
 """
 
 from __future__ import annotations
@@ -28,20 +28,19 @@ COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
 MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
 _LINES: Mapping[Eye, str] = {"left": "-", "right": "--"}
 _HAND, _CURSOR = "#0072B2", "#D55E00"
-# No scale ends below, lest rounding look like a finding.
+# Smallest range of a scale, so that rounding errors do not look like findings.
 _LEAST_MM = 0.01
 _LABEL_PT, _TITLE_PT = 7.5, 8.5
 # Side of a cell of the residual map, and the colour of one without inliers.
 CELL_MM = 2.5
 _OUTLIER = (0.75, 0.75, 0.75, 1.0)
-# An outline is sought in a mask in which a display's longer side is so long, and gaps between
-# points are closed.
+# Outlines are found in a mask: length of the display's longer side in it, and of gaps to close.
 _MASK_PX, _GAP_PX = 500, 9
 _AROUND_DISPLAY = 0.12
 
 
 def draw_convergence(axes: Sequence[Axes], results: Results) -> None:
-    """Draw how the registration error of each alignment fell, one pair of axes for each eye."""
+    """Draw the registration error of each alignment by iteration, with axes for each eye."""
     for ax, eye in zip(axes, EYES, strict=True):
         for number, shifts in results.alignments.items():
             if eye in shifts:
@@ -118,7 +117,7 @@ def draw_ellipses(axes: Sequence[Axes], results: Results) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ResidualCells:
-    """A hand as the eye faces it, in cells, each (N,)."""
+    """A hand seen from the eye, in cells, each (N,)."""
 
     x_mm: Float64
     y_mm: Float64
@@ -126,7 +125,7 @@ class ResidualCells:
     points: NDArray[np.int64]
     inliers: NDArray[np.int64]
     mean_mm: Float64
-    """Of the inliers' residuals; NaN without."""
+    """Mean residual of the inliers; NaN without inliers."""
 
 
 def residual_cells(alignment: Alignment, eye: Eye, shift: EyeShift) -> ResidualCells:
@@ -146,9 +145,9 @@ def residual_cells(alignment: Alignment, eye: Eye, shift: EyeShift) -> ResidualC
 
 
 def draw_residuals(ax: Axes, cells: ResidualCells, most_mm: float) -> None:
-    """Draw the hand as the eye faces it, coloured by the mean residual in each cell.
+    """Draw the hand seen from the eye, coloured by the mean residual in each cell.
 
-    Colours reach to `most_mm`; cells in which all points are outliers are grey.
+    The colour scale ends at `most_mm`; cells with only outliers are grey.
     """
     left_mm, top_mm = cells.x_mm.min(), cells.y_mm.min()
     columns, rows = (
@@ -173,7 +172,7 @@ def draw_residuals(ax: Axes, cells: ResidualCells, most_mm: float) -> None:
 def overlay_outlines(
     display: EyeDisplay, alignment: Alignment, eye: Eye, eye_shift_m: Float64
 ) -> dict[str, list[Float64]]:
-    """Return what an eye at one place saw at the moment of an alignment, in the display's pixels.
+    """Return the outlines that an eye with this φ saw at an alignment, in display pixels.
 
     Outlines, each (N, 2) and closed, of the hand as the eye sees it through the display, and of the
     cursor as the headset drew it.
@@ -187,7 +186,7 @@ def overlay_outlines(
 
 
 def draw_overlay(ax: Axes, display: EyeDisplay, outlines: Mapping[str, Sequence[Float64]]) -> None:
-    """Draw what `overlay_outlines` gave within the display's frame."""
+    """Draw the outlines of `overlay_outlines` within the display's frame."""
     for outline in outlines["hand"]:
         ax.fill(*outline.T, facecolor=_HAND, alpha=0.25, linewidth=0.0)
         ax.plot(*outline.T, color=_HAND, linewidth=0.6)
@@ -252,7 +251,7 @@ def draw_running_mean(ax: Axes, trials: Mapping[int, Trial]) -> None:
 
 
 def name_axes(ax: Axes, title: str, x: str, y: str) -> None:
-    """Give axes their title and the names of both, with units."""
+    """Set the title and the axis labels, with units."""
     ax.set_title(title, fontsize=_TITLE_PT, loc="left")
     ax.set_xlabel(x, fontsize=_LABEL_PT)
     ax.set_ylabel(y, fontsize=_LABEL_PT)
@@ -287,9 +286,9 @@ def _color_bar(ax: Axes, colored: ScalarMappable) -> None:
 
 
 def _outlines(pixels: Float64, display: EyeDisplay) -> list[Float64]:
-    """Return the outlines, each (N, 2) px and closed, of what a cloud covers on a display.
+    """Return the outlines, each (N, 2) px and closed, of the area a cloud covers on a display.
 
-    As far as it lies within the display's own size around it.
+    Points farther outside the display than its own size are left out.
     """
     size = np.array([display.width_px, display.height_px])
     scale = _MASK_PX / size.max()

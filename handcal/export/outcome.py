@@ -1,4 +1,4 @@
-"""What a session came to, worked out once for every format: solved again, and what is applied."""
+"""The outcome of a session, computed once for all formats: results and applied calibrations."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from handcal.types import EYES, Eye, Float64, Projection
 
 Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 
-# Solved again by another version of NumPy, φ differs by rounding.
+# φ solved again by another version of NumPy differs by rounding.
 _SAME_M = 1e-7
 _MAX_CHARACTERS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionOutcome:
-    """A session and its results, with what a stored session does not keep: residuals, histories."""
+    """A session and its results, including residuals and histories, which are not stored."""
 
     record: SessionRecord
     settings: SolveSettings
@@ -32,21 +32,21 @@ class SessionOutcome:
     results: Results | None
     """All alignments solved again; None without alignments."""
     shifts_m: Mapping[Eye, Mapping[Origin, Float64]]
-    """each (3,); every φ there is for an eye, the final one first: fine-tuned by hand, solved, and
-    the offline calibration's zero."""
+    """each (3,); every known φ of an eye, the final one first: fine-tuned by hand, solved, and the
+    zero of the offline calibration."""
 
     @property
     def name(self) -> str:
-        """The session's name: that of its folder."""
+        """The name of the session's folder."""
         return printable(self.record.path.absolute().name)
 
     @property
     def started(self) -> str:
-        """When the session was created, UTC, ISO 8601."""
+        """Time of the session's creation, UTC, ISO 8601."""
         return printable(self.record.events[0].time)
 
     def final(self, eye: Eye) -> Origin:
-        """Return which φ is the eye's final one."""
+        """Return the origin of the eye's final φ."""
         return next(iter(self.shifts_m[eye]))
 
     def final_shift_m(self, eye: Eye) -> Float64:
@@ -54,12 +54,12 @@ class SessionOutcome:
         return self.shifts_m[eye][self.final(eye)]
 
     def is_applied(self, eye: Eye, origin: Origin) -> bool:
-        """Tell whether the headset rendered with one of the eye's φ in the end."""
+        """Return whether the headset rendered with this φ of the eye at the end."""
         last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
         return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < _SAME_M)
 
     def projection(self, eye: Eye, origin: Origin) -> Projection:
-        """Return what the headset renders an eye with for one of its φ."""
+        """Return the projection of an eye for one of its φ."""
         display = self.record.rig.eyes[eye]
         P = projection_matrix(display, self.shifts_m[eye][origin])
         return Projection(eye, P, display.width_px, display.height_px)
@@ -87,7 +87,7 @@ def load_outcome(record: SessionRecord, progress: Progress = Progress()) -> Sess
 
 
 def printable(text: str) -> str:
-    """Return a text from elsewhere as one line that every format can hold."""
+    """Return an untrusted text as one line that is valid in every format."""
     return "".join(char if char.isprintable() else "\ufffd" for char in text[:_MAX_CHARACTERS])
 
 

@@ -1,4 +1,4 @@
-"""What the report of a session says: what was found for each eye, how sure it is, and from what."""
+"""The report of a session: each eye's result, its uncertainty and the data behind it."""
 
 from __future__ import annotations
 
@@ -284,7 +284,7 @@ def _residuals(outcome: SessionOutcome, results: Results) -> Section:
 
 
 def _overlays(outcome: SessionOutcome) -> Section:
-    """Return each eye's newest alignment as the eye saw it."""
+    """Return a section with each eye's newest alignment as seen by the eye."""
     record = outcome.record
     newest = {
         eye: (number, alignment)
@@ -356,7 +356,7 @@ def _user_test(outcome: SessionOutcome) -> Section:
 
 
 def _interval(outcome: SessionOutcome) -> str:
-    """Return how sure the mean error is."""
+    """Return a sentence on the uncertainty of the mean error."""
     trials = outcome.record.trials
     calibrations = list(calibration_numbers(trials).values())
     if len(set(calibrations)) < 2:

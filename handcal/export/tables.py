@@ -1,4 +1,4 @@
-"""Parameters and trials as CSV, units in the headers."""
+"""Parameters and trials as CSV, with units in the headers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _TRIALS = (
 
 
 def write_parameters(path: Path, outcome: SessionOutcome) -> None:
-    """Write each eye's φ: a row for every alignment, for all fused, and for what was set by hand.
+    """Write each eye's φ: a row for every alignment, the fused φ and the one set by hand.
 
     Columns: docs/export.md.
     """

@@ -1,4 +1,4 @@
-"""From alignments to what a session reports: solved, fused and judged."""
+"""The results of a session: its alignments solved, fused and judged."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RESULTS_VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class SolveSettings:
-    """How alignments are solved."""
+    """Settings of the solver."""
 
     method: Method = "consistent"
     """One of `handcal.types.METHODS`."""
@@ -32,19 +32,18 @@ class SolveSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """What all alignments so far say."""
+    """Fused eye shifts of all alignments, with verdicts."""
 
     method: Method
     alignments: Mapping[int, Mapping[Eye, EyeShift]]
     """Each alignment alone, without prior, by number."""
     shifts: Mapping[Eye, EyeShift]
-    """Fused; what the headset shall render with."""
+    """Fused estimates, for the headset to render with."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
-    """Implied by the shifts; None unless both eyes are solved."""
+    """Eye distance implied by the shifts; None unless both eyes are solved."""
     expected_after_another_arcmin: Mapping[Eye, float]
-    """What `expected_error_arcmin` of the shifts would become with one more alignment like those so
-    far."""
+    """`expected_error_arcmin` of the shifts after one more alignment like those so far."""
 
 
 def solve_session(
@@ -53,7 +52,7 @@ def solve_session(
     settings: SolveSettings,
     progress: Progress = Progress(),
 ) -> Results:
-    """Solve, fuse and judge alignments; equal input gives equal output, bit for bit.
+    """Solve, fuse and judge alignments; equal input gives identical output, bit for bit.
 
     Parameters
     ----------

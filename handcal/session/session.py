@@ -1,17 +1,17 @@
-"""A session: one folder that holds everything about one calibration, readable after any crash.
+"""A session: one folder with all data of one calibration, readable after any crash.
 
 ::
 
-    NAME/journal.jsonl     what happened, one JSON object a line; the only file appended to
-         rig.yaml          the rig as it was
-         settings.json     the settings as they were
-         alignments/1.npz  the clouds and poses of each alignment, whose number never changes
+    NAME/journal.jsonl     the events, one JSON object per line; the only file appended to
+         rig.yaml          the rig at the time
+         settings.json     the settings at the time
+         alignments/1.npz  clouds and poses of each alignment; its number never changes
          results.json      the newest results, if there are any
-         notes.txt         what people wrote, if anything
+         notes.txt         the notes, if there are any
 
-What exists is what the journal says: an alignment from when the journal names it with its checksum
-until it is deleted there, and again when it is restored. So the folder is consistent at every
-moment, and a killed program costs at most the line that it was writing.
+The journal decides what exists: an alignment exists once the journal contains it with its checksum,
+until the journal records its deletion. The folder is therefore consistent at every moment, and a
+killed program loses at most the line it was writing.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ MAX_NOTES_CHARACTERS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecord:
-    """What a session folder holds."""
+    """The contents of a session folder."""
 
     path: Path
     rig: Rig
     settings: dict[str, Any]
     wearer: str
-    """Name or code; empty if not told."""
+    """Name or code; empty if none was given."""
     notes: str
     events: tuple[Event, ...]
     alignments: Mapping[int, Alignment]
@@ -67,29 +67,29 @@ class SessionRecord:
     deleted_trials: Mapping[int, Trial]
     """Trials of the user test, likewise."""
     results: dict[str, Any] | None
-    """The newest; None if none were saved since an alignment was deleted or restored."""
+    """The newest results; None if none were saved since an alignment was deleted or restored."""
     is_solved: bool
-    """Whether the results are those of all `alignments`."""
+    """True if the results are those of all `alignments`."""
     is_applied: bool
-    """Whether the headset has acknowledged the projections of these results."""
+    """True if the headset has acknowledged the projections of these results."""
     applied_shift_m: Mapping[Eye, Float64]
-    """each (3,); what the headset rendered with last, solved or set by hand; an eye that is not in
-    it was left as in the offline calibration."""
+    """each (3,); the φ that the headset rendered with last, solved or set by hand; a missing eye
+    was rendered with the offline calibration."""
     fine_tuned: Mapping[Eye, Float64] | None
-    """each (3,); the φ last set by hand, as settled; None if none since the last results."""
+    """each (3,); the φ last set by hand; None if none was set since the last results."""
     is_finished: bool
-    """Whether the session was ended on purpose, and nothing happened since."""
+    """True if the session was finished, and nothing was recorded since."""
     journal_bytes: int
     """Length of the journal's complete lines."""
     torn_bytes: int
-    """Length of an unfinished last line, which is left out; 0 if there is none."""
+    """Length of an incomplete last line, which is ignored; 0 if there is none."""
 
 
 class Session(Closable):
-    """Writes to an existing session folder, which no other program can write to until `close`.
+    """Writes to an existing session folder; no other program can write to it until `close`.
 
-    Whatever a method writes is on the disk when it returns; if it raises FileError, all that was
-    written before is still there. `create` starts a new folder; `open` only reads one.
+    Data are on disk when a method returns; if it raises FileError, everything written before is
+    kept. `create` starts a new folder; `open` only reads one.
 
     Parameters
     ----------
@@ -99,12 +99,12 @@ class Session(Closable):
     ----------
     path : Path
     revision : int
-        Grows with everything written.
+        Increases with every write.
 
     Raises
     ------
     FileError
-        If another program is writing to the session, or `open` would refuse it.
+        If another program is writing to the session, or `open` fails.
     """
 
     def __init__(self, path: Path) -> None:
@@ -131,7 +131,7 @@ class Session(Closable):
         name: str | None = None,
         wearer: str = "",
     ) -> Self:
-        """Start a session in a new folder.
+        """Create a session in a new folder.
 
         Parameters
         ----------
@@ -141,7 +141,7 @@ class Session(Closable):
         settings : mapping
             JSON-able.
         name : str, optional
-            Name of the folder; by default the time in UTC.
+            Name of the folder; default: the time in UTC.
         wearer : str
             Name or code, one line of at most 100 characters.
 
@@ -150,7 +150,7 @@ class Session(Closable):
         FileError
             If the folder exists already or cannot be written.
         ValueError
-            If the rig is implausible, the settings hold NaN, or the wearer's name is refused.
+            If the rig is implausible, the settings contain NaN, or the wearer's name is invalid.
         """
         wearer = clean_wearer(wearer)
         path = make_folder(parent) / (name or f"{datetime.now(UTC):session-%Y%m%d-%H%M%S-%f}")
@@ -161,7 +161,7 @@ class Session(Closable):
             raise FileError(f"cannot create {path}: {error.strerror or error}") from error
         write_rig(path / "rig.yaml", rig)
         write_json(path / "settings.json", dict(settings))
-        # The journal comes last: without it, the folder is no session.
+        # The journal is written last: without it, the folder is not a session.
         created = {"rig_sha256": _sha256(_rig_bytes(path)), "wearer": wearer}
         first = journal_line(happens_now(1, SessionEvent.CREATED, created))
         write_atomic(path / "journal.jsonl", first)
@@ -169,13 +169,13 @@ class Session(Closable):
 
     @staticmethod
     def open(path: Path, before: SessionRecord | None = None) -> SessionRecord:
-        """Read a session, which may be in use, killed or damaged.
+        """Read a session, which may be in use or left behind by a crash.
 
         Parameters
         ----------
         path : Path
         before : SessionRecord, optional
-            What it held before; the alignments in it, which never change, are not read again.
+            An earlier record of it; its alignments, which never change, are not read again.
 
         Raises
         ------
@@ -184,7 +184,9 @@ class Session(Closable):
             damaged or too large.
         """
         if not (path / "journal.jsonl").is_file():
-            raise FileError(f"{path} is no session; give the folder that holds its journal.jsonl")
+            raise FileError(
+                f"{path} is not a session; choose the folder that contains journal.jsonl"
+            )
         journal = read_journal(path / "journal.jsonl")
         state = _replay(path, journal.events)
         if state.rig_sha256 != _sha256(_rig_bytes(path)):
@@ -220,19 +222,19 @@ class Session(Closable):
         FileError
             If the journal cannot be written or is full.
         ValueError
-            If the data hold NaN, or the event's name is one that the session itself writes.
+            If the data contain NaN, or the event is one of `SessionEvent`.
         """
         if event in set(SessionEvent):
             raise ValueError(f"the event {event} is written by the session itself")
         self._append(event, data)
 
     def save_alignment(self, alignment: Alignment) -> int:
-        """Store an alignment and return its number, from 1.
+        """Save an alignment and return its number, from 1.
 
         Raises
         ------
         FileError
-            If it cannot be written, is too large, or the session has had too many.
+            If it cannot be written, is too large, or the session is full.
         """
         number = self._next_number("alignment")
         data = encode_alignment(alignment)
@@ -243,12 +245,12 @@ class Session(Closable):
         return number
 
     def save_trial(self, trial: Trial) -> int:
-        """Store a trial of the user test, as of now, and return its number, from 1.
+        """Save a trial of the user test with the current time; return its number, from 1.
 
         Raises
         ------
         FileError
-            If the journal cannot be written, or the session has had too many.
+            If the journal cannot be written, or the session is full.
         """
         number = self._next_number("trial")
         self._append(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
@@ -273,12 +275,12 @@ class Session(Closable):
         self._change(kind, "restored", number)
 
     def save_results(self, results: Mapping[str, Any]) -> None:
-        """Replace the results, those of all alignments; FileError if they cannot be written."""
+        """Replace the results of all alignments; FileError if they cannot be written."""
         write_json(self.path / "results.json", dict(results))
         self._append(SessionEvent.SOLVED, dict(results))
 
     def save_applied(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
-        """Note that the headset renders with the solved φ.
+        """Record that the headset renders with the solved φ.
 
         Raises
         ------
@@ -290,7 +292,7 @@ class Session(Closable):
         self._append(SessionEvent.APPLIED, {"eyes": list(shifts_m), "shift_m": _lists(shifts_m)})
 
     def save_fine_tuned(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
-        """Note that the headset renders with φ set by hand; raises as `save_applied`."""
+        """Record that the headset renders with φ set by hand; raises as `save_applied`."""
         self._append(SessionEvent.FINE_TUNED, {"shift_m": _lists(shifts_m)})
 
     def save_notes(self, text: str) -> None:
@@ -309,14 +311,14 @@ class Session(Closable):
         self.revision += 1
 
     def finish(self) -> None:
-        """Note that the session ends here; FileError if the journal cannot be written.
+        """Record the end of the session; FileError if the journal cannot be written.
 
-        More may follow, after which it is unfinished again.
+        Anything recorded afterwards makes the session unfinished again.
         """
         self._append(SessionEvent.FINISHED, {})
 
     def close(self) -> None:
-        """Let other programs write to the session; safe to call twice."""
+        """Release the session for other programs; safe to call twice."""
         self._lock.release()
 
     def _next_number(self, kind: Kind) -> int:
@@ -340,7 +342,7 @@ class Session(Closable):
 
 
 def _replay(path: Path, events: Sequence[Event]) -> SessionState:
-    """Return what the events of a session's journal add up to; FileError if they do not."""
+    """Return the state after all events; FileError if they are inconsistent."""
     journal = path / "journal.jsonl"
     if not events or events[0].name != SessionEvent.CREATED:
         raise FileError(f"{journal} does not begin as the journal of a session")

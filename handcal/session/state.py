@@ -1,4 +1,4 @@
-"""What a session's journal says that there is: one state, brought on event by event. No files."""
+"""The state of a session, built by replaying its journal. No file access."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Item = TypeVar("Item")
 
 
 class SessionEvent(StrEnum):
-    """The events that a session writes itself, and that say what there is."""
+    """The events that a session writes itself and that make up its state."""
 
     CREATED = "created"
     ALIGNMENT_SAVED = "alignment_saved"
     ALIGNMENT_DROPPED = "alignment_dropped"
-    """Of version 1: deleted for good, and the next took its number."""
+    """Version 1 only: deleted for good; the next alignment took its number."""
     ALIGNMENT_DELETED = "alignment_deleted"
     ALIGNMENT_RESTORED = "alignment_restored"
     TRIAL_SAVED = "trial_saved"
@@ -120,19 +120,19 @@ class SessionState:
         return self.alignments if kind == "alignment" else self.trials
 
     def apply(self, event: Event) -> None:
-        """Go on by an event; one that is not the session's own changes nothing.
+        """Apply an event; only those of `SessionEvent` change the state.
 
         Raises
         ------
         ValueError
-            If the event lacks something, or cannot follow those before it.
+            If the event lacks data, or cannot follow the events before it.
         """
         try:
             self._apply(event.name, event.data, event.time)
         except KeyError as error:
             raise ValueError(f"{event.name} lacks {error}") from error
         except (TypeError, AttributeError, OverflowError) as error:
-            raise ValueError(f"{event.name} holds something wrong: {error}") from error
+            raise ValueError(f"{event.name} contains invalid data: {error}") from error
         self.is_finished = event.name == SessionEvent.FINISHED
 
     def _apply(self, name: str, data: dict[str, Any], time: str) -> None:
@@ -156,7 +156,7 @@ class SessionState:
                 self.trials.restore(_number(data))
             case SessionEvent.SOLVED:
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
-            case SessionEvent.APPLIED if "shift_m" in data:  # version 1 did not tell
+            case SessionEvent.APPLIED if "shift_m" in data:  # not in version 1
                 self.applied_shift_m |= as_shifts(data["shift_m"])
                 self.is_applied = self.is_solved
             case SessionEvent.FINE_TUNED:
@@ -167,7 +167,7 @@ class SessionState:
 
 
 def _number(data: Mapping[str, Any]) -> int:
-    """Return the number in an event; true and 1.0 equal 1, but name other files."""
+    """Return the number in an event, which must be an int: true and 1.0 equal 1 too."""
     number = data["number"]
     if type(number) is not int:
         raise ValueError(f"a number is whole, not {number!r}")
@@ -175,16 +175,16 @@ def _number(data: Mapping[str, Any]) -> int:
 
 
 def clean_wearer(name: str) -> str:
-    """Return a wearer's name or code without the blanks around it.
+    """Return a wearer's name or code without surrounding white space.
 
     Raises
     ------
     ValueError
-        If it is longer than 100 characters or holds line breaks or control characters.
+        If it is longer than 100 characters or contains line breaks or control characters.
     """
     name = name.strip()
     if len(name) > MAX_WEARER_CHARACTERS:
         raise ValueError(f"a wearer's name may have at most {MAX_WEARER_CHARACTERS} characters")
     if any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name):
-        raise ValueError("a wearer's name may hold no line breaks or control characters")
+        raise ValueError("a wearer's name must not contain line breaks or control characters")
     return name

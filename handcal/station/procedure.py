@@ -1,4 +1,4 @@
-"""The procedure as a state machine: show hand, align, solve, apply, and again.
+"""The calibration procedure as a state machine: show hand, align, solve, apply, repeat.
 
 ::
 
@@ -9,9 +9,9 @@
         |                                                           |   v
         '--make_cursor-- APPLIED <--acknowledged-- APPLYING <--apply-- SOLVED
 
-Any alignment may be deleted and restored in between, and solved anew; φ may be set by hand where no
-cursor is shown. It composes the other rooms and computes nothing new. One thread drives it: `step`
-for every frame, the rest in between.
+Alignments can be deleted, restored and solved again between these steps; φ can be set by hand while
+no cursor is shown. The procedure only combines the other packages. One thread drives it: `step` for
+every frame, all other calls in between.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ from handcal.types import (
 )
 
 MAX_HAND_SET_SHIFT_M = 0.030
-"""Each component of a φ set by hand: beyond the eye box, whose size it is."""
+"""Limit of each component of a φ set by hand, beyond the eye box."""
 
 
 class State(StrEnum):
-    """Where the procedure stands."""
+    """State of the procedure."""
 
     SHOW_HAND = "show_hand"
     ALIGN = "align"
@@ -66,83 +66,83 @@ class State(StrEnum):
 
 
 class ProcedureError(HandcalError):
-    """Something was asked for out of turn; the text says what must come first."""
+    """A call in the wrong state; the text says what must be done first."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationSettings:
-    """How a calibration runs."""
+    """Settings of a calibration."""
 
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     camera_latency_s: float = 0.03
-    """From a frame's exposure to its earliest arrival."""
+    """Shortest time from a frame's exposure to its arrival."""
     match_tolerance_s: float = 0.15
-    """The frame of an alignment may lie this far from t_b."""
+    """Largest time between t_b and the frame of an alignment."""
     steady_s: float = 0.4
     steady_m: float = 0.005
-    """The hand is steady if it moved less than this for so long."""
+    """The hand is steady if it moved less than `steady_m` for `steady_s`."""
     apply_timeout_s: float = 5.0
-    """The headset has so long to acknowledge projections (`Calibration.poll_applied`)."""
+    """Time for the headset to acknowledge projections (`Calibration.poll_applied`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """What one step saw."""
+    """The result of one procedure step: state, hand, rotation, timings."""
 
     state: State
     """After the step."""
     hand: PlacedHand | None
-    """The newest whose place has become known, maybe from an earlier frame; None if none has."""
+    """The newest hand placed in this step, maybe of an earlier frame; None if none was."""
     problem: str
-    """Why there is no hand; empty if there is one."""
+    """Reason why there is no hand; empty if there is one."""
     is_steady: bool
-    """Whether a cursor may be made now."""
+    """True if a cursor can be made now."""
     cloud: HandCloud | None = None
-    """The hand in the step's own frame, whether or not its place is known."""
+    """The hand in this step's own frame, placed or not."""
     rotation_rad: Float64 | None = None
-    """(3,); from the cursor to the live hand, about D's axes, while aligning."""
+    """(3,); rotation from the cursor to the live hand, about D's axes, while aligning."""
     is_over_limit: bool = False
     """True if that rotation exceeds the guard's limit."""
     segment_ms: float | None = None
     guard_ms: float | None = None
-    """What those stages took."""
+    """Durations of these stages."""
 
 
 class Calibration:
     """One wearer's calibration.
 
-    It begins by sending the offline projections, or those of the calibration that it goes on with,
-    lest the headset still render with what another calibration sent.
+    It first sends the offline projections, or those of the session it resumes, so that the headset
+    does not continue to render with those of another calibration.
 
     Parameters
     ----------
     rig : Rig
     link : HeadsetServer
     session : Session or None
-        Where everything is recorded, at the moment it happens; what it could not take is written
-        before whatever comes next, or by `store_waiting`.
+        Records everything at once. Data that could not be written are kept and written before the
+        next data, or by `store_waiting`.
     settings : CalibrationSettings
     resume : SessionRecord or None
-        What `session` holds, to go on with.
+        The contents of `session`, to resume it.
 
     Raises
     ------
     ProcedureError
-        If what is to be gone on with was solved once, but cannot be any more.
+        If the session to resume was solved, but can no longer be solved.
 
     Attributes
     ----------
     state : State
     eyes : tuple of eye
-        Those that the present alignment is for.
+        Eyes open in the present alignment.
     results : Results or None
-        Of all alignments; None before `solve`, and when an alignment has been deleted or restored.
+        Of all alignments; None before `solve` and after an alignment was deleted or restored.
     refused : int
-        Confirmations refused by the guard.
+        Number of confirmations refused by the guard.
     refusal : str
-        Why the last confirmation of the present cursor was refused; empty if none was.
+        Reason why the last confirmation of the present cursor was refused; empty if none was.
     """
 
     def __init__(
@@ -187,21 +187,21 @@ class Calibration:
 
     @property
     def cursor(self) -> PlacedHand | None:
-        """The frozen hand, while the headset shows it."""
+        """The frozen hand while the headset shows it, else None."""
         return self._cursor
 
     @property
     def applied_shift_m(self) -> Mapping[Eye, Float64]:
-        """Both eyes' φ that the headset renders with, solved or set by hand."""
+        """φ that the headset renders each eye with, solved or set by hand."""
         return MappingProxyType(dict(self._shift_m))
 
     @property
     def is_applied(self) -> bool:
-        """Whether the headset has acknowledged the newest projection of each eye."""
+        """True if the headset has acknowledged the newest projection of each eye."""
         return all(message.state is Delivery.ACKED for message in self._sent.values())
 
     def step(self, frame: Frame) -> Observation:
-        """Take a frame: find the hand, guide the alignment, take a confirmation.
+        """Process a frame: find the hand, guide the alignment, handle a confirmation.
 
         Raises
         ------
@@ -235,14 +235,14 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no steady hand, an alignment has not been applied yet, or there are too
-            many.
+            If there is no steady hand, an alignment has not been applied yet, or the session is
+            full.
         ValueError
-            Unless one eye is given, or each of both once.
+            Unless one eye is given, or both once each.
         HandError
-            If hardly a point lies off the cut edges.
+            If almost all points lie at cut edges.
         FileError
-            If the session cannot be written; the cursor is shown all the same.
+            If the session cannot be written; the cursor is shown anyway.
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED, State.ALIGN):
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
@@ -268,7 +268,7 @@ class Calibration:
         self._store(lambda session: session.record("cursor_made", **made))
 
     def confirm(self) -> None:
-        """Confirm the alignment from the PC, as of the newest frame; the next step takes it.
+        """Confirm the alignment from the PC at the newest frame; the next step handles it.
 
         Raises
         ------
@@ -285,14 +285,14 @@ class Calibration:
         self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, T_E_W, self._cursor_id)
 
     def redo(self) -> None:
-        """Give up the present cursor, or the last alignment and the results with it.
+        """Discard the present cursor, or else delete the last alignment and the results.
 
         Raises
         ------
         ProcedureError
-            If there is neither.
+            If there is nothing to discard.
         FileError
-            If the session cannot be written; the alignment is given up all the same.
+            If the session cannot be written; the alignment is deleted anyway.
         """
         if self.state in (State.ALIGNED, State.SOLVED):
             self.delete_alignment(max(self._items.active))
@@ -302,16 +302,16 @@ class Calibration:
             raise ProcedureError(f"there is nothing to redo ({self.state})")
 
     def delete_alignment(self, number: int) -> None:
-        """Leave out an alignment, and the results with it.
+        """Delete an alignment, and the results with it.
 
         Raises
         ------
         ProcedureError
             While a cursor is being aligned or projections are being applied.
         ValueError
-            If there is none of that number.
+            If there is no alignment of this number.
         FileError
-            If the session cannot be written; the alignment is left out all the same.
+            If the session cannot be written; the alignment is deleted anyway.
         """
         self._require_settled()
         self._items.delete(number)
@@ -319,7 +319,7 @@ class Calibration:
         self._store(lambda session: session.delete("alignment", number))
 
     def restore_alignment(self, number: int) -> None:
-        """Take back the deletion of an alignment; the results go all the same.
+        """Restore a deleted alignment; the results are discarded.
 
         Raises as `delete_alignment`.
         """
@@ -334,7 +334,7 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no alignment, or something sent to the headset waits for its answer.
+            If there is no alignment, or the headset has not yet acknowledged the projections.
         FileError
             If the session cannot be written; the results are kept in memory.
         """
@@ -348,7 +348,7 @@ class Calibration:
         return results
 
     def apply(self) -> None:
-        """Send the solved projections to the headset and take the cursor away.
+        """Send the solved projections to the headset and hide the cursor.
 
         Raises
         ------
@@ -363,16 +363,16 @@ class Calibration:
         self.state = State.APPLYING
 
     def poll_applied(self) -> bool:
-        """Tell, without waiting, whether the headset has acknowledged every projection by now.
+        """Return, without waiting, whether the headset has acknowledged every projection.
 
         Raises
         ------
         ProcedureError
             If nothing was sent.
         LinkError
-            If the link has given one up, or the time set is over; `apply` may be called again.
+            If one could not be delivered or the timeout is over; call `apply` again.
         FileError
-            If the session cannot be written; the projections are applied all the same.
+            If the session cannot be written; the projections are applied anyway.
         """
         is_pending = any(message.state is Delivery.PENDING for message in self._sent.values())
         if self.state is State.APPLYING and is_pending and time.monotonic() < self._apply_until_s:
@@ -388,9 +388,9 @@ class Calibration:
         ProcedureError
             If nothing was sent.
         LinkError
-            If it does not in time; `apply` may be called again.
+            If it does not in time; call `apply` again.
         FileError
-            If the session cannot be written; the projections are applied all the same.
+            If the session cannot be written; the projections are applied anyway.
         """
         if self.state is not State.APPLYING:
             raise ProcedureError("apply first")
@@ -407,17 +407,17 @@ class Calibration:
         self._store(lambda session: session.save_applied(applied_m))
 
     def set_shift(self, shifts_m: Mapping[Eye, ArrayLike]) -> list[Outgoing]:
-        """Let the headset render with φ set by hand, from now on; an eye not given keeps its own.
+        """Have the headset render with φ set by hand; an eye not given keeps its own.
 
         Returns
         -------
         list of Outgoing
-            The projections on their way.
+            The projections sent.
 
         Raises
         ------
         ProcedureError
-            While there is a cursor or an alignment that has not been applied yet.
+            While there is a cursor, or an alignment that has not been applied.
         ValueError
             If a φ is not three finite numbers up to 30 mm.
         LinkError
@@ -434,18 +434,18 @@ class Calibration:
         return self._send_projections(shifts)
 
     def record_shift(self) -> None:
-        """Note in the session that the φ set by hand has settled; FileError if it cannot be."""
+        """Record the φ set by hand in the session; FileError if it cannot be written."""
         settled_m = self.applied_shift_m
         self._store(lambda session: session.save_fine_tuned(settled_m))
 
     def store_waiting(self) -> None:
-        """Write what the session could not take before; FileError if it still cannot."""
+        """Write data that could not be written before; FileError if they still cannot be."""
         while self._session is not None and self._unstored:
             self._unstored[0](self._session)
             self._unstored.popleft()
 
     def _resume(self, record: SessionRecord) -> None:
-        """Go on where a session ended: what was on its way then has to be done again."""
+        """Restore the state of a session; a cursor or projections pending then are lost."""
         self._items.active = dict(record.alignments)
         self._items.deleted = dict(record.deleted_alignments)
         self._shift_m |= record.applied_shift_m
@@ -453,7 +453,7 @@ class Calibration:
             try:
                 self._solve()
             except ValueError as error:
-                raise ProcedureError(f"{record.path} cannot be gone on with: {error}") from error
+                raise ProcedureError(f"{record.path} cannot be resumed: {error}") from error
             self.state = State.APPLIED if record.is_applied else State.SOLVED
         elif record.alignments:
             self.state = State.ALIGNED
@@ -489,7 +489,7 @@ class Calibration:
         return [self._sent[eye] for eye in shifts_m]
 
     def _guide(self, observation: Observation) -> Observation:
-        """Show the live hand in its colour and take a confirmation."""
+        """Show the live hand with its rotation, and handle a confirmation."""
         if observation.hand is not None:
             observation = self._show_live(observation, observation.hand)
         for confirmation in self._link.confirmations():
@@ -498,7 +498,7 @@ class Calibration:
         waiting = self._confirmation
         if waiting is not None and self._hands.placed_until_ns() >= waiting.t_host_ns:
             self._confirmation = None
-            self._take(waiting)
+            self._judge(waiting)
         return observation
 
     def _show_live(self, observation: Observation, hand: PlacedHand) -> Observation:
@@ -517,7 +517,7 @@ class Calibration:
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
 
-    def _take(self, confirmation: Confirmation) -> None:
+    def _judge(self, confirmation: Confirmation) -> None:
         """Accept or refuse a confirmation."""
         assert self._cursor is not None
         assert self._guard is not None
@@ -568,13 +568,13 @@ class Calibration:
     def _clear_cursor(self) -> None:
         self._cursor = self._guard = self._confirmation = None
         self.refusal = ""
-        # The wearer lowers the hand now: only what is seen from here on may become a cursor.
+        # The wearer lowers the hand now: only a hand seen from here on can become a cursor.
         self._hands.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
 
     def _store(self, write: Callable[[Session], object]) -> None:
-        """Write to the session, after what could not be written before."""
+        """Write to the session, after data that could not be written before."""
         if self._session is not None:
             self._unstored.append(write)
             self.store_waiting()

@@ -1,4 +1,4 @@
-"""A stored session solved again, as it was or with another method; the session stays as it is."""
+"""Solve a stored session again, with its own or another method, without changing it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from handcal.station.procedure import CalibrationSettings
 
 
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:
-    """Return how a session was solved; FileError if its settings cannot be read."""
+    """Return the solve settings of a session; FileError if they cannot be read."""
     where = f"{record.path / 'settings.json'}: calibration"
     return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
 
@@ -19,7 +19,7 @@ def stored_solve_settings(record: SessionRecord) -> SolveSettings:
 def solve_again(
     record: SessionRecord, settings: SolveSettings, progress: Progress = Progress()
 ) -> Results | None:
-    """Return what a session's alignments say; None if there are none.
+    """Return the results of a session's alignments; None if there are none.
 
     Parameters
     ----------

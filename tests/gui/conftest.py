@@ -38,7 +38,7 @@ from handcal.station.hands import PlacedHand
 from handcal.station.procedure import CalibrationSettings, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
-from handcal.station.wearer_view import EyeView, see
+from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig, UInt8
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -378,5 +378,7 @@ def _views(rig: Rig, shots: Shots) -> dict[Eye, EyeView]:
             for hand in (shots.live, shots.cursor)
         )
         shift_m = np.array([0.002, -0.001, 0.003])
-        views[eye] = see(eye, display, shift_m, np.zeros(3), outline_E_m, cursor_E_m, is_true=True)
+        views[eye] = render_eye_view(
+            eye, display, shift_m, np.zeros(3), outline_E_m, cursor_E_m, is_true=True
+        )
     return views

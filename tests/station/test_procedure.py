@@ -923,7 +923,7 @@ def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
 ) -> None:
     session.save_alignment(alignment)  # of a few points
     session.save_results({})
-    with pytest.raises(ProcedureError, match=r"cannot be gone on with: .* points"):
+    with pytest.raises(ProcedureError, match=r"cannot be resumed: .* points"):
         Calibration(RIG, server, session, SETTINGS, Session.open(session.path))
 
 
