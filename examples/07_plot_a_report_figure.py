@@ -27,13 +27,12 @@ def main() -> None:
 
     session = handcal.open_session(arguments.session)
     results = handcal.solve(session)
-    numbers = session.alignment_numbers
 
     # `Figure` draws without a window; in a notebook, plt.subplots() does as well.
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     above, below = figure.subplots(nrows=2, ncols=2)
-    draw_ellipses(axes=above, numbers=numbers, results=results)
-    draw_convergence(axes=below, numbers=numbers, results=results)
+    draw_ellipses(axes=above, results=results)
+    draw_convergence(axes=below, results=results)
     figure.suptitle(f"{session.path.name}: {results.method}")
 
     arguments.output.parent.mkdir(parents=True, exist_ok=True)

@@ -52,7 +52,9 @@ def pose_of_headset() -> Float64:
 def what_to_draw(state: HeadsetState) -> str:
     """Return in words what an app draws, for each eye with its P; the target for one eye only."""
     cursor = "no cursor" if state.cursor_W_m is None else f"cursor {state.cursor_id}"
-    hand = "no hand" if state.live_W_m is None else f"{'red' if state.live_red else 'blue'} hand"
+    hand = (
+        "no hand" if state.live_W_m is None else f"{'red' if state.is_over_limit else 'blue'} hand"
+    )
     target = "no target" if state.target is None else f"the target of the {state.target.eye} eye"
     eyes = " and ".join(sorted(state.projections)) or "no eye"
     what = f"{cursor}, {hand}, {target}"

@@ -8,16 +8,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.geometry import invert, project, rigid, transform
-from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig, Solved
+from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig, Solved, readonly
 
 TARGET_SIDE_M = 0.08
 TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
 """Distances of the user test's target (Hu et al. 2021, user test)."""
+
+
+def as_shifts(shifts_m: Mapping[Any, ArrayLike]) -> dict[Eye, Float64]:
+    """Return φ of each eye given as a read-only (3,) array.
+
+    Raises
+    ------
+    ValueError
+        For an unknown eye, or a φ that is not three finite numbers.
+    """
+    unknown = set(shifts_m) - set(EYES)
+    if unknown:
+        raise ValueError(f"an eye is left or right, not {unknown.pop()!r}")
+    read = {eye: readonly(shifts_m[eye], np.float64, (3,)) for eye in EYES if eye in shifts_m}
+    if not all(np.isfinite(shift_m).all() for shift_m in read.values()):
+        raise ValueError("φ must be finite")
+    return read
 
 
 def update_matrix(shift_m: ArrayLike, display_distance_m: float) -> Float64:

@@ -26,6 +26,8 @@ class Progress:
     is_cancelled: Callable[[], bool] = lambda: False
     span: tuple[float, float] = (0.0, 1.0)
     """Shares of the whole at which this task begins and ends."""
+    what: str = ""
+    """Activity reported where none is given."""
 
     def at(self, share: float, what: str = "") -> None:
         """Report the share of this task that is done, 0 to 1.
@@ -36,16 +38,22 @@ class Progress:
             If the task is to end.
         """
         self.check()
+        self.show(share, what)
+
+    def show(self, share: float, what: str = "") -> None:
+        """Report as `at`, without ending the task: for tasks that keep what is done by then."""
         low, high = self.span
-        self.report(what, low + share * (high - low))
+        self.report(what or self.what, low + share * (high - low))
 
     def check(self) -> None:
         """Raise CancelledError if the task is to end."""
         if self.is_cancelled():
             raise CancelledError("cancelled; nothing has changed")
 
-    def part(self, low: float, high: float) -> Progress:
+    def part(self, low: float, high: float, what: str = "") -> Progress:
         """Return the progress of a part of this task, given as shares of it."""
         first, last = self.span
         width = last - first
-        return replace(self, span=(first + low * width, first + high * width))
+        return replace(
+            self, span=(first + low * width, first + high * width), what=what or self.what
+        )

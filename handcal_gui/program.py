@@ -18,8 +18,8 @@ from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX
 from handcal_gui.control.compare import Comparison
-from handcal_gui.control.live import Live
-from handcal_gui.control.review import Review
+from handcal_gui.control.live import CalibrationController
+from handcal_gui.control.review import ReviewController
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
@@ -78,8 +78,8 @@ class Program(QObject):
     ----------
     window : MainWindow
     wizard_panel : WizardPanel
-    live : Live
-    review : Review
+    live : CalibrationController
+    review : ReviewController
     start : StartPage
     """
 
@@ -107,8 +107,8 @@ class Program(QObject):
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
         comparison = Comparison(panels.results)
-        self.live = Live(self.window, self.wizard_panel, comparison)
-        self.review = Review(self.window, review_page, comparison)
+        self.live = CalibrationController(self.window, self.wizard_panel, comparison)
+        self.review = ReviewController(self.window, review_page, comparison)
         self._connect(review_page)
         self._make_menus()
         self._restore()

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from handcal.display import (
     arcmin_from_px,
+    as_shifts,
     effect_at,
     eye_projection,
     projection_matrix,
@@ -150,3 +151,11 @@ def test_effect_of_a_shift_by_hand(
     assert effect.size_ratio == pytest.approx(size_ratio)
     arcmin = 60 * np.degrees(np.arctan(np.array([right_px, up_px]) / 2456))
     np.testing.assert_allclose((effect.right_arcmin, effect.up_arcmin), arcmin, atol=1e-9)
+
+
+def test_shifts_are_read_only_and_in_the_order_of_the_eyes() -> None:
+    read = as_shifts({"right": [1, 2, 3], "left": [0, 0, 0]})
+    assert list(read) == ["left", "right"]
+    np.testing.assert_array_equal(read["right"], [1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="read-only"):
+        read["right"][0] = 0.0

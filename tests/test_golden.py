@@ -110,7 +110,11 @@ def solved(results: Results | None) -> dict[str, Any]:
     return {
         "results": results_json(results),
         "residuals": {
-            eye: [digest(alone[eye].residuals_m) for alone in results.alignments if eye in alone]
+            eye: [
+                digest(alone[eye].residuals_m)
+                for alone in results.alignments.values()
+                if eye in alone
+            ]
             for eye in EYES
         },
     }
@@ -177,7 +181,7 @@ def test_a_simulated_hand_segmented(roi: Any, golden: dict[str, Any]) -> None:
 
 def test_the_example_session_exported(tmp_path: Path, golden: dict[str, Any]) -> None:
     record = Session.open(resource_path("example_session"))
-    export_session(record, tmp_path, ExportSettings(), lambda *_: None, lambda: False)
+    export_session(record, tmp_path, ExportSettings())
     texts = sorted(path for pattern in TEXTS for path in tmp_path.rglob(pattern))
     names = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*"))
     check("export-files", names, golden)
@@ -208,10 +212,10 @@ def test_the_journal_of_a_session(tmp_path: Path, golden: dict[str, Any]) -> Non
             session.save_trial(
                 make_trial(rig.eyes[eye], eye, 0.5, shifts_m[eye], shifts_m[eye] + 0.0005)
             )
-        session.delete_trial(1)
-        session.restore_trial(1)
-        session.delete_alignment(2)
-        session.restore_alignment(2)
+        session.delete("trial", 1)
+        session.restore("trial", 1)
+        session.delete("alignment", 2)
+        session.restore("alignment", 2)
         session.save_results(results_json(results))
         session.save_notes("Golden.")
         session.finish()

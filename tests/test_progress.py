@@ -34,3 +34,19 @@ def test_a_cancelled_task_ends_before_it_reports() -> None:
 
 def test_progress_is_silent_by_default() -> None:
     Progress().at(1.0, "done")
+
+
+def test_a_part_names_the_activity_unless_another_is_given() -> None:
+    shown: list[tuple[str, float]] = []
+    progress = Progress(lambda what, share: shown.append((what, share)))
+    part = progress.part(0.5, 1.0, "Writing")
+    part.at(0.0)
+    part.part(0.0, 0.5).at(1.0)
+    part.at(1.0, "Moving")
+    assert shown == [("Writing", 0.5), ("Writing", 0.75), ("Moving", 1.0)]
+
+
+def test_a_task_that_keeps_what_is_done_is_not_ended_by_reporting() -> None:
+    shown: list[float] = []
+    Progress(lambda _what, share: shown.append(share), is_cancelled=lambda: True).show(0.5)
+    assert shown == [0.5]

@@ -183,7 +183,7 @@ def test_a_hand_is_segmented_wherever_one_looks(roi: Any) -> None:
 def test_no_hand_says_why() -> None:
     frame = simulated_frame(seed=1)
     empty = handcal.Frame(0, 0, 0, np.zeros_like(frame.depth), 1e-4, frame.depth_intrinsics)
-    with pytest.raises(handcal.HandError, match="no hand-sized thing"):
+    with pytest.raises(handcal.HandError, match="no hand-sized object"):
         handcal.segment(empty)
 
 

@@ -1,10 +1,10 @@
-"""Record what any camera sees, until told to stop."""
+"""Record any camera until a limit is reached or the recording is stopped."""
 
 from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -13,6 +13,7 @@ from handcal.camera.camera import Camera
 from handcal.camera.recordings import record_frames
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.files import make_folder
+from handcal.progress import Progress
 from handcal.types import Frame
 
 _POLL_S = 0.2
@@ -20,29 +21,29 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class RecordSettings:
-    """When a recording ends by itself."""
+    """Limits of a recording."""
 
     duration_s: float = 60.0
-    """By the camera's time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute."""
+    """In camera time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute."""
     frames: int = 100_000
     silent_s: float = 5.0
-    """A camera silent for so long has ended."""
+    """A camera that sends no frame for this time has ended."""
     free_bytes: int = 2**30
-    """Left free on the disk."""
+    """Disk space to leave free."""
     lead_frames: int = 30
-    """So many frames at most are left out at the beginning, until one has colour: cameras pair
-    their first images badly."""
+    """Most frames skipped at the beginning, until one has colour: cameras pair their first images
+    badly."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What was recorded."""
+    """Summary of a recording."""
 
     frames: int
     dropped: int
-    """Frames missing in between by the camera's own count."""
+    """Missing frames, by the camera's frame numbers."""
     duration_s: float
-    """From the first to the last frame, by the camera's time."""
+    """From the first to the last frame, in camera time."""
     stop_reason: str
 
 
@@ -50,35 +51,32 @@ def record(
     camera: Camera,
     path: Path,
     settings: RecordSettings,
-    report: Callable[[str, float], None],
-    is_stopped: Callable[[], bool],
+    progress: Progress = Progress(),
 ) -> Recorded:
     """Record a camera until it ends or fails, a limit is reached, or it is stopped.
 
-    Whatever ends it, what was recorded by then is kept.
+    The frames recorded so far are kept in all cases.
 
     Parameters
     ----------
     camera : Camera
         Stays open.
     path : Path
-        A ``.db3`` file, which replaces another once complete, or a new folder.
+        A ``.db3`` file, which replaces an existing one when complete, or a new folder.
     settings : RecordSettings
-    report : callable
-        Given what is being done and the share done, for every frame.
-    is_stopped : callable
-        Asked for every frame.
+    progress : Progress
+        Reported to for every frame; cancelling it ends the recording and keeps it.
 
     Raises
     ------
     CameraError
-        If the camera gives no frame at all, or librealsense cannot write the file.
+        If the camera sends no frame, or librealsense cannot write the file.
     FileError
         If the folder is not empty or cannot be written.
     ValueError
-        If `path` has another suffix than ``.db3``, or the camera changes.
+        If `path` has a suffix other than ``.db3``, or the camera changes.
     """
-    take = _Take(camera, make_folder(path.absolute().parent), settings, report, is_stopped)
+    take = _Take(camera, make_folder(path.absolute().parent), settings, progress)
     first = next(take.frames, None)
     if first is None:
         raise CameraError(f"nothing was recorded: {take.stop_reason}")
@@ -87,15 +85,10 @@ def record(
 
 
 class _Take:
-    """The frames of one recording, and what is to be said of them."""
+    """The frames of one recording, with counts and the reason for its end."""
 
     def __init__(
-        self,
-        camera: Camera,
-        disk: Path,
-        settings: RecordSettings,
-        report: Callable[[str, float], None],
-        is_stopped: Callable[[], bool],
+        self, camera: Camera, disk: Path, settings: RecordSettings, progress: Progress
     ) -> None:
         self.stop_reason = ""
         self.dropped = 0
@@ -103,13 +96,12 @@ class _Take:
         self.frames = self._until_limit(self._from_first_color(self._live(camera)))
         self._disk = disk
         self._settings = settings
-        self._report = report
-        self._is_stopped = is_stopped
+        self._progress = progress
 
     def _live(self, camera: Camera) -> Iterator[Frame]:
         """Yield frames until the camera ends or the recording is stopped."""
         heard_s = time.monotonic()
-        while not self._is_stopped():
+        while not self._progress.is_cancelled():
             try:
                 frame = camera.read(_POLL_S)
             except CameraTimeoutError as error:
@@ -128,7 +120,7 @@ class _Take:
         self.stop_reason = "stopped"
 
     def _from_first_color(self, frames: Iterator[Frame]) -> Iterator[Frame]:
-        """Begin with a frame that has colour; with the very first if none of the next has."""
+        """Begin with the first frame that has colour, or the first of all if none has."""
         lead: list[Frame] = []
         for frame in frames:
             lead = [frame] if frame.color is not None else [*lead, frame]
@@ -145,7 +137,7 @@ class _Take:
             self.dropped += max(0, frame.index - previous.index - 1)
             self.duration_s = (frame.t_camera_ns - first.t_camera_ns) * 1e-9
             share = max(self.duration_s / settings.duration_s, count / settings.frames)
-            self._report("recording", min(1.0, share))
+            self._progress.show(min(1.0, share), "recording")
             yield frame
             if share >= 1.0:
                 self.stop_reason = "as long as asked for"

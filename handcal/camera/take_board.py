@@ -1,9 +1,9 @@
-"""Images of a board taken by cameras, kept as files under numbers that belong together."""
+"""Capture images of a board, stored under numbers that pair the images of two cameras."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from glob import escape
@@ -13,6 +13,7 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
+from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
 from handcal.rig.choose import ChooseSettings, ViewChooser
@@ -20,7 +21,7 @@ from handcal.rig.formats import write_intrinsics, write_pose
 from handcal.types import Frame, UInt8
 
 IMAGER, DEPTH_TO_COLOR = "depth-imager.json", "depth-to-color.json"
-"""What a camera with depth tells of itself, as files beside its colour images."""
+"""Files with the calibration of a depth camera, beside its colour images."""
 
 _TOGETHER_NS = 20_000_000
 _PATIENCE = 4
@@ -28,48 +29,45 @@ _PATIENCE = 4
 
 @dataclass(frozen=True, slots=True)
 class TakeSettings:
-    """How long images are taken, and which."""
+    """Settings of a capture."""
 
     seconds: float = 60.0
-    """By the cameras' own time."""
+    """In camera time."""
     every_s: float = 0.1
-    """Between two moments looked at."""
+    """Interval between two moments examined."""
     choose: ChooseSettings = field(default_factory=ChooseSettings)
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What was taken."""
+    """Summary of a capture."""
 
     kept: int
     looked_at: int
-    """Moments."""
+    """Number of moments examined."""
     passed_over: Mapping[str, int]
-    """How many were not kept, by reason."""
+    """Number of moments not kept, by reason."""
 
 
-def take_views(
+def capture_views(
     cameras: Sequence[ViewpointCamera],
     folders: Sequence[Path],
     board: Board,
     settings: TakeSettings,
-    report: Callable[[str, float], None],
-    is_stopped: Callable[[], bool] = lambda: False,
+    progress: Progress = Progress(),
 ) -> Taken:
-    """Take images of a board by itself: of one camera, or of the two of pairs.
+    """Capture images of a board automatically with one camera, or pairs with two.
 
     Parameters
     ----------
     cameras : sequence of ViewpointCamera
-        Recordings and videos of a pair must begin at the same moment.
+        Recordings and videos of a pair must start at the same moment.
     folders : sequence of Path
-        Where each one's images go; those that are there stay.
+        A folder for each camera's images; existing images are kept.
     board : Board
     settings : TakeSettings
-    report : callable
-        Told what is being done, and the share done.
-    is_stopped : callable
-        Asked at every moment; what is kept by then stays.
+    progress : Progress
+        Reported to at every moment; cancelling it ends the search and keeps the images so far.
 
     Raises
     ------
@@ -83,12 +81,12 @@ def take_views(
     next_ns = 0
     for images, t_ns in _moments(cameras):
         share = 1e-9 * t_ns / settings.seconds
-        if chooser.is_done or share > 1.0 or is_stopped():
+        if chooser.is_done or share > 1.0 or progress.is_cancelled():
             break
         if t_ns < next_ns:
             continue
         next_ns = t_ns + round(1e9 * settings.every_s)
-        report(f"{verdicts['']} views kept", share)
+        progress.show(share, f"{verdicts['']} views kept")
         why_not = chooser.look(see_board(images, board))
         if not why_not:
             keep_images(images, folders)
@@ -98,7 +96,7 @@ def take_views(
 
 
 def see_board(images: Sequence[UInt8], board: Board) -> tuple[BoardView | None, ...]:
-    """Look for the board in each image; None where it is not found."""
+    """Return the board found in each image; None if it is not found."""
 
     def see(image: UInt8) -> BoardView | None:
         with suppress(BoardError):
@@ -109,7 +107,7 @@ def see_board(images: Sequence[UInt8], board: Board) -> tuple[BoardView | None, 
 
 
 def keep_images(images: Sequence[UInt8], folders: Sequence[Path]) -> tuple[str, ...]:
-    """Write RGB images into a folder each, under the next number; return the files' names.
+    """Write each RGB image into its folder, under the next number; return the file names.
 
     Raises
     ------
@@ -124,7 +122,7 @@ def keep_images(images: Sequence[UInt8], folders: Sequence[Path]) -> tuple[str, 
 
 
 def keep_imager(folder: Path, frame: Frame) -> None:
-    """Write where a camera's depth imager is, and its intrinsics, beside its colour images."""
+    """Write the pose and intrinsics of a depth imager beside its colour images."""
     make_folder(folder)
     write_intrinsics(folder / IMAGER, frame.depth_intrinsics, "json")
     write_pose(folder / DEPTH_TO_COLOR, frame.T_C_D, "json")
@@ -133,7 +131,7 @@ def keep_imager(folder: Path, frame: Frame) -> None:
 def _moments(cameras: Sequence[ViewpointCamera]) -> Iterator[tuple[tuple[UInt8, ...], int]]:
     """Yield an image of each camera, and the nanoseconds since the first, until one ends.
 
-    They belong together by the time since each camera's first.
+    Images are matched by the time since each camera's first image.
     """
     begins_ns: list[int] = []
     try:
@@ -152,7 +150,7 @@ def _moments(cameras: Sequence[ViewpointCamera]) -> Iterator[tuple[tuple[UInt8, 
 
 
 def _read(camera: ViewpointCamera) -> tuple[UInt8, int]:
-    """Return the next image, with the patience that a camera needs that just begins."""
+    """Return the next image, with retries for a camera that is just starting."""
     for _ in range(_PATIENCE):
         with suppress(CameraTimeoutError):
             return camera.read()

@@ -91,6 +91,7 @@ def record(arguments: argparse.Namespace) -> None:
     """Record a camera into a .db3 file or a folder of images."""
     from handcal.camera.record import RecordSettings
     from handcal.camera.record import record as record_camera
+    from handcal.progress import Progress
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
     with _open_source(arguments) as camera, until_interrupted() as is_stopped:
@@ -98,7 +99,9 @@ def record(arguments: argparse.Namespace) -> None:
         console.print(said, markup=False)
         try:
             with progress() as report:
-                recorded = record_camera(camera, arguments.output, settings, report, is_stopped)
+                recorded = record_camera(
+                    camera, arguments.output, settings, Progress(report, is_stopped)
+                )
         except ValueError as error:
             raise HandcalError(str(error)) from error
     save(arguments.json, asdict(recorded))

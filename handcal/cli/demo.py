@@ -93,7 +93,7 @@ def run_demo(
             "rejected": calibration.refused,
             "accepted_deg": max(
                 float(np.degrees(np.linalg.norm(alignment.rotation_rad)))
-                for alignment in calibration.alignments
+                for alignment in calibration.alignments.values()
             ),
         },
         "link": {
@@ -184,7 +184,7 @@ def _timing(
     Segmentation and guard as they ran, beside the virtual headset and the rendering.
     """
     solve_ms = []
-    for alignment in calibration.alignments:
+    for alignment in calibration.alignments.values():
         started_s = time.perf_counter()
         solve_alignment(replace(alignment, eyes=EYES), rig)
         solve_ms.append(1e3 * (time.perf_counter() - started_s))

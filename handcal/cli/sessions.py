@@ -87,6 +87,7 @@ def solve(arguments: argparse.Namespace) -> None:
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
+    from handcal.progress import Progress
     from handcal.session.session import Session
 
     try:
@@ -98,6 +99,6 @@ def export(arguments: argparse.Namespace) -> None:
     record = Session.open(arguments.session)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
     with progress() as report:
-        files = export_session(record, folder, settings, report, lambda: False)
+        files = export_session(record, folder, settings, Progress(report))
     for file in files:
         console.print(str(file))

@@ -1,1 +1,1 @@
-"""Files for others from a session: report, tables, matrices, clouds and the session itself."""
+"""Export of a session: report, tables, matrices, clouds and the session itself."""

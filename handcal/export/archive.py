@@ -1,13 +1,14 @@
-"""The session folder as one zip file, which extracted is the session again."""
+"""The session folder as one zip file; extracting it restores the session."""
 
 from __future__ import annotations
 
 import os
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from handcal.errors import FileError
+from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 
 MAX_ARCHIVE_BYTES = 4 * 2**30
@@ -15,26 +16,26 @@ _CHUNK_BYTES = 2**19
 
 
 def write_archive(
-    path: Path, record: SessionRecord, excluded: Path, checkpoint: Callable[[float], None]
+    path: Path, record: SessionRecord, excluded: Path, progress: Progress = Progress()
 ) -> None:
     """Write a session's folder as a zip file, under its own name.
 
-    Equal sessions give equal bytes: files come in order, without their times. Locks, hidden and
-    temporary files, links, and what the journal gained since the record was read stay out.
+    Equal sessions give equal bytes: files are sorted and have no timestamps. Left out are locks,
+    hidden and temporary files, links, and events recorded after the record was read.
 
     Parameters
     ----------
     path : Path
     record : SessionRecord
     excluded : Path
-        A folder that is left out if it lies in the session's: where exports go.
-    checkpoint : callable
-        Told the share done, every half megabyte at the latest; what it raises ends the writing.
+        A folder to leave out if it lies in the session's: that of the exports.
+    progress : Progress
+        Reported to every half megabyte at the latest.
 
     Raises
     ------
     FileError
-        If a file cannot be read or written, or there are more than 4 GiB.
+        If a file cannot be read or written, or the session exceeds 4 GiB.
     """
     folder = record.path.absolute()
     try:
@@ -46,7 +47,7 @@ def write_archive(
         total_bytes = sum(sizes.values())
         if total_bytes > MAX_ARCHIVE_BYTES:
             raise FileError(
-                f"{folder} holds {total_bytes:,} bytes, more than the {MAX_ARCHIVE_BYTES:,} "
+                f"{folder} has {total_bytes:,} bytes, more than the {MAX_ARCHIVE_BYTES:,} "
                 "that fit in one zip file; copy the folder instead"
             )
         with path.open("xb") as stream:
@@ -62,7 +63,7 @@ def write_archive(
                             target.write(chunk)
                             left_bytes -= len(chunk)
                             done_bytes += len(chunk)
-                            checkpoint(done_bytes / total_bytes)
+                            progress.at(done_bytes / total_bytes)
             stream.flush()
             os.fsync(stream.fileno())
     except OSError as error:
@@ -70,7 +71,7 @@ def write_archive(
 
 
 def _contents(folder: Path, excluded: Path) -> Iterator[Path]:
-    """Yield what is in a session's folder, in order."""
+    """Yield the files and folders in a session's folder, sorted."""
     for path in sorted(folder.iterdir()):
         if path.is_symlink() or path.name.startswith(".") or path == excluded:
             continue
@@ -82,7 +83,7 @@ def _contents(folder: Path, excluded: Path) -> Iterator[Path]:
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
-    entry = zipfile.ZipInfo(name)  # of 1980: equal bytes whenever it is written
+    entry = zipfile.ZipInfo(name)  # dated 1980, so that the bytes do not depend on the time
     entry.compress_type = zipfile.ZIP_DEFLATED
     entry.external_attr = (0o40755 << 16) | 0x10 if entry.is_dir() else 0o100644 << 16
     return entry

@@ -1,6 +1,6 @@
-"""The calibration as numbers for other programs: FileStorage YAML, and JSON in four conventions.
+"""The calibration for other programs: FileStorage YAML, and JSON in four conventions.
 
-docs/export.md describes every field. Numbers survive exactly in both.
+docs/export.md describes every field. Both formats preserve numbers exactly.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from handcal.conventions import (
     openxr_view,
     unity_world_to_camera,
 )
-from handcal.export.outcome import Origin, Outcome, printable
+from handcal.export.outcome import Origin, SessionOutcome, printable
 from handcal.io.files import write_atomic, write_json
 from handcal.rig.rig_file import quoted
 from handcal.types import EYES, Eye, Projection
@@ -26,8 +26,8 @@ from handcal.types import EYES, Eye, Projection
 CALIBRATION_VERSION = 1
 
 
-def write_calibration_yaml(path: Path, outcome: Outcome) -> None:
-    """Write each eye's final calibration, what it is made of, in OpenCV's FileStorage YAML."""
+def write_calibration_yaml(path: Path, outcome: SessionOutcome) -> None:
+    """Write each eye's final calibration and its parts in OpenCV's FileStorage YAML."""
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.write("handcal_calibration", CALIBRATION_VERSION)
     for name, text in _whose(outcome).items():
@@ -53,13 +53,15 @@ def write_calibration_yaml(path: Path, outcome: Outcome) -> None:
     write_atomic(path, storage.releaseAndGetString().encode())
 
 
-def write_calibration_json(path: Path, outcome: Outcome, near_m: float, far_m: float) -> None:
+def write_calibration_json(
+    path: Path, outcome: SessionOutcome, near_m: float, far_m: float
+) -> None:
     """Write every φ of each eye with its matrices in OpenCV's, OpenGL's, Unity's and OpenXR's form.
 
     Parameters
     ----------
     path : Path
-    outcome : Outcome
+    outcome : SessionOutcome
     near_m, far_m : float
         Clipping distances of the OpenGL and Unity matrices.
     """
@@ -79,7 +81,7 @@ def write_calibration_json(path: Path, outcome: Outcome, near_m: float, far_m: f
     )
 
 
-def _whose(outcome: Outcome) -> dict[str, str]:
+def _whose(outcome: SessionOutcome) -> dict[str, str]:
     return {
         "session": outcome.name,
         "wearer": printable(outcome.record.wearer),
@@ -89,7 +91,7 @@ def _whose(outcome: Outcome) -> dict[str, str]:
     }
 
 
-def _eye(outcome: Outcome, eye: Eye, near_m: float, far_m: float) -> dict[str, Any]:
+def _eye(outcome: SessionOutcome, eye: Eye, near_m: float, far_m: float) -> dict[str, Any]:
     display = outcome.record.rig.eyes[eye]
     return {
         "final": outcome.final(eye),
@@ -112,7 +114,7 @@ def _eye(outcome: Outcome, eye: Eye, near_m: float, far_m: float) -> dict[str, A
 
 
 def _solution(
-    outcome: Outcome, eye: Eye, origin: Origin, near_m: float, far_m: float
+    outcome: SessionOutcome, eye: Eye, origin: Origin, near_m: float, far_m: float
 ) -> dict[str, Any]:
     projection = outcome.projection(eye, origin)
     clip = opengl_projection(projection, near_m, far_m).tolist()
@@ -136,7 +138,7 @@ def _solution(
 
 
 def _openxr(projection: Projection) -> dict[str, Any]:
-    """Return XrView's fields, or null and why there are none."""
+    """Return the fields of XrView, or null and the reason."""
     try:
         pose, fov = openxr_view(projection)
     except ValueError as error:

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
 from handcal.io.files import make_folder, write_ply
+from handcal.progress import Progress
 
 
-def write_clouds(folder: Path, outcome: Outcome, checkpoint: Callable[[float], None]) -> None:
+def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Progress()) -> None:
     """Write ``alignment-N-cursor.ply`` and ``alignment-N-hand.ply`` for each alignment.
 
-    Points are doubles in W, in metres; `is_cut` is 1 beside a cut edge. The hand's
+    Points are doubles in W, in metres; `is_cut` is 1 at a cut edge. The hand's
     `residual_left_m` and `residual_right_m`, where solved, are each point's distance to its
     partner on the cursor, NaN for an outlier.
     """
     make_folder(folder)
-    record = outcome.record
-    solved = outcome.results.alignments if outcome.results else ()
-    numbered = zip(record.alignment_numbers, record.alignments, solved, strict=True)
-    for done, (number, alignment, shifts) in enumerate(numbered):
-        checkpoint(done / len(solved))
+    solved = outcome.results.alignments if outcome.results else {}
+    for done, (number, shifts) in enumerate(solved.items()):
+        progress.at(done / len(solved))
+        alignment = outcome.record.alignments[number]
         write_ply(
             folder / f"alignment-{number}-cursor.ply",
             alignment.cursor_m,

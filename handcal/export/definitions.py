@@ -1,4 +1,4 @@
-"""What the words and symbols of the report mean."""
+"""Definitions of the words and symbols of the report."""
 
 DEFINITIONS = {
     "φ = (φ₁, φ₂, φ₃)": (

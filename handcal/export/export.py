@@ -1,31 +1,28 @@
-"""A session's export: the formats asked for, made together and put in place at once."""
+"""Export of a session: all requested formats are written, then published together."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from handcal.errors import CancelledError
 from handcal.export.archive import write_archive
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
 from handcal.export.formats import FORMATS, Format
-from handcal.export.outcome import Outcome, conclude
+from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
+from handcal.progress import Progress
 from handcal.session.session import SessionRecord
-
-_SOLVING = "Solving the alignments again"
 
 
 @dataclass(frozen=True, slots=True)
 class ExportSettings:
-    """What is exported."""
+    """Settings of an export."""
 
     formats: tuple[Format, ...] = tuple(FORMATS)
-    """Some of `FORMATS`."""
+    """A selection of `FORMATS`."""
     near_m: float = 0.1
     far_m: float = 100.0
     """Clipping distances of the OpenGL and Unity matrices."""
@@ -44,71 +41,55 @@ def export_session(
     record: SessionRecord,
     folder: Path,
     settings: ExportSettings,
-    report: Callable[[str, float], None],
-    is_cancelled: Callable[[], bool],
+    progress: Progress = Progress(),
 ) -> tuple[Path, ...]:
     """Export a session into a folder, and return the files.
 
     The files appear together when all are complete, and replace those of an earlier export of the
-    same formats; whatever goes wrong before leaves the folder as it was.
+    same formats; after an error the folder is unchanged.
 
     Parameters
     ----------
     record : SessionRecord
     folder : Path
-        Created if needed. Two sessions need two folders: the names of the files are fixed.
+        Created if needed. Use one folder for each session: file names are fixed.
     settings : ExportSettings
-    report : callable
-        Told what is being made and which share of the whole is done, 0..1.
-    is_cancelled : callable
-        Asked many times a second whether to give up; while solving, before each alignment.
+    progress : Progress
+        Reported to many times a second; while solving, before each alignment.
 
     Raises
     ------
     CancelledError
-        If `is_cancelled`.
+        If it was cancelled.
     FileError
         If the session cannot be solved, or a file cannot be written or replaced.
     """
-    told = ("", 0)
-
-    def checkpoint(what: str, share: float) -> None:
-        nonlocal told
-        if is_cancelled():
-            raise CancelledError("the export was cancelled; nothing has changed")
-        if told != (what, int(100 * share)):
-            told = what, int(100 * share)
-            report(what, share)
-
     formats = [name for name in FORMATS if name in settings.formats]
     with Staging(folder) as staging:
         parts = 1 + len(formats)
-        outcome = conclude(record, lambda share: checkpoint(_SOLVING, share / parts))
+        outcome = load_outcome(record, progress.part(0.0, 1.0 / parts))
         for done, name in enumerate(formats, 1):
-
-            def part(share: float, done: int = done, name: Format = name) -> None:
-                checkpoint(FORMATS[name].title, (done + share) / parts)
-
-            part(0.0)
+            part = progress.part(done / parts, (done + 1) / parts, FORMATS[name].title)
+            part.at(0.0)
             _write(name, outcome, staging.path, folder, settings, part)
-        checkpoint("Moving the files in place", 1.0)
+        progress.at(1.0, "Moving the files in place")
         return staging.publish([pattern for name in formats for pattern in FORMATS[name].patterns])
 
 
 def _write(
     name: Format,
-    outcome: Outcome,
+    outcome: SessionOutcome,
     place: Path,
     folder: Path,
     settings: ExportSettings,
-    checkpoint: Callable[[float], None],
+    progress: Progress,
 ) -> None:
-    """Write the files of one format into `place`, which are meant for `folder`."""
+    """Write the files of one format, destined for `folder`, into `place`."""
     match name:
         case "report" | "html":
             for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf", "jinja2"):
                 import_module(heavy)
-                checkpoint(0.0)
+                progress.check()
             from handcal.export.report import session_report
             from handcal.report.figures import write_figures
             from handcal.report.html import write_html
@@ -116,11 +97,11 @@ def _write(
 
             report = session_report(outcome)
             if name == "report":
-                write_pdf(place / "report.pdf", report, checkpoint)
+                write_pdf(place / "report.pdf", report, progress.at)
             else:
-                write_html(place / "report.html", report, lambda share: checkpoint(0.5 * share))
+                write_html(place / "report.html", report, progress.part(0.0, 0.5).at)
                 figures = place / "figures"
-                write_figures(figures, report, lambda share: checkpoint(0.5 + 0.5 * share))
+                write_figures(figures, report, progress.part(0.5, 1.0).at)
         case "csv":
             write_parameters(place / "parameters.csv", outcome)
             write_trials(place / "trials.csv", outcome)
@@ -131,6 +112,6 @@ def _write(
                 place / "calibration.json", outcome, settings.near_m, settings.far_m
             )
         case "ply":
-            write_clouds(place / "clouds", outcome, checkpoint)
+            write_clouds(place / "clouds", outcome, progress)
         case "zip":
-            write_archive(place / "session.zip", outcome.record, folder, checkpoint)
+            write_archive(place / "session.zip", outcome.record, folder, progress)

@@ -1,4 +1,4 @@
-"""The raw numbers behind the session report's figures; those of φ and trials are the tables'."""
+"""The raw data of the session report's figures; those of φ and trials are in `tables`."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from handcal.session.trial import Trial
 from handcal.types import Eye, Float64
 
 
-def convergence_rows(numbers: Sequence[int], results: Results) -> Iterator[Row]:
+def convergence_rows(results: Results) -> Iterator[Row]:
     """Yield a row for every iteration of every alignment and eye."""
-    for number, shifts in zip(numbers, results.alignments, strict=True):
+    for number, shifts in results.alignments.items():
         for eye, shift in shifts.items():
             for iteration, rms_m in enumerate(np.sqrt(shift.history_m2), 1):
                 yield {
@@ -46,7 +46,7 @@ def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[R
 def overlay_rows(
     number: int, eye: Eye, outlines: Mapping[str, Mapping[str, Sequence[Float64]]]
 ) -> Iterator[Row]:
-    """Yield a row for every corner of the outlines, by when and of what they are."""
+    """Yield a row for every corner of the outlines, by calibration and object."""
     for when, of_what in outlines.items():
         for what, closed in of_what.items():
             for place, outline in enumerate(closed, 1):
@@ -62,10 +62,10 @@ def overlay_rows(
                     }
 
 
-def running_mean_rows(numbers: Sequence[int], trials: Sequence[Trial]) -> Iterator[Row]:
+def running_mean_rows(trials: Mapping[int, Trial]) -> Iterator[Row]:
     """Yield a row for every trial, with the mean of the eye's trials so far."""
     errors: dict[Eye, list[float]] = {}
-    for number, trial in zip(numbers, trials, strict=True):
+    for number, trial in trials.items():
         so_far = errors.setdefault(trial.eye, [])
         so_far.append(float(trial.error_arcmin.mean()))
         yield {

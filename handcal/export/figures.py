@@ -1,11 +1,11 @@
-"""The report's figures, each drawn into axes that it is given.
+"""The figures of the report, each drawn into given axes.
 
-Left and right differ in colour, marker and line, so that the report also reads in grey.
+Left and right differ in colour, marker and line, so that the report is readable in grey too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from handcal.display import eye_projection
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
 from handcal.geometry import project, transform
 from handcal.register.results import Results
 from handcal.session.trial import Trial
@@ -28,22 +28,21 @@ COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
 MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}
 _LINES: Mapping[Eye, str] = {"left": "-", "right": "--"}
 _HAND, _CURSOR = "#0072B2", "#D55E00"
-# No scale ends below, lest rounding look like a finding.
+# Smallest range of a scale, so that rounding errors do not look like findings.
 _LEAST_MM = 0.01
 _LABEL_PT, _TITLE_PT = 7.5, 8.5
 # Side of a cell of the residual map, and the colour of one without inliers.
 CELL_MM = 2.5
 _OUTLIER = (0.75, 0.75, 0.75, 1.0)
-# An outline is sought in a mask in which a display's longer side is so long, and gaps between
-# points are closed.
+# Outlines are found in a mask: length of the display's longer side in it, and of gaps to close.
 _MASK_PX, _GAP_PX = 500, 9
 _AROUND_DISPLAY = 0.12
 
 
-def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Results) -> None:
-    """Draw how the registration error of each alignment fell, one pair of axes for each eye."""
+def draw_convergence(axes: Sequence[Axes], results: Results) -> None:
+    """Draw the registration error of each alignment by iteration, with axes for each eye."""
     for ax, eye in zip(axes, EYES, strict=True):
-        for number, shifts in zip(numbers, results.alignments, strict=True):
+        for number, shifts in results.alignments.items():
             if eye in shifts:
                 rms_mm = 1e3 * np.sqrt(shifts[eye].history_m2)
                 steps = np.arange(1, len(rms_mm) + 1)
@@ -55,7 +54,7 @@ def draw_convergence(axes: Sequence[Axes], numbers: Sequence[int], results: Resu
             ax.legend(title="alignment", fontsize=6.5, title_fontsize=6.5, frameon=False)
 
 
-def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> None:
+def draw_shifts(axes: Sequence[Axes], outcome: SessionOutcome, results: Results) -> None:
     """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
     count = len(results.alignments)
     room = max(1.0, 0.4 * count)  # for the names below
@@ -66,7 +65,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
             offset = -0.12 if eye == "left" else 0.12
             each = {
                 place + offset: shifts[eye]
-                for place, shifts in enumerate(results.alignments, 1)
+                for place, shifts in enumerate(results.alignments.values(), 1)
                 if eye in shifts
             }
             if eye in results.eyes:
@@ -87,7 +86,7 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
                 ax.plot(tuned + offset, tuned_mm, MARKERS[eye], color=COLORS[eye], mfc="none")
         ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
         ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
-        numbers = outcome.record.alignment_numbers
+        numbers = list(results.alignments)
         names: dict[float, str] = {
             index + 1: str(numbers[index]) for index in range(0, count, -(-count // 6))
         }
@@ -98,10 +97,10 @@ def draw_shifts(axes: Sequence[Axes], outcome: Outcome, results: Results) -> Non
     axes[0].legend(fontsize=6.5, frameon=False)
 
 
-def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results) -> None:
+def draw_ellipses(axes: Sequence[Axes], results: Results) -> None:
     """Draw φ1 and φ2 of every alignment and fused with their 1σ ellipses, axes for each eye."""
     for ax, eye in zip(axes, EYES, strict=True):
-        for number, shifts in zip(numbers, results.alignments, strict=True):
+        for number, shifts in results.alignments.items():
             if eye in shifts:
                 _ellipse(ax, shifts[eye], "0.45", linewidth=0.8)
                 x_mm, y_mm, _ = 1e3 * shifts[eye].shift_m
@@ -118,7 +117,7 @@ def draw_ellipses(axes: Sequence[Axes], numbers: Sequence[int], results: Results
 
 @dataclass(frozen=True, slots=True)
 class ResidualCells:
-    """A hand as the eye faces it, in cells, each (N,)."""
+    """A hand seen from the eye, in cells, each (N,)."""
 
     x_mm: Float64
     y_mm: Float64
@@ -126,7 +125,7 @@ class ResidualCells:
     points: NDArray[np.int64]
     inliers: NDArray[np.int64]
     mean_mm: Float64
-    """Of the inliers' residuals; NaN without."""
+    """Mean residual of the inliers; NaN without inliers."""
 
 
 def residual_cells(alignment: Alignment, eye: Eye, shift: EyeShift) -> ResidualCells:
@@ -146,9 +145,9 @@ def residual_cells(alignment: Alignment, eye: Eye, shift: EyeShift) -> ResidualC
 
 
 def draw_residuals(ax: Axes, cells: ResidualCells, most_mm: float) -> None:
-    """Draw the hand as the eye faces it, coloured by the mean residual in each cell.
+    """Draw the hand seen from the eye, coloured by the mean residual in each cell.
 
-    Colours reach to `most_mm`; cells in which all points are outliers are grey.
+    The colour scale ends at `most_mm`; cells with only outliers are grey.
     """
     left_mm, top_mm = cells.x_mm.min(), cells.y_mm.min()
     columns, rows = (
@@ -173,7 +172,7 @@ def draw_residuals(ax: Axes, cells: ResidualCells, most_mm: float) -> None:
 def overlay_outlines(
     display: EyeDisplay, alignment: Alignment, eye: Eye, eye_shift_m: Float64
 ) -> dict[str, list[Float64]]:
-    """Return what an eye at one place saw at the moment of an alignment, in the display's pixels.
+    """Return the outlines that an eye with this φ saw at an alignment, in display pixels.
 
     Outlines, each (N, 2) and closed, of the hand as the eye sees it through the display, and of the
     cursor as the headset drew it.
@@ -187,7 +186,7 @@ def overlay_outlines(
 
 
 def draw_overlay(ax: Axes, display: EyeDisplay, outlines: Mapping[str, Sequence[Float64]]) -> None:
-    """Draw what `overlay_outlines` gave within the display's frame."""
+    """Draw the outlines of `overlay_outlines` within the display's frame."""
     for outline in outlines["hand"]:
         ax.fill(*outline.T, facecolor=_HAND, alpha=0.25, linewidth=0.0)
         ax.plot(*outline.T, color=_HAND, linewidth=0.6)
@@ -200,7 +199,7 @@ def draw_overlay(ax: Axes, display: EyeDisplay, outlines: Mapping[str, Sequence[
     ax.set_aspect("equal")
 
 
-def draw_trial_errors(axes: Sequence[Axes], trials: Sequence[Trial]) -> None:
+def draw_trial_errors(axes: Sequence[Axes], trials: Collection[Trial]) -> None:
     """Draw box plots of the corners' errors by distance and eye: in pixels, and in arcminutes."""
     depths_m = sorted({trial.target_depth_m for trial in trials})
     for ax, name, unit in zip(axes, ("error_px", "error_arcmin"), ("px", "arcmin"), strict=True):
@@ -232,12 +231,12 @@ def draw_trial_errors(axes: Sequence[Axes], trials: Sequence[Trial]) -> None:
     axes[0].legend(fontsize=6.5, frameon=False)
 
 
-def draw_running_mean(ax: Axes, numbers: Sequence[int], trials: Sequence[Trial]) -> None:
+def draw_running_mean(ax: Axes, trials: Mapping[int, Trial]) -> None:
     """Draw each trial's mean error and the mean of all so far, by eye."""
     for eye in EYES:
         errors = {
             number: float(trial.error_arcmin.mean())
-            for number, trial in zip(numbers, trials, strict=True)
+            for number, trial in trials.items()
             if trial.eye == eye
         }
         if errors:
@@ -252,7 +251,7 @@ def draw_running_mean(ax: Axes, numbers: Sequence[int], trials: Sequence[Trial])
 
 
 def name_axes(ax: Axes, title: str, x: str, y: str) -> None:
-    """Give axes their title and the names of both, with units."""
+    """Set the title and the axis labels, with units."""
     ax.set_title(title, fontsize=_TITLE_PT, loc="left")
     ax.set_xlabel(x, fontsize=_LABEL_PT)
     ax.set_ylabel(y, fontsize=_LABEL_PT)
@@ -287,9 +286,9 @@ def _color_bar(ax: Axes, colored: ScalarMappable) -> None:
 
 
 def _outlines(pixels: Float64, display: EyeDisplay) -> list[Float64]:
-    """Return the outlines, each (N, 2) px and closed, of what a cloud covers on a display.
+    """Return the outlines, each (N, 2) px and closed, of the area a cloud covers on a display.
 
-    As far as it lies within the display's own size around it.
+    Points farther outside the display than its own size are left out.
     """
     size = np.array([display.width_px, display.height_px])
     scale = _MASK_PX / size.max()

@@ -1,4 +1,4 @@
-"""The formats of an export, without what writes them: quick to import."""
+"""The formats of an export, without their writers: quick to import."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Format: TypeAlias = Literal["report", "html", "csv", "yaml", "json", "ply", "zip
 
 @dataclass(frozen=True, slots=True)
 class FormatInfo:
-    """What a format is called, and the patterns of its files' names in the export's folder."""
+    """Title of a format, and the patterns of its file names in the export's folder."""
 
     title: str
     patterns: tuple[str, ...]

@@ -1,14 +1,15 @@
-"""What a session came to, worked out once for every format: solved again, and what is applied."""
+"""The outcome of a session, computed once for all formats: results and applied calibrations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from handcal.display import projection_matrix
+from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
@@ -16,14 +17,14 @@ from handcal.types import EYES, Eye, Float64, Projection
 
 Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 
-# Solved again by another version of NumPy, φ differs by rounding.
+# φ solved again by another version of NumPy differs by rounding.
 _SAME_M = 1e-7
 _MAX_CHARACTERS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
-    """A session and its results, with what a stored session does not keep: residuals, histories."""
+class SessionOutcome:
+    """A session and its results, including residuals and histories, which are not stored."""
 
     record: SessionRecord
     settings: SolveSettings
@@ -31,21 +32,21 @@ class Outcome:
     results: Results | None
     """All alignments solved again; None without alignments."""
     shifts_m: Mapping[Eye, Mapping[Origin, Float64]]
-    """each (3,); every φ there is for an eye, the final one first: fine-tuned by hand, solved, and
-    the offline calibration's zero."""
+    """each (3,); every known φ of an eye, the final one first: fine-tuned by hand, solved, and the
+    zero of the offline calibration."""
 
     @property
     def name(self) -> str:
-        """The session's name: that of its folder."""
+        """The name of the session's folder."""
         return printable(self.record.path.absolute().name)
 
     @property
     def started(self) -> str:
-        """When the session was created, UTC, ISO 8601."""
+        """Time of the session's creation, UTC, ISO 8601."""
         return printable(self.record.events[0].time)
 
     def final(self, eye: Eye) -> Origin:
-        """Return which φ is the eye's final one."""
+        """Return the origin of the eye's final φ."""
         return next(iter(self.shifts_m[eye]))
 
     def final_shift_m(self, eye: Eye) -> Float64:
@@ -53,27 +54,25 @@ class Outcome:
         return self.shifts_m[eye][self.final(eye)]
 
     def is_applied(self, eye: Eye, origin: Origin) -> bool:
-        """Tell whether the headset rendered with one of the eye's φ in the end."""
+        """Return whether the headset rendered with this φ of the eye at the end."""
         last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
         return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < _SAME_M)
 
     def projection(self, eye: Eye, origin: Origin) -> Projection:
-        """Return what the headset renders an eye with for one of its φ."""
+        """Return the projection of an eye for one of its φ."""
         display = self.record.rig.eyes[eye]
         P = projection_matrix(display, self.shifts_m[eye][origin])
         return Projection(eye, P, display.width_px, display.height_px)
 
 
-def conclude(
-    record: SessionRecord, checkpoint: Callable[[float], None] = lambda _share: None
-) -> Outcome:
+def load_outcome(record: SessionRecord, progress: Progress = Progress()) -> SessionOutcome:
     """Solve a session's alignments again, with its own settings.
 
     Parameters
     ----------
     record : SessionRecord
-    checkpoint : callable
-        Told the share done, before each alignment; what it raises ends the solving.
+    progress : Progress
+        Reported to before each alignment.
 
     Raises
     ------
@@ -81,14 +80,14 @@ def conclude(
         If its settings are unreadable or an alignment cannot be solved.
     """
     settings = stored_solve_settings(record)
-    results = solve_again(record, settings, lambda _what, share: checkpoint(share))
-    return Outcome(
+    results = solve_again(record, settings, progress)
+    return SessionOutcome(
         record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
     )
 
 
 def printable(text: str) -> str:
-    """Return a text from elsewhere as one line that every format can hold."""
+    """Return an untrusted text as one line that is valid in every format."""
     return "".join(char if char.isprintable() else "\ufffd" for char in text[:_MAX_CHARACTERS])
 
 

@@ -1,4 +1,4 @@
-"""What the report of a session says: what was found for each eye, how sure it is, and from what."""
+"""The report of a session: each eye's result, its uncertainty and the data behind it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from handcal.export.figure_rows import (
     running_mean_rows,
 )
 from handcal.export.figures import ResidualCells
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, SessionOutcome
 from handcal.export.tables import parameter_rows, trial_rows
 from handcal.register.results import Results
 from handcal.register.verdict import expected_error_arcmin
@@ -40,7 +40,7 @@ _VERDICTS: Mapping[VerdictName, str] = {
 }
 
 
-def session_report(outcome: Outcome) -> Report:
+def session_report(outcome: SessionOutcome) -> Report:
     """Return the report of a session."""
     return Report(
         title="Eye-display calibration",
@@ -50,7 +50,7 @@ def session_report(outcome: Outcome) -> Report:
     )
 
 
-def _sections(outcome: Outcome) -> Iterator[Section]:
+def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     record, results = outcome.record, outcome.results
     yield _summary(outcome)
     yield _shifts(outcome)
@@ -58,7 +58,7 @@ def _sections(outcome: Outcome) -> Iterator[Section]:
         yield _solution(outcome, results)
         yield _alignments(outcome, results)
         yield _shift_plots(outcome, results)
-        yield _convergence(outcome, results)
+        yield _convergence(results)
         yield _residuals(outcome, results)
         yield _overlays(outcome)
     if record.trials:
@@ -74,7 +74,7 @@ def _sections(outcome: Outcome) -> Iterator[Section]:
     yield Section("Definitions", [facts(DEFINITIONS)], starts_page=True)
 
 
-def _verdict(outcome: Outcome) -> str:
+def _verdict(outcome: SessionOutcome) -> str:
     """Return the verdict in one sentence."""
     if outcome.results is None:
         return "Nothing is solved: the session holds no alignment."
@@ -89,7 +89,7 @@ def _verdict(outcome: Outcome) -> str:
     return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _summary(outcome: Outcome) -> Section:
+def _summary(outcome: SessionOutcome) -> Section:
     record = outcome.record
     return Section(
         "",
@@ -113,7 +113,7 @@ def _summary(outcome: Outcome) -> Section:
     )
 
 
-def _shifts(outcome: Outcome) -> Section:
+def _shifts(outcome: SessionOutcome) -> Section:
     table = Table(
         [
             Column("eye", "left"),
@@ -143,7 +143,7 @@ def _shifts(outcome: Outcome) -> Section:
     return Section("Eye shift φ", items)
 
 
-def _solution(outcome: Outcome, results: Results) -> Section:
+def _solution(outcome: SessionOutcome, results: Results) -> Section:
     table = Table(
         [
             Column("eye", "left"),
@@ -173,7 +173,7 @@ def _solution(outcome: Outcome, results: Results) -> Section:
     return Section("How it was solved", items)
 
 
-def _alignments(outcome: Outcome, results: Results) -> Section:
+def _alignments(outcome: SessionOutcome, results: Results) -> Section:
     record = outcome.record
     times = {
         event.data.get("number"): event.time
@@ -206,10 +206,8 @@ def _alignments(outcome: Outcome, results: Results) -> Section:
                 f"{100 * shift.inlier_ratio:.0f}",
                 str(shift.iterations),
             ]
-            for number, alignment, shifts in zip(
-                record.alignment_numbers, record.alignments, results.alignments, strict=True
-            )
-            for eye, shift in shifts.items()
+            for number, alignment in record.alignments.items()
+            for eye, shift in results.alignments[number].items()
         ],
         "Each alignment solved alone, without priors; eyes: those open. One alignment with both "
         "eyes open shows one hand displacement for both; fusing shares it out between them.",
@@ -217,8 +215,7 @@ def _alignments(outcome: Outcome, results: Results) -> Section:
     return Section("Alignments", [table])
 
 
-def _shift_plots(outcome: Outcome, results: Results) -> Section:
-    numbers = outcome.record.alignment_numbers
+def _shift_plots(outcome: SessionOutcome, results: Results) -> Section:
     rows = list(parameter_rows(outcome))
     return Section(
         "φ of each alignment, and fused",
@@ -235,7 +232,7 @@ def _shift_plots(outcome: Outcome, results: Results) -> Section:
                 "ellipses",
                 "Grey: each alignment by its number; coloured: fused. Ellipses are 1σ (39 % of "
                 "cases); the cross at 0 is the viewpoint of the offline calibration.",
-                lambda axes: figures.draw_ellipses(axes, numbers, results),
+                lambda axes: figures.draw_ellipses(axes, results),
                 rows,
                 height_mm=68.0,
                 columns=2,
@@ -244,22 +241,23 @@ def _shift_plots(outcome: Outcome, results: Results) -> Section:
     )
 
 
-def _convergence(outcome: Outcome, results: Results) -> Section:
-    numbers = outcome.record.alignment_numbers
+def _convergence(results: Results) -> Section:
     figure = Figure(
         "convergence",
         "Root mean square distance of the pairs at each iteration.",
-        lambda axes: figures.draw_convergence(axes, numbers, results),
-        list(convergence_rows(numbers, results)),
+        lambda axes: figures.draw_convergence(axes, results),
+        list(convergence_rows(results)),
         height_mm=55.0,
         columns=2,
     )
     return Section("Convergence", [figure])
 
 
-def _residuals(outcome: Outcome, results: Results) -> Section:
+def _residuals(outcome: SessionOutcome, results: Results) -> Section:
     record = outcome.record
-    residuals_m = [shift.residuals_m for each in results.alignments for shift in each.values()]
+    residuals_m = [
+        shift.residuals_m for each in results.alignments.values() for shift in each.values()
+    ]
     most_mm = 1e3 * float(np.nanpercentile(np.concatenate(residuals_m), 98))
 
     def draw(number: int, cells: Mapping[Eye, ResidualCells], axes: Sequence[Axes]) -> None:
@@ -274,11 +272,10 @@ def _residuals(outcome: Outcome, results: Results) -> Section:
         "The hand as the eye faces it, in E, mm; colour: mean residual in cells of "
         f"{figures.CELL_MM:g} mm; grey: only outliers, or points that belong to a cut edge."
     ]
-    for number, alignment, shifts in zip(
-        record.alignment_numbers, record.alignments, results.alignments, strict=True
-    ):
+    for number, alignment in record.alignments.items():
         cells = {
-            eye: figures.residual_cells(alignment, eye, shift) for eye, shift in shifts.items()
+            eye: figures.residual_cells(alignment, eye, shift)
+            for eye, shift in results.alignments[number].items()
         }
         rows = list(residual_rows(number, cells))
         drawn = partial(draw, number, cells)
@@ -286,12 +283,12 @@ def _residuals(outcome: Outcome, results: Results) -> Section:
     return Section("Residuals on the hand", items)
 
 
-def _overlays(outcome: Outcome) -> Section:
-    """Return each eye's newest alignment as the eye saw it."""
+def _overlays(outcome: SessionOutcome) -> Section:
+    """Return a section with each eye's newest alignment as seen by the eye."""
     record = outcome.record
     newest = {
         eye: (number, alignment)
-        for number, alignment in zip(record.alignment_numbers, record.alignments, strict=True)
+        for number, alignment in record.alignments.items()
         for eye in alignment.eyes
     }
     items: list[Item] = [
@@ -304,7 +301,7 @@ def _overlays(outcome: Outcome) -> Section:
     return Section("Hand and cursor through the display", items)
 
 
-def _overlay(outcome: Outcome, eye: Eye, number: int, alignment: Alignment) -> Figure:
+def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignment) -> Figure:
     display = outcome.record.rig.eyes[eye]
     shifts_m = {"before": np.zeros(3), "after": outcome.final_shift_m(eye)}
     outlines = {
@@ -321,9 +318,9 @@ def _overlay(outcome: Outcome, eye: Eye, number: int, alignment: Alignment) -> F
     return Figure(f"overlay-{eye}", "", draw, rows, height_mm=58.0, columns=2)
 
 
-def _user_test(outcome: Outcome) -> Section:
+def _user_test(outcome: SessionOutcome) -> Section:
     record = outcome.record
-    statistics = summarise(record.trials)
+    statistics = summarise(record.trials.values())
     groups = {"all": statistics.total} if statistics.total else {}
     groups |= {f"{eye} eye": errors for eye, errors in statistics.by_eye.items()}
     groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
@@ -343,32 +340,31 @@ def _user_test(outcome: Outcome) -> Section:
     boxes = Figure(
         "trial-errors",
         "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
-        lambda axes: figures.draw_trial_errors(axes, record.trials),
-        list(trial_rows(record.trial_numbers, record.trials)),
+        lambda axes: figures.draw_trial_errors(axes, record.trials.values()),
+        list(trial_rows(record.trials)),
         height_mm=62.0,
         columns=2,
     )
-    numbers = record.trial_numbers
     running = Figure(
         "running-mean",
         "Points: mean error of each trial; lines: mean of all so far.",
-        lambda axes: figures.draw_running_mean(axes[0], numbers, record.trials),
-        list(running_mean_rows(numbers, record.trials)),
+        lambda axes: figures.draw_running_mean(axes[0], record.trials),
+        list(running_mean_rows(record.trials)),
         height_mm=48.0,
     )
     return Section("User test", [table, _interval(outcome), boxes, running])
 
 
-def _interval(outcome: Outcome) -> str:
-    """Return how sure the mean error is."""
+def _interval(outcome: SessionOutcome) -> str:
+    """Return a sentence on the uncertainty of the mean error."""
     trials = outcome.record.trials
-    calibrations = calibration_numbers(trials)
+    calibrations = list(calibration_numbers(trials).values())
     if len(set(calibrations)) < 2:
         return (
             "All trials judge one calibration, so how far another would differ is not known: no "
             "interval is given for the mean."
         )
-    errors = [float(trial.error_arcmin.mean()) for trial in trials]
+    errors = [float(trial.error_arcmin.mean()) for trial in trials.values()]
     found = mean_interval(errors, calibrations)
     return (
         f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
@@ -376,7 +372,7 @@ def _interval(outcome: Outcome) -> str:
     )
 
 
-def _trials(outcome: Outcome) -> Section:
+def _trials(outcome: SessionOutcome) -> Section:
     record = outcome.record
     table = Table(
         [
@@ -400,7 +396,7 @@ def _trials(outcome: Outcome) -> Section:
                 f"{trial.error_px.mean():.2f}",
                 f"{trial.error_arcmin.mean():.2f}",
             ]
-            for number, trial in zip(record.trial_numbers, record.trials, strict=True)
+            for number, trial in record.trials.items()
         ],
     )
     return Section("Trials", [table])
@@ -417,7 +413,7 @@ def _error_cells(errors: ErrorStatistics) -> list[str]:
     ]
 
 
-def _shift_cells(outcome: Outcome, eye: Eye, origin: Origin) -> list[str]:
+def _shift_cells(outcome: SessionOutcome, eye: Eye, origin: Origin) -> list[str]:
     if origin == "solved" and outcome.results is not None:
         return _with_sigma(outcome.results.eyes[eye])
     return [_mm(value) for value in outcome.shifts_m[eye][origin]]

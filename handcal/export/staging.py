@@ -1,7 +1,7 @@
-"""Files that appear together or not at all.
+"""Atomic publishing of several files: all of them appear, or none.
 
-They are made in a hidden folder on the disk of the target and moved in place when all are
-complete. What a killed program leaves of it, the next export to the same target removes.
+They are written to a hidden folder on the target's disk and moved into place when all are complete.
+The next export to the same target removes the remains of a killed program.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from handcal.io.lock import FileLock
 
 
 class Staging(Closable):
-    """A hidden place to make files for a folder, which is left as it was unless `publish` succeeds.
+    """A hidden folder for new files of another, which is unchanged unless `publish` succeeds.
 
     Parameters
     ----------
     folder : Path
-        Where the files shall go; it need not exist.
+        Destination of the files; it need not exist.
 
     Attributes
     ----------
     path : Path
-        Where to make them.
+        Folder to write them to.
 
     Raises
     ------
     FileError
-        If another program is making files for the same folder, or nothing can be written there.
+        If another program is exporting to the same folder, or it cannot be written.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder.absolute()
-        # In the folder itself if it exists: it may be a disk of its own.
+        # In the folder itself if it exists: it may be a separate disk.
         home = next(path for path in (self._folder, *self._folder.parents) if path.is_dir())
         self._root = make_folder(home / f".{self._folder.name}.handcal-export")
         self._lock = FileLock(self._root / "lock")
@@ -54,18 +54,18 @@ class Staging(Closable):
             raise FileError(f"cannot write {self._root}: {error.strerror or error}") from error
 
     def publish(self, replaced: Sequence[str]) -> tuple[Path, ...]:
-        """Move the files in place and return where they are now, in order.
+        """Move the files into place and return their new paths, sorted.
 
         Parameters
         ----------
         replaced : sequence of str
-            Patterns of the files that these replace, relative to the folder: what matches and is
-            not among them is removed.
+            Patterns, relative to the folder, of the files to replace: matching files that are not
+            among the new ones are removed.
 
         Raises
         ------
         FileError
-            If a file cannot be moved or replaced; all is then as it was.
+            If a file cannot be moved or replaced; the folder is then unchanged.
         """
         names = sorted(
             path.relative_to(self.path) for path in self.path.rglob("*") if path.is_file()
@@ -84,12 +84,12 @@ class Staging(Closable):
         return tuple(self._folder / name for name in names)
 
     def close(self) -> None:
-        """Remove what was not published; safe to call twice."""
+        """Remove unpublished files; safe to call twice."""
         self._lock.release()
         shutil.rmtree(self._root, ignore_errors=True)
 
     def _merge(self, names: Sequence[Path], replaced: Sequence[str]) -> None:
-        """Move the files into the existing folder, each at one stroke; undo all if one fails."""
+        """Move each file atomically into the existing folder; undo all moves if one fails."""
         stale = {
             path.relative_to(self._folder)
             for pattern in replaced
@@ -108,7 +108,7 @@ class Staging(Closable):
                 (self._folder / name).unlink()
         except (OSError, FileError):
             for name in affected:
-                # What cannot be put back, such as a file that is open elsewhere, was not moved.
+                # A file that cannot be put back, such as one open elsewhere, was not moved.
                 with contextlib.suppress(OSError):
                     self._put_back(name)
             raise

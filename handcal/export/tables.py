@@ -1,14 +1,14 @@
-"""Parameters and trials as CSV, units in the headers."""
+"""Parameters and trials as CSV, with units in the headers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, SessionOutcome
 from handcal.io.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.rows import rows_csv
@@ -58,26 +58,25 @@ _TRIALS = (
 )
 
 
-def write_parameters(path: Path, outcome: Outcome) -> None:
-    """Write each eye's φ: a row for every alignment, for all fused, and for what was set by hand.
+def write_parameters(path: Path, outcome: SessionOutcome) -> None:
+    """Write each eye's φ: a row for every alignment, the fused φ and the one set by hand.
 
     Columns: docs/export.md.
     """
     _write(path, _PARAMETERS, outcome, parameter_rows(outcome))
 
 
-def write_trials(path: Path, outcome: Outcome) -> None:
+def write_trials(path: Path, outcome: SessionOutcome) -> None:
     """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    record = outcome.record
-    _write(path, _TRIALS, outcome, trial_rows(record.trial_numbers, record.trials))
+    _write(path, _TRIALS, outcome, trial_rows(outcome.record.trials))
 
 
-def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
+def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
     """Yield a row for every φ of each eye."""
     record, results = outcome.record, outcome.results
     if results is not None:
-        numbered = zip(record.alignment_numbers, record.alignments, results.alignments, strict=True)
-        for number, alignment, shifts in numbered:
+        for number, shifts in results.alignments.items():
+            alignment = record.alignments[number]
             for eye, shift in shifts.items():
                 yield {
                     "source": "alignment",
@@ -106,7 +105,7 @@ def parameter_rows(outcome: Outcome) -> Iterator[dict[str, Any]]:
             }
 
 
-def _place(outcome: Outcome, eye: Eye, origin: Origin) -> dict[str, Any]:
+def _place(outcome: SessionOutcome, eye: Eye, origin: Origin) -> dict[str, Any]:
     return {
         "eye": eye,
         "final": _yes(outcome.final(eye) == origin),
@@ -114,7 +113,7 @@ def _place(outcome: Outcome, eye: Eye, origin: Origin) -> dict[str, Any]:
     }
 
 
-def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
+def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
     covariance_mm2 = 1e6 * shift.covariance_m2
     return {
         "method": outcome.settings.method,
@@ -133,9 +132,9 @@ def _solved(outcome: Outcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
     }
 
 
-def trial_rows(numbers: Sequence[int], trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
-    """Yield a row for every corner of every trial, given with their numbers."""
-    for number, trial in zip(numbers, trials, strict=True):
+def trial_rows(trials: Mapping[int, Trial]) -> Iterator[dict[str, Any]]:
+    """Yield a row for every corner of every trial."""
+    for number, trial in trials.items():
         for corner in range(len(trial.corners_E_m)):
             x_m, y_m, z_m = map(float, trial.corners_E_m[corner])
             yield {
@@ -167,7 +166,7 @@ def _yes(truth: bool) -> str:
 
 
 def _write(
-    path: Path, columns: tuple[str, ...], outcome: Outcome, rows: Iterable[Mapping[str, Any]]
+    path: Path, columns: tuple[str, ...], outcome: SessionOutcome, rows: Iterable[Mapping[str, Any]]
 ) -> None:
     whose = {"session": outcome.name, "wearer": outcome.record.wearer}
     write_atomic(path, rows_csv(({**whose, **row} for row in rows), columns))

@@ -34,7 +34,7 @@ def segment(frame: Frame, *, roi: Roi = "detector") -> HandCloud:
         Depth, and colour for the detector; aligned or not. Without colour, ``"depth"`` is used.
     roi : {"detector", "left", "right", "depth"}
         Where to look: where the shipped detector sees a hand in the colour image (of several the
-        nearest, the leftmost or the rightmost), or for the nearest hand-sized thing in the depth
+        nearest, the leftmost or the rightmost), or for the nearest hand-sized object in the depth
         image.
 
     Returns

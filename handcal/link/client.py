@@ -31,8 +31,8 @@ class HeadsetState:
     cursor_id: int = 0
     live_W_m: Float64 | None = None
     """(N, 3); the frozen and the live hand, frame W; None if not shown."""
-    live_red: bool = False
-    """True if the live hand is drawn red because it is rotated too far."""
+    is_over_limit: bool = False
+    """True if the live hand is rotated too far; the headset then draws it red."""
     prompt: str = ""
     eyes: tuple[Eye, ...] = EYES
     """The eyes to keep open."""
@@ -172,7 +172,7 @@ class HeadsetClient(Endpoint):
             self._live_chunks.clear()
         if live.chunk < messages.MAX_CHUNKS:
             self._live_chunks[live.chunk] = messages.read_points(live.points)
-            self._state = replace(self._state, live_red=live.red)
+            self._state = replace(self._state, is_over_limit=live.red)
 
     def _answer(self, ping: pb.Ping) -> None:
         received_ns = self._clock_ns()

@@ -59,7 +59,7 @@ def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
     return pb.Envelope(cursor=pb.Cursor(cursor_id=cursor_id, points=points))
 
 
-def live_hand(points_W_m: ArrayLike, red: bool, frame: int) -> list[pb.Envelope]:
+def live_hand(points_W_m: ArrayLike, is_over_limit: bool, frame: int) -> list[pb.Envelope]:
     """Make the chunks of a live hand, interleaved so that a lost chunk leaves no hole.
 
     Raises
@@ -75,7 +75,7 @@ def live_hand(points_W_m: ArrayLike, red: bool, frame: int) -> list[pb.Envelope]
                 frame=frame,
                 chunk=chunk,
                 chunk_count=count,
-                red=red,
+                red=is_over_limit,
                 points=pb.Points(origin_m=origin_m, offsets=offsets[chunk::count].tobytes()),
             )
         )

@@ -126,10 +126,11 @@ class HeadsetServer(Endpoint):
         """
         return self._send_reliably(Slot.CURSOR, messages.cursor(points_W_m, cursor_id))
 
-    def send_live_hand(self, points_W_m: ArrayLike, red: bool) -> None:
+    def send_live_hand(self, points_W_m: ArrayLike, is_over_limit: bool) -> None:
         """Send the live hand, (N, 3) of frame W, thinned evenly to the limit of one frame.
 
-        It replaces any hand that has not been sent yet.
+        `is_over_limit` means that it is rotated too far; the headset then draws it red. The hand
+        replaces any that has not been sent yet.
 
         Raises
         ------
@@ -144,7 +145,7 @@ class HeadsetServer(Endpoint):
             self._require_running()
             self._live_frame += 1
             self._stream.clear()
-            self._stream.extend(messages.live_hand(thinned, red, self._live_frame))
+            self._stream.extend(messages.live_hand(thinned, is_over_limit, self._live_frame))
 
     def send_prompt(self, text: str, eyes: Sequence[Eye] = EYES) -> Outgoing:
         """Send a text to show and the eyes to keep open, reliably.

@@ -1,12 +1,12 @@
-"""Several alignments, two eyes, one estimate.
+"""Fusion of several alignments of two eyes into one estimate.
 
-An alignment gives one hand displacement: three numbers. With one eye open they are that eye's φ.
-With both open the wearer puts the hand where the errors of both eyes balance: by least squares in
-the image, at ``φ_seen = W_left φ_left + W_right φ_right`` with ``W_e = (N_left + N_right)^-1 N_e``
-and N_e the normal matrix, in common axes, of the cursor's pixels in eye e for a moved hand. So six
-unknowns meet three numbers, and only a prior on how far two eyes can differ closes the gap.
-Everything is Gaussian, so this is one linear system; several alignments add up in it, weighed by
-their covariances.
+An alignment measures one hand displacement: three numbers. With one eye open they are that eye's φ.
+With both eyes open the wearer moves the hand to where the errors of both eyes balance: by least
+squares in the image, at ``φ_seen = W_left φ_left + W_right φ_right`` with
+``W_e = (N_left + N_right)^-1 N_e``, where N_e is the normal matrix, in common axes, of the cursor's
+pixels in eye e with respect to a displacement of the hand. Three measurements do not determine six
+unknowns, so a prior limits how far the two eyes differ. Everything is Gaussian, so this is one
+linear system, in which the alignments add up, weighted by their covariances.
 """
 
 from __future__ import annotations
@@ -22,32 +22,43 @@ from handcal.geometry import project, transform
 from handcal.register.surface import describe_surface
 from handcal.types import EYES, Alignment, Bool, Eye, EyeDisplay, EyeShift, Float64, Rig
 
-# The cursor's outline is sought in this many of its points.
+# The cursor's outline is found in this many of its points.
 _OUTLINE_FROM_POINTS = 1500
-# Far less than one point's, so that a cursor beside the display leaves the weights defined.
+# Far less than that of one point; it keeps the weights defined for a cursor outside the display.
 _NORMAL_FLOOR = 1e-3
 
-# H (3, 6), what was seen (3,), and its covariance (3, 3).
+# H (3, 6), the displacement seen (3,), and its covariance (3, 3).
 Observed: TypeAlias = tuple[Float64, Float64, Float64]
 
 
 @dataclass(frozen=True, slots=True)
 class FuseSettings:
-    """What is known before, and how well people align."""
+    """Priors on φ, and the precision of a wearer's alignment."""
 
     eye_box_sigma_m: float = 0.010
-    """Each component of φ, standard deviation: the eye box is about 2 cm wide (paper)."""
+    """Standard deviation of each component of φ: the eye box is about 2 cm wide (paper)."""
     eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
-    """Of the right φ from the left. x is the eye distance against the rig's: 2 mm where the headset
-    is set to the wearer's; 3.6 mm among adults (Gordon et al. 2014, ANSUR II)."""
+    """Standard deviation of the right φ minus the left. x is the difference of the wearer's eye
+    distance from the rig's: 2 mm if the headset is adjusted to the wearer; 3.6 mm among adults
+    (Gordon et al. 2014, ANSUR II)."""
     lateral_sigma_arcmin: float = 3.0
-    """How exactly a wearer overlays, about each of two axes."""
+    """Standard deviation of the overlay in each of two directions."""
     depth_sigma: float = 0.003
-    """How exactly a wearer matches the size, relative."""
+    """Relative standard deviation of the depth, by matching the size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fused:
+    """Estimates from several alignments, for each eye that any of them has."""
+
+    shifts: Mapping[Eye, EyeShift]
+    covariances_after_another_m2: Mapping[Eye, Float64]
+    """each (3, 3); covariances to expect after one more alignment that is as informative as those
+    so far are on average, and agrees with them as well."""
 
 
 def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> EyeShift:
-    """Return the estimate with the eye box as prior: what is hardly known is drawn to C0."""
+    """Return the estimate with the eye box as prior: uncertain components shrink towards C0."""
     prior = np.eye(3) / settings.eye_box_sigma_m**2
     covariance_m2 = np.asarray(np.linalg.inv(np.linalg.inv(shift.covariance_m2) + prior))
     return replace(
@@ -59,13 +70,13 @@ def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> Ey
 
 def fuse_alignments(
     solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
-) -> dict[Eye, EyeShift]:
-    """Fuse solved alignments into one estimate for each eye that took part in any.
+) -> Fused:
+    """Fuse solved alignments into one estimate for each eye that any of them has.
 
     Parameters
     ----------
     solved : sequence of (Alignment, mapping of eye to EyeShift)
-        As `solve_alignment` gives them, without prior.
+        As returned by `solve_alignment`, without prior.
     rig : Rig
     settings : FuseSettings
 
@@ -74,52 +85,32 @@ def fuse_alignments(
     ValueError
         If there is nothing to fuse.
     HandError
-        If a cursor lies wholly beside cut edges.
+        If all points of a cursor lie at cut edges.
     """
-    rows, disagreement = _observe_all(solved, rig, settings)
-    estimate_m, joint_m2 = _combine(rows, disagreement, settings)
-    return {
-        eye: _summarise(
-            [shifts[eye] for _, shifts in solved if eye in shifts],
-            estimate_m[_of(eye)],
-            joint_m2[_of(eye), _of(eye)],
-        )
-        for eye in _took_part(solved)
-    }
-
-
-def covariances_after_another(
-    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
-) -> dict[Eye, Float64]:
-    """Return each eye's covariance (3, 3) in m² to expect after one more alignment.
-
-    One that tells as much as those so far do on average, and agrees with them as well. Takes and
-    raises what `fuse_alignments` does.
-    """
-    rows, disagreement = _observe_all(solved, rig, settings)
-    # The same information as of so many alignments more is that of so much less noise.
-    noise = disagreement * len(rows) / (len(rows) + 1)
-    _, joint_m2 = _combine(rows, noise, settings)
-    return {eye: joint_m2[_of(eye), _of(eye)] for eye in _took_part(solved)}
-
-
-def _observe_all(
-    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
-) -> tuple[list[Observed], float]:
-    """Return what every alignment saw, and by how much their noise is to be inflated."""
     if not solved:
         raise ValueError("at least one alignment is needed")
     rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
-    estimate_m, _ = _combine(rows, 1.0, settings)
-    return rows, _disagreement(rows, estimate_m)
-
-
-def _took_part(solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]]) -> list[Eye]:
-    return [eye for eye in EYES if any(eye in shifts for _, shifts in solved)]
+    disagreement = _disagreement(rows, _combine(rows, 1.0, settings)[0])
+    estimate_m, joint_m2 = _combine(rows, disagreement, settings)
+    # One more average alignment adds as much information as this much less noise.
+    less_noise = disagreement * len(rows) / (len(rows) + 1)
+    _, after_another_m2 = _combine(rows, less_noise, settings)
+    of_eye = {
+        eye: found
+        for eye in EYES
+        if (found := [shifts[eye] for _, shifts in solved if eye in shifts])
+    }
+    return Fused(
+        {
+            eye: _summarise(shifts, estimate_m[_of(eye)], joint_m2[_of(eye), _of(eye)])
+            for eye, shifts in of_eye.items()
+        },
+        {eye: after_another_m2[_of(eye), _of(eye)] for eye in of_eye},
+    )
 
 
 def _of(eye: Eye) -> slice:
-    """Return an eye's place in [φ_left; φ_right]."""
+    """Return an eye's components in [φ_left; φ_right]."""
     return slice(3 * EYES.index(eye), 3 * EYES.index(eye) + 3)
 
 
@@ -142,9 +133,10 @@ def _combine(
 def _observe(
     alignment: Alignment, shifts: Mapping[Eye, EyeShift], rig: Rig, settings: FuseSettings
 ) -> Observed:
-    """Return H (3, 6), what was seen (3,) in W's axes, its covariance: seen = H [φ_left; φ_right].
+    """Return H (3, 6), the displacement seen (3,) in W's axes, and its covariance.
 
-    The wearer sees the cursor's outline, as far as the display shows it.
+    The displacement is H [φ_left; φ_right]. The wearer sees the part of the cursor's outline that
+    lies within the display.
     """
     surface = describe_surface(alignment.cursor_m, alignment.cursor_is_cut, _OUTLINE_FROM_POINTS)
     outline_m = surface.points_m[surface.outline]
@@ -170,14 +162,14 @@ def _observe(
 
 
 def _is_shown(points_E_m: Float64, display: EyeDisplay, drawn_shift_m: Float64) -> Bool:
-    """Tell which of (N, 3) points the headset draws within the display."""
+    """Return (N,): True for points that the headset draws within the display."""
     pixels = project(eye_projection(display, drawn_shift_m), points_E_m)
     last_px = display.width_px - 0.5, display.height_px - 0.5
     return np.asarray(((pixels >= -0.5) & (pixels <= last_px)).all(axis=1))
 
 
 def _pixel_normal(points_E_m: Float64) -> Float64:
-    """Return Σ JᵀJ (3, 3) of points' pixels for their displacement, up to the focal length."""
+    """Return Σ JᵀJ (3, 3) of pixels with respect to displacement, up to the focal length."""
     depth = points_E_m[:, 2]
     J = np.zeros((len(points_E_m), 2, 3))
     J[:, 0, 0] = J[:, 1, 1] = 1.0 / depth
@@ -187,7 +179,7 @@ def _pixel_normal(points_E_m: Float64) -> Float64:
 
 
 def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings) -> Float64:
-    """Covariance of φ from how exactly a wearer aligns a hand at a depth."""
+    """Return the covariance (3, 3) of φ from a wearer's alignment of a hand at a depth."""
     lateral_m = depth_m * np.radians(settings.lateral_sigma_arcmin / 60.0)
     along_m = depth_m * settings.depth_sigma
     gain = 1.0 / (1.0 - depth_m / distance_m)
@@ -195,7 +187,7 @@ def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings
 
 
 def _disagreement(rows: Sequence[Observed], estimate_m: Float64) -> float:
-    """Return the Birge ratio, at least 1: how far alignments differ beyond their covariances."""
+    """Return the Birge ratio, at least 1: scatter of alignments beyond their covariances."""
     chi_square = sum(
         float((seen_m - H @ estimate_m) @ np.linalg.solve(covariance_m2, seen_m - H @ estimate_m))
         for H, seen_m, covariance_m2 in rows

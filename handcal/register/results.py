@@ -1,13 +1,13 @@
-"""From alignments to what a session reports: solved, fused and judged."""
+"""The results of a session: its alignments solved, fused and judged."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from handcal.errors import CancelledError
-from handcal.register.fuse import FuseSettings, covariances_after_another, fuse_alignments
+from handcal.progress import Progress
+from handcal.register.fuse import FuseSettings, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
     VerdictSettings,
@@ -32,7 +32,7 @@ RESULTS_VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class SolveSettings:
-    """How alignments are solved."""
+    """Settings of the solver."""
 
     method: Method = "consistent"
     """One of `handcal.types.METHODS`."""
@@ -42,19 +42,18 @@ class SolveSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """Eye shifts of one wearer: each alignment alone, all of them fused, and judged."""
+    """Fused eye shifts of all alignments of one wearer, with verdicts."""
 
     method: Method
-    alignments: tuple[Mapping[Eye, EyeShift], ...]
-    """Each alignment alone, without prior."""
+    alignments: Mapping[int, Mapping[Eye, EyeShift]]
+    """Each alignment alone, without prior, by number."""
     eyes: Mapping[Eye, EyeShift]
-    """Fused; what the headset shall render with."""
+    """Fused estimates, for the headset to render with."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
-    """Implied by `eyes`; None unless both eyes are solved."""
+    """Eye distance implied by `eyes`; None unless both eyes are solved."""
     expected_after_another_arcmin: Mapping[Eye, float]
-    """What `expected_error_arcmin` of `eyes` would become with one more alignment like those so
-    far."""
+    """`expected_error_arcmin` of `eyes` after one more alignment like those so far."""
 
     def __str__(self) -> str:
         solved = (
@@ -83,23 +82,21 @@ class Results:
 
 
 def solve_session(
-    alignments: Sequence[Alignment],
+    alignments: Mapping[int, Alignment] | Sequence[Alignment],
     rig: Rig,
     settings: SolveSettings,
-    report: Callable[[str, float], object] = lambda *_: None,
-    is_cancelled: Callable[[], bool] = lambda: False,
+    progress: Progress = Progress(),
 ) -> Results:
-    """Solve, fuse and judge alignments; equal input gives equal output, bit for bit.
+    """Solve, fuse and judge alignments; equal input gives identical output, bit for bit.
 
     Parameters
     ----------
-    alignments : sequence of Alignment
+    alignments : mapping of int to Alignment, or sequence of Alignment
+        By number; those of a sequence are numbered from 1.
     rig : Rig
     settings : SolveSettings
-    report : callable
-        Told before each alignment what is going on and which share of the whole is done.
-    is_cancelled : callable
-        Asked before each alignment, and by the slow methods before each iteration.
+    progress : Progress
+        Reported to before each alignment; the slow methods can be cancelled before each iteration.
 
     Raises
     ------
@@ -108,30 +105,27 @@ def solve_session(
     CancelledError
         If it was cancelled.
     """
-
-    def checkpoint() -> None:
-        if is_cancelled():
-            raise CancelledError("solving was cancelled")
-
-    solved = []
-    for done, alignment in enumerate(alignments):
-        checkpoint()
-        report(f"Solving alignment {done + 1} of {len(alignments)}", done / len(alignments))
-        solved.append(solve_alignment(alignment, rig, settings.method, checkpoint))
-    pairs = list(zip(alignments, solved, strict=True))
-    shifts = fuse_alignments(pairs, rig, settings.fuse)
-    after_another_m2 = covariances_after_another(pairs, rig, settings.fuse)
+    numbered = (
+        alignments if isinstance(alignments, Mapping) else dict(enumerate(alignments, start=1))
+    )
+    solved = {}
+    for done, (number, alignment) in enumerate(numbered.items()):
+        progress.at(done / len(alignments), f"Solving alignment {done + 1} of {len(alignments)}")
+        solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
+    pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
+    fused = fuse_alignments(pairs, rig, settings.fuse)
     return Results(
         method=settings.method,
-        alignments=tuple(solved),
-        eyes=shifts,
-        verdicts=judge(rig, shifts, settings.verdict),
-        eye_distance_m=eye_distance_m(rig, shifts),
+        alignments=solved,
+        eyes=fused.shifts,
+        verdicts=judge(rig, fused.shifts, settings.verdict),
+        eye_distance_m=eye_distance_m(rig, fused.shifts),
         expected_after_another_arcmin={
             eye: expected_error_arcmin(
-                rig.eyes[eye], replace(shift, covariance_m2=after_another_m2[eye])
+                rig.eyes[eye],
+                replace(shift, covariance_m2=fused.covariances_after_another_m2[eye]),
             )
-            for eye, shift in shifts.items()
+            for eye, shift in fused.shifts.items()
         },
     )
 
@@ -149,7 +143,7 @@ def results_json(results: Results) -> dict[str, Any]:
         "eye_distance_m": results.eye_distance_m,
         "alignments": [
             {eye: _shift_json(shift) for eye, shift in shifts.items()}
-            for shifts in results.alignments
+            for shifts in results.alignments.values()
         ],
     }
 

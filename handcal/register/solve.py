@@ -65,7 +65,7 @@ def solve_eye_shift(
     --------
     >>> import handcal
     >>> session = handcal.open_session("resources/example_session")
-    >>> alignment = session.alignments[0]
+    >>> alignment = session.alignments[1]
     >>> shift = handcal.solve_eye_shift(
     ...     alignment.cursor_m,
     ...     alignment.hand_m,

@@ -1,4 +1,4 @@
-"""One alignment as the bytes of a plain, uncompressed .npz archive, bit for bit and back."""
+"""Lossless encoding of one alignment as the bytes of an uncompressed .npz archive."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DTYPES = {
     "eyes": "<U5",
 } | {f"{name}_{eye}": "<f8" for name in ("T_E_W", "drawn_shift_m") for eye in EYES}
 
-# What zipfile, numpy's header parser and ndarray raise on damaged archives, besides ValueError.
+# Raised by zipfile, numpy's header parser and ndarray on damaged archives, besides ValueError.
 _DAMAGE = (
     zipfile.BadZipFile,
     RuntimeError,
@@ -37,9 +37,9 @@ _DAMAGE = (
 def encode_alignment(alignment: Alignment) -> bytes:
     """Return `alignment` as a .npz archive.
 
-    It holds `cursor_m`, `hand_m`, `cursor_is_cut`, `hand_is_cut` and `rotation_rad` as in
-    `Alignment`, `t_ns` (t_a, t_b), `eyes`, and `T_E_W` and `drawn_shift_m` of each eye known,
-    as `T_E_W_left` and so on.
+    It contains `cursor_m`, `hand_m`, `cursor_is_cut`, `hand_is_cut` and `rotation_rad` as in
+    `Alignment`, `t_ns` (t_a, t_b), `eyes`, and for each eye that has them `T_E_W` and
+    `drawn_shift_m`, named `T_E_W_left` and so on.
     """
     arrays: dict[str, Any] = {
         "cursor_m": alignment.cursor_m,
@@ -62,12 +62,12 @@ def encode_alignment(alignment: Alignment) -> bytes:
 
 
 def decode_alignment(data: bytes) -> Alignment:
-    """Return the alignment in a .npz archive, allocating no more than its own length.
+    """Return the alignment in a .npz archive, without allocating more than its own length.
 
     Raises
     ------
     ValueError
-        If the archive is damaged or holds anything else.
+        If the archive is damaged or contains anything else.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -100,7 +100,7 @@ def _of_eyes(arrays: dict[str, NDArray[Any]], name: str) -> dict[Eye, NDArray[An
 
 def _decode_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
     if info.compress_type != zipfile.ZIP_STORED:
-        raise ValueError(f"{info.filename} is compressed; alignments are stored plain")
+        raise ValueError(f"{info.filename} is compressed; alignments are stored uncompressed")
     data = archive.read(info)
     stream = io.BytesIO(data)
     if npy.read_magic(stream) != (1, 0):
@@ -109,5 +109,5 @@ def _decode_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[An
     wanted = _DTYPES.get(info.filename.removesuffix(".npy"))
     if dtype.str != wanted or fortran_order:
         raise ValueError(f"{info.filename} holds {dtype.str}, not {wanted} in C order")
-    # A view of the bytes fails if the header promises more of them than there are.
+    # Creating a view fails if the header declares more bytes than there are.
     return np.ndarray(shape, dtype, data, stream.tell()).copy()

@@ -1,4 +1,4 @@
-"""A journal: one JSON object a line, only ever appended to, readable after any crash."""
+"""The journal of a session: an append-only file, one JSON object per line, safe after a crash."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from handcal.errors import FileError
 from handcal.io.files import read_limited
 
 JOURNAL_VERSION = 2
-"""2 brought alignments deleted and restored, trials and fine-tuning; 1 is read as well."""
+"""Version 2 added deletion and restoring, trials and fine-tuning; version 1 can be read too."""
 
 MAX_JOURNAL_BYTES = 64 * 2**20
 
@@ -32,22 +32,22 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class JournalContent:
-    """What a journal holds."""
+    """The contents of a journal."""
 
     events: tuple[Event, ...]
     complete_bytes: int
     """Length of the complete lines."""
     torn_bytes: int
-    """Length of an unfinished last line, which is left out; 0 if there is none."""
+    """Length of an incomplete last line, which is ignored; 0 if there is none."""
 
 
 def happens_now(number: int, name: str, data: dict[str, Any]) -> Event:
-    """Return an event as of now."""
+    """Return an event with the current time."""
     return Event(number, datetime.now(UTC).isoformat(), name, data)
 
 
 def journal_line(event: Event) -> bytes:
-    """Return an event as a line; ValueError if its data hold NaN."""
+    """Return an event as a line; ValueError if its data contain NaN."""
     fields = {
         "version": JOURNAL_VERSION,
         "number": event.number,
@@ -64,7 +64,7 @@ def read_journal(path: Path) -> JournalContent:
     Raises
     ------
     FileError
-        If it cannot be read, is too large, of an unknown version, or a complete line is damaged.
+        If it cannot be read, is too large or of an unknown version, or a complete line is damaged.
     """
     content = read_limited(path, MAX_JOURNAL_BYTES)
     *lines, torn = content.split(b"\n")
@@ -76,13 +76,13 @@ def read_journal(path: Path) -> JournalContent:
 
 
 class JournalWriter:
-    """Appends to a journal that nobody else writes to.
+    """Appends to a journal that no other program writes to.
 
     Parameters
     ----------
     path : Path
     content : JournalContent
-        What is in it; a torn line goes with the next write.
+        Its present contents; an incomplete last line is removed by the next write.
     """
 
     def __init__(self, path: Path, content: JournalContent) -> None:
@@ -91,24 +91,24 @@ class JournalWriter:
         self._bytes = content.complete_bytes
 
     def append(self, name: str, data: dict[str, Any]) -> Event:
-        """Append an event, as of now, and return it; it is on the disk by then.
+        """Append an event with the current time, sync it to disk, and return it.
 
         Raises
         ------
         FileError
-            If the journal cannot be written or is full; what was in it stays.
+            If the journal cannot be written or is full; its contents are kept.
         ValueError
-            If the data hold NaN.
+            If the data contain NaN.
         """
         event = happens_now(self._events + 1, name, data)
         line = journal_line(event)
         if self._bytes + len(line) > MAX_JOURNAL_BYTES:
             raise FileError(f"the journal of {self._path.parent} is full; start another session")
         try:
-            # Opened anew each time, so that a folder that has gone is noticed.
+            # Reopened each time, so that a folder that was moved or removed is noticed.
             with self._path.open("r+b") as file:
                 file.seek(self._bytes)
-                file.truncate()  # what a failed or killed write may have left
+                file.truncate()  # a failed or killed write may have left part of a line
                 file.write(line)
                 file.flush()
                 os.fsync(file.fileno())

@@ -1,17 +1,17 @@
-"""A session: one folder that holds everything about one calibration, readable after any crash.
+"""A session: one folder with all data of one calibration, readable after any crash.
 
 ::
 
-    NAME/journal.jsonl     what happened, one JSON object a line; the only file appended to
-         rig.yaml          the rig as it was
-         settings.json     the settings as they were
-         alignments/1.npz  the clouds and poses of each alignment, whose number never changes
+    NAME/journal.jsonl     the events, one JSON object per line; the only file appended to
+         rig.yaml          the rig at the time
+         settings.json     the settings at the time
+         alignments/1.npz  clouds and poses of each alignment; its number never changes
          results.json      the newest results, if there are any
-         notes.txt         what people wrote, if anything
+         notes.txt         the notes, if there are any
 
-What exists is what the journal says: an alignment from when the journal names it with its checksum
-until it is deleted there, and again when it is restored. So the folder is consistent at every
-moment, and a killed program costs at most the line that it was writing.
+The journal decides what exists: an alignment exists once the journal contains it with its checksum,
+until the journal records its deletion. The folder is therefore consistent at every moment, and a
+killed program loses at most the line it was writing.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from numpy.typing import ArrayLike
 
+from handcal.display import as_shifts
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.io.files import make_folder, read_json, read_limited, write_atomic, write_json
@@ -41,7 +42,7 @@ from handcal.session.journal import (
     journal_line,
     read_journal,
 )
-from handcal.session.state import History, SessionEvent, Shelf, clean_wearer, read_shifts
+from handcal.session.state import Kind, SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import Trial, trial_json
 from handcal.types import Alignment, Eye, Float64, Rig
 
@@ -51,42 +52,38 @@ MAX_NOTES_CHARACTERS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecord:
-    """What a session folder holds."""
+    """The contents of a session folder."""
 
     path: Path
     rig: Rig
     settings: dict[str, Any]
     wearer: str
-    """Name or code; empty if not told."""
+    """Name or code; empty if none was given."""
     notes: str
     events: tuple[Event, ...]
-    alignments: tuple[Alignment, ...]
-    """Those not deleted, in the order in which they were saved."""
-    alignment_numbers: tuple[int, ...]
-    """Theirs, by which they can be deleted."""
-    deleted: Mapping[int, Alignment]
-    """The others, by number; they can be restored."""
-    trials: tuple[Trial, ...]
-    trial_numbers: tuple[int, ...]
+    alignments: Mapping[int, Alignment]
+    """The alignments that are not deleted, by number, in the order in which they were saved."""
+    deleted_alignments: Mapping[int, Alignment]
+    trials: Mapping[int, Trial]
     deleted_trials: Mapping[int, Trial]
-    """Likewise, trials of the user test."""
+    """Trials of the user test, likewise."""
     results: dict[str, Any] | None
-    """The newest; None if none were saved since an alignment was deleted or restored."""
+    """The newest results; None if none were saved since an alignment was deleted or restored."""
     is_solved: bool
-    """Whether the results are those of all `alignments`."""
+    """True if the results are those of all `alignments`."""
     is_applied: bool
-    """Whether the headset has acknowledged the projections of these results."""
+    """True if the headset has acknowledged the projections of these results."""
     applied_shift_m: Mapping[Eye, Float64]
-    """each (3,); what the headset rendered with last, solved or set by hand; an eye that is not in
-    it was left as in the offline calibration."""
+    """each (3,); the φ that the headset rendered with last, solved or set by hand; a missing eye
+    was rendered with the offline calibration."""
     fine_tuned: Mapping[Eye, Float64] | None
-    """each (3,); the φ last set by hand, as settled; None if none since the last results."""
+    """each (3,); the φ last set by hand; None if none was set since the last results."""
     is_finished: bool
-    """Whether the session was ended on purpose, and nothing happened since."""
+    """True if the session was finished, and nothing was recorded since."""
     journal_bytes: int
     """Length of the journal's complete lines."""
     torn_bytes: int
-    """Length of an unfinished last line, which is left out; 0 if there is none."""
+    """Length of an incomplete last line, which is ignored; 0 if there is none."""
 
     def __repr__(self) -> str:
         counts = f"{len(self.alignments)} alignments, {len(self.trials)} trials"
@@ -94,10 +91,10 @@ class SessionRecord:
 
 
 class Session(Closable):
-    """Writes to an existing session folder, which no other program can write to until `close`.
+    """Writes to an existing session folder; no other program can write to it until `close`.
 
-    Whatever a method writes is on the disk when it returns; if it raises FileError, all that was
-    written before is still there. `create` starts a new folder; `open` only reads one.
+    Data are on disk when a method returns; if it raises FileError, everything written before is
+    kept. `create` starts a new folder; `open` only reads one.
 
     Parameters
     ----------
@@ -107,12 +104,12 @@ class Session(Closable):
     ----------
     path : Path
     revision : int
-        Grows with everything written.
+        Increases with every write.
 
     Raises
     ------
     FileError
-        If another program is writing to the session, or `open` would refuse it.
+        If another program is writing to the session, or `open` fails.
     """
 
     def __init__(self, path: Path) -> None:
@@ -124,7 +121,7 @@ class Session(Closable):
         except BaseException:
             self.close()
             raise
-        self._history = _replay(path, record.events)
+        self._state = _replay(path, record.events)
         self._journal = JournalWriter(
             path / "journal.jsonl",
             JournalContent(record.events, record.journal_bytes, record.torn_bytes),
@@ -139,7 +136,7 @@ class Session(Closable):
         name: str | None = None,
         wearer: str = "",
     ) -> Self:
-        """Start a session in a new folder.
+        """Create a session in a new folder.
 
         Parameters
         ----------
@@ -149,7 +146,7 @@ class Session(Closable):
         settings : mapping
             JSON-able.
         name : str, optional
-            Name of the folder; by default the time in UTC.
+            Name of the folder; default: the time in UTC.
         wearer : str
             Name or code, one line of at most 100 characters.
 
@@ -158,7 +155,7 @@ class Session(Closable):
         FileError
             If the folder exists already or cannot be written.
         ValueError
-            If the rig is implausible, the settings hold NaN, or the wearer's name is refused.
+            If the rig is implausible, the settings contain NaN, or the wearer's name is invalid.
         """
         wearer = clean_wearer(wearer)
         path = make_folder(parent) / (name or f"{datetime.now(UTC):session-%Y%m%d-%H%M%S-%f}")
@@ -169,7 +166,7 @@ class Session(Closable):
             raise FileError(f"cannot create {path}: {error.strerror or error}") from error
         write_rig(path / "rig.yaml", rig)
         write_json(path / "settings.json", dict(settings))
-        # The journal comes last: without it, the folder is no session.
+        # The journal is written last: without it, the folder is not a session.
         created = {"rig_sha256": _sha256(_rig_bytes(path)), "wearer": wearer}
         first = journal_line(happens_now(1, SessionEvent.CREATED, created))
         write_atomic(path / "journal.jsonl", first)
@@ -177,13 +174,13 @@ class Session(Closable):
 
     @staticmethod
     def open(path: Path, before: SessionRecord | None = None) -> SessionRecord:
-        """Read a session, which may be in use, killed or damaged.
+        """Read a session, which may be in use or left behind by a crash.
 
         Parameters
         ----------
         path : Path
         before : SessionRecord, optional
-            What it held before; the alignments in it, which never change, are not read again.
+            An earlier record of it; its alignments, which never change, are not read again.
 
         Raises
         ------
@@ -192,32 +189,32 @@ class Session(Closable):
             damaged or too large.
         """
         if not (path / "journal.jsonl").is_file():
-            raise FileError(f"{path} is no session; give the folder that holds its journal.jsonl")
+            raise FileError(
+                f"{path} is not a session; choose the folder that contains journal.jsonl"
+            )
         journal = read_journal(path / "journal.jsonl")
-        history = _replay(path, journal.events)
-        if history.rig_sha256 != _sha256(_rig_bytes(path)):
+        state = _replay(path, journal.events)
+        if state.rig_sha256 != _sha256(_rig_bytes(path)):
             raise FileError(f"{path / 'rig.yaml'} is damaged: its checksum is not the journal's")
-        known = _alignments_by_number(before) if before else {}
+        known = {**before.alignments, **before.deleted_alignments} if before else {}
         results, notes = path / "results.json", path / "notes.txt"
         return SessionRecord(
             path=path,
             rig=read_rig(path / "rig.yaml"),
             settings=read_json(path / "settings.json"),
-            wearer=history.wearer,
+            wearer=state.wearer,
             notes=_read_notes(notes) if notes.exists() else "",
             events=journal.events,
-            alignments=tuple(_read_alignments(path, history.alignments.kept, known).values()),
-            alignment_numbers=tuple(history.alignments.kept),
-            deleted=MappingProxyType(_read_alignments(path, history.alignments.deleted, known)),
-            trials=tuple(history.trials.kept.values()),
-            trial_numbers=tuple(history.trials.kept),
-            deleted_trials=MappingProxyType(history.trials.deleted),
+            alignments=_read_alignments(path, state.alignments.active, known),
+            deleted_alignments=_read_alignments(path, state.alignments.deleted, known),
+            trials=MappingProxyType(state.trials.active),
+            deleted_trials=MappingProxyType(state.trials.deleted),
             results=read_json(results) if results.exists() else None,
-            is_solved=history.is_solved and results.exists(),
-            is_applied=history.is_applied and results.exists(),
-            applied_shift_m=MappingProxyType(history.applied_shift_m),
-            fine_tuned=history.fine_tuned and MappingProxyType(history.fine_tuned),
-            is_finished=history.is_finished,
+            is_solved=state.is_solved and results.exists(),
+            is_applied=state.is_applied and results.exists(),
+            applied_shift_m=MappingProxyType(state.applied_shift_m),
+            fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
+            is_finished=state.is_finished,
             journal_bytes=journal.complete_bytes,
             torn_bytes=journal.torn_bytes,
         )
@@ -230,21 +227,21 @@ class Session(Closable):
         FileError
             If the journal cannot be written or is full.
         ValueError
-            If the data hold NaN, or the event's name is one that the session itself writes.
+            If the data contain NaN, or the event is one of `SessionEvent`.
         """
         if event in set(SessionEvent):
             raise ValueError(f"the event {event} is written by the session itself")
         self._append(event, data)
 
     def save_alignment(self, alignment: Alignment) -> int:
-        """Store an alignment and return its number, from 1.
+        """Save an alignment and return its number, from 1.
 
         Raises
         ------
         FileError
-            If it cannot be written, is too large, or the session has had too many.
+            If it cannot be written, is too large, or the session is full.
         """
-        number = self._next_number(self._history.alignments)
+        number = self._next_number("alignment")
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
@@ -252,83 +249,43 @@ class Session(Closable):
         self._append(SessionEvent.ALIGNMENT_SAVED, {"number": number, "sha256": _sha256(data)})
         return number
 
-    def delete_alignment(self, number: int) -> None:
-        """Leave out an alignment, and the results with it.
-
-        Raises
-        ------
-        FileError
-            If the folder cannot be written.
-        ValueError
-            If there is none of that number.
-        """
-        shelf = self._history.alignments
-        shelf.require(number, shelf.kept)
-        self._remove_results()
-        self._append(SessionEvent.ALIGNMENT_DELETED, {"number": number})
-
-    def restore_alignment(self, number: int) -> None:
-        """Take back the deletion of an alignment; the results go all the same.
-
-        Raises
-        ------
-        FileError
-            If the folder cannot be written.
-        ValueError
-            If none of that number is deleted.
-        """
-        shelf = self._history.alignments
-        shelf.require(number, shelf.deleted)
-        self._remove_results()
-        self._append(SessionEvent.ALIGNMENT_RESTORED, {"number": number})
-
     def save_trial(self, trial: Trial) -> int:
-        """Store a trial of the user test, as of now, and return its number, from 1.
+        """Save a trial of the user test with the current time; return its number, from 1.
 
         Raises
         ------
         FileError
-            If the journal cannot be written, or the session has had too many.
+            If the journal cannot be written, or the session is full.
         """
-        number = self._next_number(self._history.trials)
+        number = self._next_number("trial")
         self._append(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
         return number
 
-    def delete_trial(self, number: int) -> None:
-        """Leave out a trial.
+    def delete(self, kind: Kind, number: int) -> None:
+        """Mark an alignment or a trial as deleted; results go with an alignment.
 
         Raises
         ------
         FileError
-            If the journal cannot be written.
+            If the folder cannot be written.
         ValueError
-            If there is none of that number.
+            If there is none of this number.
         """
-        shelf = self._history.trials
-        shelf.require(number, shelf.kept)
-        self._append(SessionEvent.TRIAL_DELETED, {"number": number})
+        self._state.items(kind).require_active(number)
+        self._change(kind, "deleted", number)
 
-    def restore_trial(self, number: int) -> None:
-        """Take back the deletion of a trial.
-
-        Raises
-        ------
-        FileError
-            If the journal cannot be written.
-        ValueError
-            If none of that number is deleted.
-        """
-        shelf = self._history.trials
-        shelf.require(number, shelf.deleted)
-        self._append(SessionEvent.TRIAL_RESTORED, {"number": number})
+    def restore(self, kind: Kind, number: int) -> None:
+        """Restore a deleted alignment or trial; raises and removes results as `delete`."""
+        self._state.items(kind).require_deleted(number)
+        self._change(kind, "restored", number)
 
     def save_results(self, results: Mapping[str, Any]) -> None:
-        """Replace the results, those of all alignments; FileError if they cannot be written."""
+        """Replace the results of all alignments; FileError if they cannot be written."""
         write_json(self.path / "results.json", dict(results))
         self._append(SessionEvent.SOLVED, dict(results))
 
     def save_applied(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
-        """Note that the headset renders with the solved φ.
+        """Record that the headset renders with the solved φ.
 
         Raises
         ------
@@ -340,7 +297,7 @@ class Session(Closable):
         self._append(SessionEvent.APPLIED, {"eyes": list(shifts_m), "shift_m": _lists(shifts_m)})
 
     def save_fine_tuned(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
-        """Note that the headset renders with φ set by hand; raises as `save_applied`."""
+        """Record that the headset renders with φ set by hand; raises as `save_applied`."""
         self._append(SessionEvent.FINE_TUNED, {"shift_m": _lists(shifts_m)})
 
     def save_notes(self, text: str) -> None:
@@ -359,31 +316,33 @@ class Session(Closable):
         self.revision += 1
 
     def finish(self) -> None:
-        """Note that the session ends here; FileError if the journal cannot be written.
+        """Record the end of the session; FileError if the journal cannot be written.
 
-        More may follow, after which it is unfinished again.
+        Anything recorded afterwards makes the session unfinished again.
         """
         self._append(SessionEvent.FINISHED, {})
 
     def close(self) -> None:
-        """Let other programs write to the session; safe to call twice."""
+        """Release the session for other programs; safe to call twice."""
         self._lock.release()
 
-    def _next_number(self, shelf: Shelf[Any]) -> int:
+    def _next_number(self, kind: Kind) -> int:
         try:
-            return shelf.next_number()
+            return self._state.items(kind).next_number()
         except ValueError as error:
             raise FileError(f"{self.path} is full: {error}; start another session") from error
 
-    def _remove_results(self) -> None:
-        results = self.path / "results.json"
-        try:
-            results.unlink(missing_ok=True)
-        except OSError as error:
-            raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
+    def _change(self, kind: Kind, what: Literal["deleted", "restored"], number: int) -> None:
+        if kind == "alignment":  # the results are those of other alignments
+            results = self.path / "results.json"
+            try:
+                results.unlink(missing_ok=True)
+            except OSError as error:
+                raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
+        self._append(SessionEvent(f"{kind}_{what}"), {"number": number})
 
     def _append(self, event: str, data: dict[str, Any]) -> None:
-        self._history.take(self._journal.append(event, data))
+        self._state.apply(self._journal.append(event, data))
         self.revision += 1
 
 
@@ -417,31 +376,29 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     return Session.open(Path(path))
 
 
-def _replay(path: Path, events: Sequence[Event]) -> History:
-    """Return what the events of a session's journal add up to; FileError if they do not."""
+def _replay(path: Path, events: Sequence[Event]) -> SessionState:
+    """Return the state after all events; FileError if they are inconsistent."""
     journal = path / "journal.jsonl"
     if not events or events[0].name != SessionEvent.CREATED:
         raise FileError(f"{journal} does not begin as the journal of a session")
-    history = History()
+    state = SessionState()
     for event in events:
         try:
-            history.take(event)
+            state.apply(event)
         except ValueError as error:
             raise FileError(f"{journal}: line {event.number}: {error}") from error
-    return history
-
-
-def _alignments_by_number(record: SessionRecord) -> dict[int, Alignment]:
-    return {**dict(zip(record.alignment_numbers, record.alignments, strict=True)), **record.deleted}
+    return state
 
 
 def _read_alignments(
     path: Path, checksums: Mapping[int, str], known: Mapping[int, Alignment]
-) -> dict[int, Alignment]:
-    return {
-        number: known.get(number) or _read_alignment(_alignment_path(path, number), sha256)
-        for number, sha256 in checksums.items()
-    }
+) -> Mapping[int, Alignment]:
+    return MappingProxyType(
+        {
+            number: known.get(number) or _read_alignment(_alignment_path(path, number), sha256)
+            for number, sha256 in checksums.items()
+        }
+    )
 
 
 def _read_alignment(path: Path, sha256: str) -> Alignment:
@@ -459,7 +416,7 @@ def _read_notes(path: Path) -> str:
 
 
 def _lists(shifts_m: Mapping[Eye, ArrayLike]) -> dict[Eye, list[float]]:
-    return {eye: shift_m.tolist() for eye, shift_m in read_shifts(shifts_m).items()}
+    return {eye: shift_m.tolist() for eye, shift_m in as_shifts(shifts_m).items()}
 
 
 def _alignment_path(path: Path, number: int) -> Path:

@@ -1,33 +1,34 @@
-"""What a session's journal says that there is: one state, brought on event by event. No files."""
+"""The state of a session, built by replaying its journal. No file access."""
 
 from __future__ import annotations
 
 import unicodedata
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike
-
+from handcal.display import as_shifts
 from handcal.session.journal import Event
 from handcal.session.trial import Trial, read_trial
-from handcal.types import EYES, Eye, Float64, readonly
+from handcal.types import Eye, Float64
 
 MAX_ALIGNMENTS = 100
 MAX_TRIALS = 1000
 MAX_WEARER_CHARACTERS = 100
 
+Kind: TypeAlias = Literal["alignment", "trial"]
+"""Items of a session that can be deleted and restored."""
+
 Item = TypeVar("Item")
 
 
 class SessionEvent(StrEnum):
-    """The events that a session writes itself, and that say what there is."""
+    """The events that a session writes itself and that make up its state."""
 
     CREATED = "created"
     ALIGNMENT_SAVED = "alignment_saved"
     ALIGNMENT_DROPPED = "alignment_dropped"
-    """Of version 1: deleted for good, and the next took its number."""
+    """Version 1 only: deleted for good; the next alignment took its number."""
     ALIGNMENT_DELETED = "alignment_deleted"
     ALIGNMENT_RESTORED = "alignment_restored"
     TRIAL_SAVED = "trial_saved"
@@ -39,60 +40,64 @@ class SessionEvent(StrEnum):
     FINISHED = "finished"
 
 
-class Shelf(Generic[Item]):
-    """Numbered things that can be deleted and restored.
+class NumberedItems(Generic[Item]):
+    """Items numbered from 1 that can be deleted and restored; a number is never given twice.
 
     Attributes
     ----------
-    kept, deleted : dict of int to item
+    active, deleted : dict of int to item
     """
 
-    def __init__(self, kind: str, limit: int) -> None:
-        self.kept: dict[int, Item] = {}
+    def __init__(self, kind: Kind, limit: int) -> None:
+        self.active: dict[int, Item] = {}
         self.deleted: dict[int, Item] = {}
         self._kind = kind
         self._limit = limit
 
     def next_number(self) -> int:
-        """Return the number of the next, from 1; ValueError if there are too many."""
-        number = 1 + max((*self.kept, *self.deleted), default=0)
+        """Return the number of the next item; ValueError if there are too many."""
+        number = 1 + max((*self.active, *self.deleted), default=0)
         if number > self._limit:
             raise ValueError(f"no room for more than {self._limit} {self._kind}s")
         return number
 
     def save(self, number: int, item: Item) -> None:
-        """Take a new one; ValueError unless it has the next number."""
+        """Add an item; ValueError unless its number is the next one."""
         if number != self.next_number():
             raise ValueError(f"{self._kind} {number} is not the next")
-        self.kept[number] = item
+        self.active[number] = item
 
-    def require(self, number: int, where: Mapping[int, Item]) -> None:
-        """Raise ValueError if there is none of that number in `kept` or in `deleted`."""
-        if number not in where:
-            state = "deleted " if where is self.deleted else ""
-            raise ValueError(f"there is no {state}{self._kind} {number}")
+    def require_active(self, number: int) -> None:
+        """Raise ValueError unless there is an active item of this number."""
+        if number not in self.active:
+            raise ValueError(f"there is no {self._kind} {number}")
+
+    def require_deleted(self, number: int) -> None:
+        """Raise ValueError unless there is a deleted item of this number."""
+        if number not in self.deleted:
+            raise ValueError(f"there is no deleted {self._kind} {number}")
 
     def delete(self, number: int) -> None:
-        """Put one aside; ValueError if there is none."""
-        self.require(number, self.kept)
-        self.deleted[number] = self.kept.pop(number)
+        """Delete an active item; ValueError if there is none."""
+        self.require_active(number)
+        self.deleted[number] = self.active.pop(number)
 
     def restore(self, number: int) -> None:
-        """Put one back in its place; ValueError if none of that number is deleted."""
-        self.require(number, self.deleted)
-        self.kept = dict(sorted({**self.kept, number: self.deleted.pop(number)}.items()))
+        """Restore a deleted item to its place; ValueError if there is none."""
+        self.require_deleted(number)
+        self.active = dict(sorted({**self.active, number: self.deleted.pop(number)}.items()))
 
 
-class History:
-    """What there is after the events so far.
+class SessionState:
+    """The state of a session after the events applied so far.
 
     Attributes
     ----------
     rig_sha256 : str
     wearer : str
-    alignments : Shelf of str
+    alignments : NumberedItems of str
         Checksums.
-    trials : Shelf of Trial
+    trials : NumberedItems of Trial
     is_solved, is_applied, is_finished : bool
     applied_shift_m : dict of eye to (3,) float64
     fine_tuned : dict of eye to (3,) float64, or None
@@ -102,31 +107,35 @@ class History:
     def __init__(self) -> None:
         self.rig_sha256 = ""
         self.wearer = ""
-        self.alignments = Shelf[str]("alignment", MAX_ALIGNMENTS)
-        self.trials = Shelf[Trial]("trial", MAX_TRIALS)
+        self.alignments = NumberedItems[str]("alignment", MAX_ALIGNMENTS)
+        self.trials = NumberedItems[Trial]("trial", MAX_TRIALS)
         self.is_solved = False
         self.is_applied = False
         self.is_finished = False
         self.applied_shift_m: dict[Eye, Float64] = {}
         self.fine_tuned: dict[Eye, Float64] | None = None
 
-    def take(self, event: Event) -> None:
-        """Go on by an event; one that is not the session's own changes nothing.
+    def items(self, kind: Kind) -> NumberedItems[Any]:
+        """Return the alignments or the trials."""
+        return self.alignments if kind == "alignment" else self.trials
+
+    def apply(self, event: Event) -> None:
+        """Apply an event; only those of `SessionEvent` change the state.
 
         Raises
         ------
         ValueError
-            If the event lacks something, or cannot follow those before it.
+            If the event lacks data, or cannot follow the events before it.
         """
         try:
-            self._take(event.name, event.data, event.time)
+            self._apply(event.name, event.data, event.time)
         except KeyError as error:
             raise ValueError(f"{event.name} lacks {error}") from error
         except (TypeError, AttributeError, OverflowError) as error:
-            raise ValueError(f"{event.name} holds something wrong: {error}") from error
+            raise ValueError(f"{event.name} contains invalid data: {error}") from error
         self.is_finished = event.name == SessionEvent.FINISHED
 
-    def _take(self, name: str, data: dict[str, Any], time: str) -> None:
+    def _apply(self, name: str, data: dict[str, Any], time: str) -> None:
         match name:
             case SessionEvent.CREATED:
                 self.rig_sha256 = data["rig_sha256"]
@@ -134,7 +143,7 @@ class History:
             case SessionEvent.ALIGNMENT_SAVED:
                 self.alignments.save(_number(data), data["sha256"])
             case SessionEvent.ALIGNMENT_DROPPED:
-                self.alignments.kept.pop(_number(data))
+                self.alignments.active.pop(_number(data))
             case SessionEvent.ALIGNMENT_DELETED:
                 self.alignments.delete(_number(data))
             case SessionEvent.ALIGNMENT_RESTORED:
@@ -147,18 +156,18 @@ class History:
                 self.trials.restore(_number(data))
             case SessionEvent.SOLVED:
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
-            case SessionEvent.APPLIED if "shift_m" in data:  # version 1 did not tell
-                self.applied_shift_m |= read_shifts(data["shift_m"])
+            case SessionEvent.APPLIED if "shift_m" in data:  # not in version 1
+                self.applied_shift_m |= as_shifts(data["shift_m"])
                 self.is_applied = self.is_solved
             case SessionEvent.FINE_TUNED:
-                self.fine_tuned = read_shifts(data["shift_m"])
+                self.fine_tuned = as_shifts(data["shift_m"])
                 self.applied_shift_m |= self.fine_tuned
         if name.startswith("alignment_"):
             self.is_solved = self.is_applied = False
 
 
 def _number(data: Mapping[str, Any]) -> int:
-    """Return the number in an event; true and 1.0 equal 1, but name other files."""
+    """Return the number in an event, which must be an int: true and 1.0 equal 1 too."""
     number = data["number"]
     if type(number) is not int:
         raise ValueError(f"a number is whole, not {number!r}")
@@ -166,33 +175,16 @@ def _number(data: Mapping[str, Any]) -> int:
 
 
 def clean_wearer(name: str) -> str:
-    """Return a wearer's name or code without the blanks around it.
+    """Return a wearer's name or code without surrounding white space.
 
     Raises
     ------
     ValueError
-        If it is longer than 100 characters or holds line breaks or control characters.
+        If it is longer than 100 characters or contains line breaks or control characters.
     """
     name = name.strip()
     if len(name) > MAX_WEARER_CHARACTERS:
         raise ValueError(f"a wearer's name may have at most {MAX_WEARER_CHARACTERS} characters")
     if any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name):
-        raise ValueError("a wearer's name may hold no line breaks or control characters")
+        raise ValueError("a wearer's name must not contain line breaks or control characters")
     return name
-
-
-def read_shifts(shifts_m: Mapping[Any, ArrayLike]) -> dict[Eye, Float64]:
-    """Return φ of each eye as (3,) arrays.
-
-    Raises
-    ------
-    ValueError
-        For an unknown eye, or a φ that is not three finite numbers.
-    """
-    unknown = set(shifts_m) - set(EYES)
-    if unknown:
-        raise ValueError(f"an eye is left or right, not {unknown.pop()!r}")
-    read = {eye: readonly(shifts_m[eye], np.float64, (3,)) for eye in EYES if eye in shifts_m}
-    if not all(np.isfinite(shift_m).all() for shift_m in read.values()):
-        raise ValueError("φ must be finite")
-    return read

@@ -1,12 +1,12 @@
-"""Trials of the user test: how far the calibrated projection misses what the wearer sees.
+"""Trials of the user test: the error of the calibrated projection as the wearer sees it.
 
-As in Hu et al. 2021 (user test): the wearer's φ is adjusted by hand until the virtual target covers
-the real one; where its corners are drawn then is taken for the truth.
+As in Hu et al. 2021 (user test): φ is adjusted by hand until the virtual target covers the real
+one; the corners drawn with that φ are the ground truth.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,15 +46,15 @@ class Trial:
     """(4, 3); the target's corners in E, clockwise from the upper left."""
     calibrated_shift_m: Float64
     adjusted_shift_m: Float64
-    """(3,); φ as calibrated, and as adjusted by hand."""
+    """(3,); calibrated φ, and φ adjusted by hand."""
     drawn_px: Float64
     truth_px: Float64
-    """(4, 2); the corners drawn with the one and with the other."""
+    """(4, 2); the corners drawn with the calibrated and with the adjusted φ."""
     error_px: Float64
     error_arcmin: Float64
     """(4,); their distances."""
     time: str = ""
-    """When it was saved, UTC, ISO 8601; empty before."""
+    """Time of saving, UTC, ISO 8601; empty before."""
 
     def __post_init__(self) -> None:
         if self.eye not in EYES:
@@ -72,14 +72,14 @@ class ErrorStatistics:
 
     trials: int
     corners: int
-    """Each corner counts as one error, as in the paper."""
+    """Number of errors: each corner counts as one, as in the paper."""
     px: Summary
     arcmin: Summary
 
 
 @dataclass(frozen=True, slots=True)
 class TrialStatistics:
-    """All trials, and those of each eye and of each distance that there are."""
+    """Error statistics of all trials, by eye and by distance."""
 
     total: ErrorStatistics | None
     """None without trials."""
@@ -94,15 +94,15 @@ def make_trial(
     calibrated_shift_m: ArrayLike,
     adjusted_shift_m: ArrayLike,
 ) -> Trial:
-    """Judge a calibrated φ by the one adjusted by hand.
+    """Return the trial of a calibrated φ against the φ adjusted by hand.
 
     Raises
     ------
     ValueError
-        If a shift is not three finite numbers, or the target does not stand before the eye.
+        If a shift is not three finite numbers, or the target is not in front of the eye.
     """
     if not 0.0 < depth_m < np.inf:
-        raise ValueError(f"a target at {depth_m:g} m does not stand before the eye")
+        raise ValueError(f"a target at {depth_m:g} m is not in front of the eye")
     corners_E_m = target_corners_m(depth_m)
     drawn_px, truth_px = (
         project(eye_projection(display, shift_m), corners_E_m)
@@ -122,7 +122,7 @@ def make_trial(
     )
 
 
-def summarise(trials: Sequence[Trial]) -> TrialStatistics:
+def summarise(trials: Collection[Trial]) -> TrialStatistics:
     """Return statistics of trials; JSON-able with `dataclasses.asdict`."""
     return TrialStatistics(
         total=_errors(trials) if trials else None,
@@ -131,17 +131,19 @@ def summarise(trials: Sequence[Trial]) -> TrialStatistics:
     )
 
 
-def calibration_numbers(trials: Sequence[Trial]) -> tuple[int, ...]:
-    """Return which calibration each of a session's trials judges, from 1.
+def calibration_numbers(trials: Mapping[int, Trial]) -> dict[int, int]:
+    """Return the number, from 1, of the calibration that each of a session's trials judges.
 
-    A calibration is what has a calibrated φ of its own; the first of the left eye is that of the
-    right eye too, and so on, as both are aligned together.
+    Trials with the same calibrated φ belong to one calibration. Both eyes are aligned together, so
+    the first calibration of the left eye is also the first of the right, and so on.
     """
     known: dict[Eye, dict[bytes, int]] = {eye: {} for eye in EYES}
-    return tuple(
-        known[trial.eye].setdefault(trial.calibrated_shift_m.tobytes(), 1 + len(known[trial.eye]))
-        for trial in trials
-    )
+    return {
+        number: known[trial.eye].setdefault(
+            trial.calibrated_shift_m.tobytes(), 1 + len(known[trial.eye])
+        )
+        for number, trial in trials.items()
+    }
 
 
 def trial_json(trial: Trial) -> dict[str, Any]:
@@ -151,12 +153,12 @@ def trial_json(trial: Trial) -> dict[str, Any]:
 
 
 def read_trial(data: Mapping[str, Any], time: str) -> Trial:
-    """Return the trial that `trial_json` gave.
+    """Return the trial encoded by `trial_json`.
 
     Raises
     ------
     ValueError
-        If anything in it is missing or wrong.
+        If anything is missing or invalid.
     """
     try:
         depth_m = float(data["target_depth_m"])
@@ -165,17 +167,17 @@ def read_trial(data: Mapping[str, Any], time: str) -> Trial:
     except KeyError as error:
         raise ValueError(f"the trial has no {error}") from error
     except (TypeError, OverflowError) as error:
-        raise ValueError(f"the trial holds something else than numbers: {error}") from error
+        raise ValueError(f"the trial contains something other than numbers: {error}") from error
 
 
-def _by(trials: Sequence[Trial], name: str) -> dict[Any, ErrorStatistics]:
+def _by(trials: Collection[Trial], name: str) -> dict[Any, ErrorStatistics]:
     return {
         value: _errors([trial for trial in trials if getattr(trial, name) == value])
         for value in sorted({getattr(trial, name) for trial in trials})
     }
 
 
-def _errors(trials: Sequence[Trial]) -> ErrorStatistics:
+def _errors(trials: Collection[Trial]) -> ErrorStatistics:
     px = np.concatenate([trial.error_px for trial in trials])
     arcmin = np.concatenate([trial.error_arcmin for trial in trials])
     return ErrorStatistics(

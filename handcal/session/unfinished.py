@@ -1,4 +1,4 @@
-"""The sessions in a folder that were not ended on purpose, and may be gone on with."""
+"""The interrupted sessions in a folder, which can be resumed."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class UnfinishedSession:
 
     path: Path
     started: str = ""
-    """UTC, ISO 8601; empty if it cannot be told."""
+    """UTC, ISO 8601; empty if unknown."""
     wearer: str = ""
     alignments: int = 0
     trials: int = 0
-    """Those not deleted."""
+    """Numbers of those that are not deleted."""
     problem: str = ""
-    """Why it cannot be gone on with, such as damage or another program; empty if it can."""
+    """Reason why it cannot be resumed, such as damage; empty if it can."""
 
 
 def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
@@ -46,7 +46,7 @@ def _inspect(path: Path) -> UnfinishedSession | None:
             started = events[0].time
             if events[-1].name == SessionEvent.FINISHED:
                 return None
-        FileLock(path / "lock").release()  # only tried: reading takes longer than anyone may wait
+        FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
         record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))

@@ -152,7 +152,7 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
         P={eye: rendered(eye) for eye in EYES},
         T_V_H={eye: rig.eyes[eye].T_V_H for eye in EYES},
         eyes=state.eyes,
-        guard_red=state.live_red,
+        guard_red=state.is_over_limit,
         prompt=state.prompt,
     )
 

@@ -1,4 +1,4 @@
-"""What is installed and plugged in, and what to do about each problem."""
+"""Checks of the installation and the connected devices, with advice on each problem."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _LEAST_FREE_BYTES = 500 * 2**20
 
 
 class Health(Enum):
-    """How it stands with one thing."""
+    """Severity of a finding."""
 
     GOOD = "ok"
     LIMITED = "note"
@@ -46,18 +46,18 @@ class Health(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at."""
+    """The result of one check."""
 
     what: str
     health: Health
-    """LIMITED where the simulator and recordings work all the same."""
+    """LIMITED if the simulator and recordings still work."""
     found: str
     advice: str = ""
-    """What to do; empty if nothing."""
+    """Recommended action; empty if none."""
 
 
 def examine() -> list[Finding]:
-    """Look at everything that a calibration needs; never raises."""
+    """Check everything that a calibration needs; never raises."""
     return [
         _python(),
         *_packages(),
@@ -138,7 +138,7 @@ def _cameras() -> list[Finding]:
 
 
 def examine_camera(device: Device) -> Finding:
-    """Tell what a device is, and whether it is connected well enough."""
+    """Return the identity of a device and problems of its connection."""
     found = f"{device.name}, serial {device.serial}, firmware {device.firmware}, USB {device.usb}"
     if device.temperature_c is not None:
         found += f", {device.temperature_c:.0f} °C"
@@ -166,7 +166,7 @@ def _disk() -> Finding:
 
 
 def examine_disk(folder: Path) -> Finding:
-    """Tell whether a session fits on the disk of a folder that exists; OSError otherwise."""
+    """Check for enough disk space for a session; OSError if the folder does not exist."""
     free_bytes = shutil.disk_usage(folder).free
     found = f"{free_bytes / 2**30:.1f} GiB free here"
     if free_bytes < _LEAST_FREE_BYTES:

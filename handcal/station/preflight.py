@@ -1,4 +1,4 @@
-"""Whether a station can be opened as it is set up: what is there, what is not, what to do."""
+"""Checks of a station's settings before it is opened."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ PARTS: dict[Part, str] = {
 
 
 def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Finding]:
-    """Look at each part of a station without opening it; never raises.
+    """Check each part of a station without opening it; never raises.
 
-    Takes some 0.1 s where a RealSense is asked for, otherwise a few milliseconds.
+    Takes about 0.1 s with a RealSense, otherwise a few milliseconds.
 
     Parameters
     ----------
@@ -51,14 +51,18 @@ def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Fin
 
 
 def is_ready(findings: Mapping[Part, Finding]) -> bool:
-    """Tell whether a station with these findings can be opened."""
+    """Return whether a station with these findings can be opened."""
     return all(finding.health is not Health.BROKEN for finding in findings.values())
 
 
 def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
     try:
         finding = look()
-    except (HandcalError, OSError, ValueError) as error:  # ValueError: a path with a null byte
+    except (
+        HandcalError,
+        OSError,
+        ValueError,
+    ) as error:  # ValueError: a path that contains a null byte
         finding = Finding("", Health.BROKEN, str(error), advice)
     return replace(finding, what=PARTS[part])
 
@@ -90,14 +94,14 @@ def _recording(name: str, is_looped: bool) -> Finding:
     if not name:
         return _broken("no recording is chosen", f"choose {kinds}")
     path = Path(name)
-    how = "played over and over" if is_looped else "played once"
+    how = "played in a loop" if is_looped else "played once"
     if path.is_dir():
         with FolderCamera(path) as camera:
             return _good(f"{camera.name}, {how}")
     if not path.is_file():
         return _broken(f"there is no recording {path}", f"choose {kinds}")
     if path.suffix not in RECORDING_SUFFIXES:
-        return _broken(f"{path.name} is no recording", f"choose {kinds}")
+        return _broken(f"{path.name} is not a recording", f"choose {kinds}")
     librealsense()
     check_recording(path)
     return _good(f"{path.stat().st_size / 2**20:,.1f} MiB, {how}")
@@ -128,7 +132,7 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
         advice = "give four numbers; 0.0.0.0 listens on all networks"
         return _broken(f"{settings.host!r} is not an address", advice)
     if not 1 <= settings.port <= 65535:
-        return _broken(f"{settings.port} is no port", "choose one from 1 to 65535")
+        return _broken(f"{settings.port} is not a valid port", "choose one from 1 to 65535")
     _require_free((settings.host, settings.port))
     try:
         host, port = reachable_address((str(address), settings.port))
@@ -138,7 +142,7 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
 
 
 def _require_free(address: Address) -> None:
-    """Raise LinkError unless the address can be listened at."""
+    """Raise LinkError if the address cannot be bound."""
     UdpTransport(address, DEFAULT_SETTINGS.receive_buffer_bytes).close()
 
 

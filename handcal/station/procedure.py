@@ -1,4 +1,4 @@
-"""The procedure as a state machine: show hand, align, solve, apply, and again.
+"""The calibration procedure as a state machine: show hand, align, solve, apply, repeat.
 
 ::
 
@@ -9,9 +9,9 @@
         |                                                           |   v
         '--make_cursor-- APPLIED <--acknowledged-- APPLYING <--apply-- SOLVED
 
-Any alignment may be deleted and restored in between, and solved anew; φ may be set by hand where no
-cursor is shown. It composes the other rooms and computes nothing new. One thread drives it: `step`
-for every frame, the rest in between.
+Alignments can be deleted, restored and solved again between these steps; φ can be set by hand while
+no cursor is shown. The procedure only combines the other packages. One thread drives it: `step` for
+every frame, all other calls in between.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
-from handcal.display import projection_matrix, view_of_eye
-from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
+from handcal.display import as_shifts, projection_matrix, view_of_eye
+from handcal.errors import HandcalError, HandError
 from handcal.geometry import invert, transform
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
@@ -37,7 +37,8 @@ from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.session.session import Session, SessionRecord
-from handcal.session.state import MAX_ALIGNMENTS, Shelf, read_shifts
+from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
+from handcal.station.hands import PlacedHand, RecentHands
 from handcal.types import (
     EYES,
     Alignment,
@@ -50,15 +51,11 @@ from handcal.types import (
 )
 
 MAX_HAND_SET_SHIFT_M = 0.030
-"""Each component of a φ set by hand: beyond the eye box, whose size it is."""
-
-_LATEST_CONFIRMATION_S = 1.0
-_MIDDLE_OF_EVERY = 8  # points; a median of all takes half a millisecond
-"""Hands are kept for so long, lest a confirmation sent again finds its frame gone."""
+"""Limit of each component of a φ set by hand, beyond the eye box."""
 
 
 class State(StrEnum):
-    """Where the procedure stands."""
+    """State of the procedure."""
 
     SHOW_HAND = "show_hand"
     ALIGN = "align"
@@ -69,98 +66,83 @@ class State(StrEnum):
 
 
 class ProcedureError(HandcalError):
-    """Something was asked for out of turn; the text says what must come first."""
+    """A call in the wrong state; the text says what must be done first."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationSettings:
-    """How a calibration runs."""
+    """Settings of a calibration."""
 
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     camera_latency_s: float = 0.03
-    """From a frame's exposure to its earliest arrival."""
+    """Shortest time from a frame's exposure to its arrival."""
     match_tolerance_s: float = 0.15
-    """The frame of an alignment may lie this far from t_b."""
+    """Largest time between t_b and the frame of an alignment."""
     steady_s: float = 0.4
     steady_m: float = 0.005
-    """The hand is steady if it moved less than this for so long."""
+    """The hand is steady if it moved less than `steady_m` for `steady_s`."""
     apply_timeout_s: float = 5.0
-    """The headset has so long to acknowledge projections (`Calibration.poll_applied`)."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlacedHand:
-    """A hand cloud with its place in the world."""
-
-    cloud: HandCloud
-    t_host_ns: int
-    """Of its exposure, host's monotonic clock."""
-    T_W_D: Float64
-    """(4, 4)."""
-    points_W_m: Float64
-    """(N, 3); the cloud's surface."""
-    middle_W_m: Float64
-    """(3,); its median, to a millimetre."""
+    """Time for the headset to acknowledge projections (`Calibration.poll_applied`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """What one step saw."""
+    """The result of one procedure step: state, hand, rotation, timings."""
 
     state: State
     """After the step."""
     hand: PlacedHand | None
-    """The newest whose place has become known, maybe from an earlier frame; None if none has."""
+    """The newest hand placed in this step, maybe of an earlier frame; None if none was."""
     problem: str
-    """Why there is no hand; empty if there is one."""
+    """Reason why there is no hand; empty if there is one."""
     is_steady: bool
-    """Whether a cursor may be made now."""
+    """True if a cursor can be made now."""
     cloud: HandCloud | None = None
-    """The hand in the step's own frame, whether or not its place is known."""
+    """The hand in this step's own frame, placed or not."""
     rotation_rad: Float64 | None = None
-    """(3,); from the cursor to the live hand, about D's axes, while aligning."""
-    is_red: bool = False
-    """Whether that is beyond the guard's limit."""
+    """(3,); rotation from the cursor to the live hand, about D's axes, while aligning."""
+    is_over_limit: bool = False
+    """True if that rotation exceeds the guard's limit."""
     segment_ms: float | None = None
     guard_ms: float | None = None
-    """What those stages took."""
+    """Durations of these stages."""
 
 
 class Calibration:
     """One wearer's calibration.
 
-    It begins by sending the offline projections, or those of the calibration that it goes on with,
-    lest the headset still render with what another calibration sent.
+    It first sends the offline projections, or those of the session it resumes, so that the headset
+    does not continue to render with those of another calibration.
 
     Parameters
     ----------
     rig : Rig
     link : HeadsetServer
     session : Session or None
-        Where everything is recorded, at the moment it happens; what it could not take is written
-        before whatever comes next, or by `store_waiting`.
+        Records everything at once. Data that could not be written are kept and written before the
+        next data, or by `store_waiting`.
     settings : CalibrationSettings
     resume : SessionRecord or None
-        What `session` holds, to go on with.
+        The contents of `session`, to resume it.
 
     Raises
     ------
     ProcedureError
-        If what is to be gone on with was solved once, but cannot be any more.
+        If the session to resume was solved, but can no longer be solved.
 
     Attributes
     ----------
     state : State
     eyes : tuple of eye
-        Those that the present alignment is for.
+        Eyes open in the present alignment.
     results : Results or None
-        Of all alignments; None before `solve`, and when an alignment has been deleted or restored.
+        Of all alignments; None before `solve` and after an alignment was deleted or restored.
     refused : int
-        Confirmations refused by the guard.
+        Number of confirmations refused by the guard.
     refusal : str
-        Why the last confirmation of the present cursor was refused; empty if none was.
+        Reason why the last confirmation of the present cursor was refused; empty if none was.
     """
 
     def __init__(
@@ -182,14 +164,14 @@ class Calibration:
         self._settings = settings or CalibrationSettings()
         self._clock = FrameClock(self._settings.camera_latency_s)
         self._finder = make_finder(self._settings.segment)
-        self._hands: deque[PlacedHand] = deque()
-        self._unplaced: deque[tuple[HandCloud, int]] = deque()
-        self._seen_ns = 0
+        self._hands = RecentHands(
+            link.pose_at_host_ns, rig.T_H_D, self._settings.steady_s, self._settings.steady_m
+        )
         self._cursor: PlacedHand | None = None
         self._cursor_id = 0
         self._guard: RotationGuard | None = None
         self._confirmation: Confirmation | None = None
-        self._shelf = Shelf[Alignment]("alignment", MAX_ALIGNMENTS)
+        self._items = NumberedItems[Alignment]("alignment", MAX_ALIGNMENTS)
         self._unstored: deque[Callable[[Session], object]] = deque()
         self._shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
         self._sent: dict[Eye, Outgoing] = {}
@@ -199,32 +181,27 @@ class Calibration:
         self._send_projections(self._shift_m)
 
     @property
-    def alignments(self) -> tuple[Alignment, ...]:
-        """Those not deleted, in the order in which they were made."""
-        return tuple(self._shelf.kept.values())
-
-    @property
-    def alignment_numbers(self) -> tuple[int, ...]:
-        """Numbers of `alignments`, the same as in the session."""
-        return tuple(self._shelf.kept)
+    def alignments(self) -> Mapping[int, Alignment]:
+        """The alignments that are not deleted, by their number in the session."""
+        return MappingProxyType(dict(self._items.active))
 
     @property
     def cursor(self) -> PlacedHand | None:
-        """The frozen hand, while the headset shows it."""
+        """The frozen hand while the headset shows it, else None."""
         return self._cursor
 
     @property
     def applied_shift_m(self) -> Mapping[Eye, Float64]:
-        """Both eyes' φ that the headset renders with, solved or set by hand."""
+        """φ that the headset renders each eye with, solved or set by hand."""
         return MappingProxyType(dict(self._shift_m))
 
     @property
     def is_applied(self) -> bool:
-        """Whether the headset has acknowledged the newest projection of each eye."""
+        """True if the headset has acknowledged the newest projection of each eye."""
         return all(message.state is Delivery.ACKED for message in self._sent.values())
 
     def step(self, frame: Frame) -> Observation:
-        """Take a frame: find the hand, guide the alignment, take a confirmation.
+        """Process a frame: find the hand, guide the alignment, handle a confirmation.
 
         Raises
         ------
@@ -234,20 +211,19 @@ class Calibration:
             If the session cannot be written; the alignment is kept in memory.
         """
         started_s = time.perf_counter()
-        self._seen_ns = self._clock.exposure_ns(frame)
+        t_host_ns = self._clock.exposure_ns(frame)
         problem = ""
         cloud: HandCloud | None = None
         try:
             cloud = self._finder.find(frame)
-            self._unplaced.append((cloud, self._seen_ns))
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
-        self._forget_hands()
-        hand, not_placed = self._place_hands()
+        hand, not_placed = self._hands.add(cloud, t_host_ns)
         problem = "" if hand else problem or not_placed
+        is_steady = self._hands.steady() is not None
         observation = Observation(
-            self.state, hand, problem, self._is_steady(), cloud, segment_ms=segment_ms
+            self.state, hand, problem, is_steady, cloud, segment_ms=segment_ms
         )
         if self.state is State.ALIGN:
             observation = self._guide(observation)
@@ -259,26 +235,26 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no steady hand, an alignment has not been applied yet, or there are too
-            many.
+            If there is no steady hand, an alignment has not been applied yet, or the session is
+            full.
         ValueError
-            Unless one eye is given, or each of both once.
+            Unless one eye is given, or both once each.
         HandError
-            If hardly a point lies off the cut edges.
+            If almost all points lie at cut edges.
         FileError
-            If the session cannot be written; the cursor is shown all the same.
+            If the session cannot be written; the cursor is shown anyway.
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED, State.ALIGN):
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
-        if not self._is_steady():
+        hand = self._hands.steady()
+        if hand is None:
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
         try:
-            self._shelf.next_number()
+            self._items.next_number()
         except ValueError as error:
             raise ProcedureError(f"{error} in a session; start another") from error
-        hand = self._hands[-1]
         self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
         self._cursor = hand
         self._cursor_id += 1
@@ -292,7 +268,7 @@ class Calibration:
         self._store(lambda session: session.record("cursor_made", **made))
 
     def confirm(self) -> None:
-        """Confirm the alignment from the PC, as of the newest frame; the next step takes it.
+        """Confirm the alignment from the PC at the newest frame; the next step handles it.
 
         Raises
         ------
@@ -301,57 +277,56 @@ class Calibration:
         """
         if self.state is not State.ALIGN:
             raise ProcedureError(f"there is no cursor to confirm ({self.state})")
-        tolerance_ns = 1e9 * self._settings.match_tolerance_s
-        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > tolerance_ns:
+        hand = self._hands.newest(self._settings.match_tolerance_s)
+        if hand is None:
             raise ProcedureError("hold the hand under the cursor, in view of the camera")
-        t_ns = self._hands[-1].t_host_ns
-        T_W_H = self._hands[-1].T_W_D @ invert(self.rig.T_H_D)
+        T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
         T_E_W = {eye: view_of_eye(self.rig.eyes[eye], T_W_H) for eye in EYES}
-        self._confirmation = Confirmation(t_ns, t_ns, T_E_W, self._cursor_id)
+        self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, T_E_W, self._cursor_id)
 
     def redo(self) -> None:
-        """Give up the present cursor, or the last alignment and the results with it.
+        """Discard the present cursor, or else delete the last alignment and the results.
 
         Raises
         ------
         ProcedureError
-            If there is neither.
+            If there is nothing to discard.
         FileError
-            If the session cannot be written; the alignment is given up all the same.
+            If the session cannot be written; the alignment is deleted anyway.
         """
         if self.state in (State.ALIGNED, State.SOLVED):
-            self.delete_alignment(self.alignment_numbers[-1])
+            self.delete_alignment(max(self._items.active))
         elif self.state is State.ALIGN:
             self._show_hand_again()
         else:
             raise ProcedureError(f"there is nothing to redo ({self.state})")
 
     def delete_alignment(self, number: int) -> None:
-        """Leave out an alignment, and the results with it.
+        """Delete an alignment, and the results with it.
 
         Raises
         ------
         ProcedureError
             While a cursor is being aligned or projections are being applied.
         ValueError
-            If there is none of that number.
+            If there is no alignment of this number.
         FileError
-            If the session cannot be written; the alignment is left out all the same.
+            If the session cannot be written; the alignment is deleted anyway.
         """
         self._require_settled()
-        self._shelf.delete(number)
+        self._items.delete(number)
         self._forget_results()
-        self._store(lambda session: session.delete_alignment(number))
+        self._store(lambda session: session.delete("alignment", number))
 
     def restore_alignment(self, number: int) -> None:
-        """Take back the deletion of an alignment; the results go all the same.
+        """Restore a deleted alignment; the results are discarded.
 
         Raises as `delete_alignment`.
         """
         self._require_settled()
-        self._shelf.restore(number)
+        self._items.restore(number)
         self._forget_results()
-        self._store(lambda session: session.restore_alignment(number))
+        self._store(lambda session: session.restore("alignment", number))
 
     def solve(self) -> Results:
         """Solve all alignments so far.
@@ -359,7 +334,7 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no alignment, or something sent to the headset waits for its answer.
+            If there is no alignment, or the headset has not yet acknowledged the projections.
         FileError
             If the session cannot be written; the results are kept in memory.
         """
@@ -373,7 +348,7 @@ class Calibration:
         return results
 
     def apply(self) -> None:
-        """Send the solved projections to the headset and take the cursor away.
+        """Send the solved projections to the headset and hide the cursor.
 
         Raises
         ------
@@ -388,16 +363,16 @@ class Calibration:
         self.state = State.APPLYING
 
     def poll_applied(self) -> bool:
-        """Tell, without waiting, whether the headset has acknowledged every projection by now.
+        """Return, without waiting, whether the headset has acknowledged every projection.
 
         Raises
         ------
         ProcedureError
             If nothing was sent.
         LinkError
-            If the link has given one up, or the time set is over; `apply` may be called again.
+            If one could not be delivered or the timeout is over; call `apply` again.
         FileError
-            If the session cannot be written; the projections are applied all the same.
+            If the session cannot be written; the projections are applied anyway.
         """
         is_pending = any(message.state is Delivery.PENDING for message in self._sent.values())
         if self.state is State.APPLYING and is_pending and time.monotonic() < self._apply_until_s:
@@ -413,9 +388,9 @@ class Calibration:
         ProcedureError
             If nothing was sent.
         LinkError
-            If it does not in time; `apply` may be called again.
+            If it does not in time; call `apply` again.
         FileError
-            If the session cannot be written; the projections are applied all the same.
+            If the session cannot be written; the projections are applied anyway.
         """
         if self.state is not State.APPLYING:
             raise ProcedureError("apply first")
@@ -432,17 +407,17 @@ class Calibration:
         self._store(lambda session: session.save_applied(applied_m))
 
     def set_shift(self, shifts_m: Mapping[Eye, ArrayLike]) -> list[Outgoing]:
-        """Let the headset render with φ set by hand, from now on; an eye not given keeps its own.
+        """Have the headset render with φ set by hand; an eye not given keeps its own.
 
         Returns
         -------
         list of Outgoing
-            The projections on their way.
+            The projections sent.
 
         Raises
         ------
         ProcedureError
-            While there is a cursor or an alignment that has not been applied yet.
+            While there is a cursor, or an alignment that has not been applied.
         ValueError
             If a φ is not three finite numbers up to 30 mm.
         LinkError
@@ -450,7 +425,7 @@ class Calibration:
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED):
             raise ProcedureError(f"φ cannot be set by hand now ({self.state}): solve and apply")
-        shifts = read_shifts(shifts_m)
+        shifts = as_shifts(shifts_m)
         for eye, shift_m in shifts.items():
             if np.abs(shift_m).max() > MAX_HAND_SET_SHIFT_M:
                 limit_mm = 1e3 * MAX_HAND_SET_SHIFT_M
@@ -459,26 +434,26 @@ class Calibration:
         return self._send_projections(shifts)
 
     def record_shift(self) -> None:
-        """Note in the session that the φ set by hand has settled; FileError if it cannot be."""
+        """Record the φ set by hand in the session; FileError if it cannot be written."""
         settled_m = self.applied_shift_m
         self._store(lambda session: session.save_fine_tuned(settled_m))
 
     def store_waiting(self) -> None:
-        """Write what the session could not take before; FileError if it still cannot."""
+        """Write data that could not be written before; FileError if they still cannot be."""
         while self._session is not None and self._unstored:
             self._unstored[0](self._session)
             self._unstored.popleft()
 
     def _resume(self, record: SessionRecord) -> None:
-        """Go on where a session ended: what was on its way then has to be done again."""
-        self._shelf.kept = dict(zip(record.alignment_numbers, record.alignments, strict=True))
-        self._shelf.deleted = dict(record.deleted)
+        """Restore the state of a session; a cursor or projections pending then are lost."""
+        self._items.active = dict(record.alignments)
+        self._items.deleted = dict(record.deleted_alignments)
         self._shift_m |= record.applied_shift_m
         if record.is_solved:
             try:
                 self._solve()
             except ValueError as error:
-                raise ProcedureError(f"{record.path} cannot be gone on with: {error}") from error
+                raise ProcedureError(f"{record.path} cannot be resumed: {error}") from error
             self.state = State.APPLIED if record.is_applied else State.SOLVED
         elif record.alignments:
             self.state = State.ALIGNED
@@ -513,66 +488,17 @@ class Calibration:
             self._sent[eye] = self._link.send_projection(projection)
         return [self._sent[eye] for eye in shifts_m]
 
-    def _forget_hands(self) -> None:
-        """Let go of what is too old for a confirmation, and for telling whether it is steady."""
-        kept_s = self._settings.steady_s + _LATEST_CONFIRMATION_S
-        oldest_ns = self._seen_ns - round(1e9 * kept_s)
-        while self._hands and self._hands[0].t_host_ns < oldest_ns:
-            self._hands.popleft()
-        while self._unplaced and self._unplaced[0][1] < oldest_ns:
-            self._unplaced.popleft()
-
-    def _place_hands(self) -> tuple[PlacedHand | None, str]:
-        """Place the clouds whose pose has come by now; return the newest, or why there is none."""
-        hand, problem = None, ""
-        while self._unplaced:
-            cloud, t_ns = self._unplaced[0]
-            try:
-                T_W_D = self._link.pose_at_host_ns(t_ns) @ self.rig.T_H_D
-            except PosePendingError as error:
-                problem = str(error)
-                break
-            except PoseError as error:
-                problem = str(error)
-            else:
-                points_W_m = transform(T_W_D, cloud.points_m)
-                middle_W_m = np.median(points_W_m[::_MIDDLE_OF_EVERY], axis=0)
-                hand = PlacedHand(cloud, t_ns, T_W_D, points_W_m, middle_W_m)
-                self._hands.append(hand)
-            self._unplaced.popleft()
-        return hand, problem
-
-    def _placed_until_ns(self) -> int:
-        """Return the time of the newest frame whose hand, as those of all before, has its place."""
-        if not self._unplaced:
-            return self._seen_ns
-        return self._hands[-1].t_host_ns if self._hands else 0
-
-    def _is_steady(self) -> bool:
-        """Tell whether a hand is in view, placed, and has hardly moved for a while."""
-        steady_ns = round(1e9 * self._settings.steady_s)
-        if not self._hands or self._seen_ns - self._hands[-1].t_host_ns > steady_ns:
-            return False
-        since_ns = self._seen_ns - steady_ns
-        before = [hand.middle_W_m for hand in self._hands if hand.t_host_ns <= since_ns]
-        after = [hand.middle_W_m for hand in self._hands if hand.t_host_ns > since_ns]
-        # From the last before on, so that a slow camera shows enough of them too.
-        places = before[-1:] + after
-        return (
-            bool(before and after) and float(np.ptp(places, axis=0).max()) < self._settings.steady_m
-        )
-
     def _guide(self, observation: Observation) -> Observation:
-        """Show the live hand in its colour and take a confirmation."""
+        """Show the live hand with its rotation, and handle a confirmation."""
         if observation.hand is not None:
             observation = self._show_live(observation, observation.hand)
         for confirmation in self._link.confirmations():
             if confirmation.cursor_id == self._cursor_id:
                 self._confirmation = confirmation
         waiting = self._confirmation
-        if waiting is not None and self._placed_until_ns() >= waiting.t_host_ns:
+        if waiting is not None and self._hands.placed_until_ns() >= waiting.t_host_ns:
             self._confirmation = None
-            self._take(waiting)
+            self._judge(waiting)
         return observation
 
     def _show_live(self, observation: Observation, hand: PlacedHand) -> Observation:
@@ -582,27 +508,27 @@ class Calibration:
             rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
         except HandError as error:
             return replace(observation, hand=None, problem=str(error))
-        is_red = self._is_over(rotation_W)
-        self._link.send_live_hand(hand.points_W_m, is_red)
+        is_over_limit = self._is_over_limit(rotation_W)
+        self._link.send_live_hand(hand.points_W_m, is_over_limit)
         return replace(
             observation,
             rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
-            is_red=is_red,
+            is_over_limit=is_over_limit,
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
 
-    def _take(self, confirmation: Confirmation) -> None:
+    def _judge(self, confirmation: Confirmation) -> None:
         """Accept or refuse a confirmation."""
         assert self._cursor is not None
         assert self._guard is not None
         try:
-            hand = self._hand_at(confirmation.t_host_ns)
+            hand = self._hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
             rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
         except HandError as error:
             self._refuse(f"{error}. Align and confirm again.", "no hand")
             return
         angle_deg = float(np.degrees(np.linalg.norm(rotation_W)))
-        if self._is_over(rotation_W):
+        if self._is_over_limit(rotation_W):
             self.refused += 1
             limit_deg = np.degrees(self._settings.guard.limit_rad)
             advice = turn_advice(hand.T_W_D[:3, :3].T @ rotation_W)
@@ -625,18 +551,10 @@ class Calibration:
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._shift_m),
         )
-        self._shelf.save(self._shelf.next_number(), alignment)
+        self._items.save(self._items.next_number(), alignment)
         self.state = State.ALIGNED
         self.refusal = ""
         self._store(lambda session: session.save_alignment(alignment))
-
-    def _hand_at(self, t_host_ns: int) -> PlacedHand:
-        """Return the hand nearest in time."""
-        tolerance_ns = 1e9 * self._settings.match_tolerance_s
-        near = [hand for hand in self._hands if abs(hand.t_host_ns - t_host_ns) <= tolerance_ns]
-        if not near:
-            raise HandError("The camera did not see your hand")
-        return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
     def _refuse(self, prompt: str, reason: str, angle_deg: float | None = None) -> None:
         self.refusal = prompt
@@ -644,20 +562,19 @@ class Calibration:
         refused = {"reason": reason, "angle_deg": angle_deg, "cursor_id": self._cursor_id}
         self._store(lambda session: session.record("refused", **refused))
 
-    def _is_over(self, rotation: Float64) -> bool:
+    def _is_over_limit(self, rotation: Float64) -> bool:
         return float(np.linalg.norm(rotation)) > self._settings.guard.limit_rad
 
     def _clear_cursor(self) -> None:
         self._cursor = self._guard = self._confirmation = None
         self.refusal = ""
-        # The wearer lowers the hand now: only what is seen from here on may become a cursor.
+        # The wearer lowers the hand now: only a hand seen from here on can become a cursor.
         self._hands.clear()
-        self._unplaced.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
 
     def _store(self, write: Callable[[Session], object]) -> None:
-        """Write to the session, after what could not be written before."""
+        """Write to the session, after data that could not be written before."""
         if self._session is not None:
             self._unstored.append(write)
             self.store_waiting()

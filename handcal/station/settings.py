@@ -1,4 +1,4 @@
-"""What a calibration station is made of."""
+"""Settings of a calibration station."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ DEFAULT_PORT = 47800
 
 @dataclass(frozen=True, slots=True)
 class StationSettings:
-    """What a station is made of."""
+    """Settings of a station."""
 
     source: Source = "simulator"
     recording: str = ""
-    """Path of the recording that `source` plays: a file or a folder."""
+    """Path of the recording to play, if `source` is one: a file or a folder."""
     playback: PlaybackSettings = field(
         default_factory=lambda: PlaybackSettings(real_time=True, loop=True)
     )
-    """How: at its own pace and over and over, unless told otherwise."""
+    """Default: in real time and in a loop."""
     realsense: RealSenseSettings = field(default_factory=RealSenseSettings)
     headset: HeadsetKind = "virtual"
-    """The virtual headset is a process of its own on this machine; it brings the simulated
+    """The virtual headset runs as a separate process on this machine and includes the simulated
     wearer."""
     host: str = "0.0.0.0"  # noqa: S104 (a headset is another device; the datagrams are signed)
     port: int = DEFAULT_PORT
-    """Where a network headset connects to."""
+    """Address that a network headset connects to."""
     rig: str = ""
-    """Path of the rig file; empty takes the example, which is the virtual headset's own."""
+    """Path of the rig file; if empty, the example, which fits the virtual headset."""
     worn_rig: str = ""
-    """Path of the rig that the simulated wearer really looks through; empty takes `rig`."""
+    """Path of the true rig of the simulated wearer; if empty, `rig`."""
     seed: int = 1
-    """Of the simulated wearer, hand and room."""
+    """Seed of the simulated wearer, hand and room."""
     loss: float = 0.0
     reorder: float = 0.0
     """Share of the virtual headset's datagrams lost, and reordered, in each direction."""

@@ -1,4 +1,4 @@
-"""What a station knows at one frame, for whoever watches: frozen, and complete in itself."""
+"""The state of a station at one frame, for display: complete and immutable."""
 
 from __future__ import annotations
 
@@ -10,58 +10,59 @@ from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal.station.procedure import Observation, PlacedHand, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import Observation, State
 from handcal.station.wearer_view import EyeView
 from handcal.types import Alignment, Eye, Float64, Frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Procedure:
-    """Where the calibration stands."""
+    """State of the calibration."""
 
     state: State
     eyes: tuple[Eye, ...]
-    """Those that the present cursor is for."""
+    """Eyes that the present cursor is for."""
     cursor: PlacedHand | None
-    """The frozen hand while one is shown."""
+    """The frozen hand while it is shown, else None."""
     refusal: str
-    """Why the last confirmation of the present cursor was refused; empty if none was."""
+    """Reason why the last confirmation of the present cursor was refused; empty if none was."""
     refused: int
-    """Confirmations refused so far."""
+    """Number of confirmations refused so far."""
     guard_limit_rad: float
-    alignments: tuple[Alignment, ...]
-    """Those not deleted, even while the session cannot take them."""
+    alignments: Mapping[int, Alignment]
+    """By number, without deleted ones, including those that could not be written yet."""
     results: Results | None
     """Of all alignments; None while there are none, or alignments have changed since."""
     applied_shift_m: Mapping[Eye, Float64]
-    """each (3,); what the headset renders with."""
+    """each (3,); φ that the headset renders with."""
     is_applied: bool
-    """Whether it has acknowledged that."""
+    """True if the headset has acknowledged it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """Everything at one frame."""
+    """A station at one frame."""
 
     number: int
     """Running number, from 1."""
     t_host_ns: int
-    """Host's monotonic time when it was taken."""
+    """Time on the host's monotonic clock."""
     frame: Frame | None
-    """The newest; None before the first."""
+    """The newest frame; None before the first."""
     observation: Observation | None
-    """What the procedure saw in it; None if no frame came since the last snapshot."""
+    """The procedure's result for this frame; None without a new frame."""
     camera: CameraStatus
     link: LinkStatistics
     link_problem: str
-    """What is wrong with the headset, and what to do; empty if nothing is."""
+    """Problem of the headset and what to do about it; empty if there is none."""
     problem: str
-    """What went wrong in the procedure itself, such as a full disk; empty if nothing did."""
+    """Problem of the procedure, such as a full disk; empty if there is none."""
     procedure: Procedure
     record: SessionRecord
-    """The session as it is on the disk; the same object until it changes."""
+    """The session as stored on disk; the same object until it changes."""
     views: Mapping[Eye, EyeView] = field(default_factory=dict)
-    """What the wearer sees, if asked for (`Station.watch_views`)."""
+    """The wearer's views, if requested by `Station.watch_views`."""
 
     @property
     def session_path(self) -> Path:

@@ -1,12 +1,12 @@
-"""A stored session solved again, as it was or with another method; the session stays as it is."""
+"""Solve a stored session again, with its own or another method, without changing it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
+from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import CalibrationSettings
@@ -38,7 +38,7 @@ def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
         If the session has no alignments, one of them cannot be solved, or its settings cannot be
         read.
     HandError
-        If hardly a point of an alignment lies off the cut edges.
+        If nearly all points of an alignment lie beside cut edges.
     ValueError
         If the method is unknown.
 
@@ -64,25 +64,22 @@ def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
 
 
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:
-    """Return how a session was solved; FileError if its settings cannot be read."""
+    """Return the solve settings of a session; FileError if they cannot be read."""
     where = f"{record.path / 'settings.json'}: calibration"
     return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
 
 
 def solve_again(
-    record: SessionRecord,
-    settings: SolveSettings,
-    report: Callable[[str, float], object] = lambda *_: None,
-    is_cancelled: Callable[[], bool] = lambda: False,
+    record: SessionRecord, settings: SolveSettings, progress: Progress = Progress()
 ) -> Results | None:
-    """Return what a session's alignments say; None if there are none.
+    """Return the results of a session's alignments; None if there are none.
 
     Parameters
     ----------
     record : SessionRecord
     settings : SolveSettings
-    report, is_cancelled : callable
-        As `solve_session` takes them.
+    progress : Progress
+        As in `solve_session`.
 
     Raises
     ------
@@ -94,6 +91,6 @@ def solve_again(
     if not record.alignments:
         return None
     try:
-        return solve_session(record.alignments, record.rig, settings, report, is_cancelled)
+        return solve_session(record.alignments, record.rig, settings, progress)
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error

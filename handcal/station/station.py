@@ -1,6 +1,6 @@
-"""A calibration station: camera, headset, procedure and session, opened, run and closed together.
+"""A calibration station: camera, headset, procedure and session, opened and closed together.
 
-One thread owns a station: it calls `step` for ever, and whatever else is wanted in between.
+One thread owns a station: it calls `step` repeatedly, and other methods in between.
 """
 
 from __future__ import annotations
@@ -26,15 +26,17 @@ from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
+from handcal.session.state import Kind
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
-from handcal.station.procedure import Calibration, PlacedHand, ProcedureError, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import Calibration, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
-from handcal.station.wearer_view import EyeView, see
+from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import Eye, Float64, Frame, Target
 
 _VIEW_PERIOD_S = 0.1
@@ -42,17 +44,17 @@ _STORE_PERIOD_S = 1.0
 
 
 class Station(Closable):
-    """One wearer at one station.
+    """A station with one wearer.
 
     Parameters
     ----------
     settings : StationSettings
     wearer : str
-        Name or code; kept in the session.
+        Name or code; stored in the session.
     resume : Path, optional
-        A session to go on with, instead of a new one.
+        A session to resume, instead of a new one.
     pairing_key : str
-        Shared with a network headset; the virtual one is given a fresh key.
+        Shared with a network headset; the virtual headset gets a new key.
 
     Attributes
     ----------
@@ -62,7 +64,7 @@ class Station(Closable):
     Raises
     ------
     FileError
-        If the rig or the session to resume cannot be read, or no session can be created.
+        If the rig or the session cannot be read, or no session can be created.
     LinkError
         If the network address cannot be bound, or the key is too short.
     """
@@ -106,20 +108,20 @@ class Station(Closable):
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
         self._revision = self.session.revision
-        self._target_E_m: dict[Eye, Float64] = {}  # of the one eye that it is shown to
+        self._target_E_m: dict[Eye, Float64] = {}  # only of the eye that it is shown to
         self._views: dict[Eye, EyeView] = {}
         self._viewed: Eye = "right"
         self._next_view_s = 0.0
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where the headset connects to: host, which others can reach, and port."""
-        with suppress(LinkError):  # no network, not yet
+        """Host and port that the headset connects to, reachable from other machines."""
+        with suppress(LinkError):  # no network yet
             return reachable_address(self._link.address)
         return self._link.address
 
     def step(self) -> Snapshot:
-        """Take a frame, if one comes soon, through the procedure; say how everything stands."""
+        """Process the next frame, if one arrives soon, and return the new snapshot."""
         frame = self._feed.read()
         self._frame = frame or self._frame
         observation = None
@@ -131,7 +133,7 @@ class Station(Closable):
         except LinkError as error:
             self._not_applied = str(error)
         except FileError:
-            pass  # the procedure keeps what it could not write; `_store_waiting` tells
+            pass  # the procedure keeps the data; `_store_waiting` reports the problem
         if self.calibration.state is not State.SOLVED:
             self._not_applied = ""
         if self.calibration.state is not State.APPLIED:
@@ -155,14 +157,14 @@ class Station(Closable):
         )
 
     def finish(self) -> None:
-        """Note how the link did and that the session is complete; FileError if it cannot be."""
+        """Record the link statistics and finish the session; FileError if it cannot be written."""
         self.hide_target()
         self.calibration.store_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
 
     def save_trial(self, eye: Eye, depth_m: float) -> int:
-        """Store a trial: the solved φ judged by the one set by hand, for a target at a distance.
+        """Save a trial: the solved φ against the one set by hand, for a target at a distance.
 
         Raises
         ------
@@ -183,8 +185,34 @@ class Station(Closable):
         )
         return self.session.save_trial(trial)
 
+    def delete(self, kind: Kind, number: int) -> None:
+        """Delete an alignment or a trial; it can be restored.
+
+        Raises
+        ------
+        ProcedureError
+            While alignments cannot be changed.
+        ValueError
+            If there is none of this number.
+        FileError
+            If a trial's deletion cannot be written; that of an alignment is kept until it can.
+        """
+        if kind == "trial":
+            self.session.delete(kind, number)
+        else:
+            with suppress(FileError):
+                self.calibration.delete_alignment(number)
+
+    def restore(self, kind: Kind, number: int) -> None:
+        """Restore a deleted alignment or trial; raises as `delete`."""
+        if kind == "trial":
+            self.session.restore(kind, number)
+        else:
+            with suppress(FileError):
+                self.calibration.restore_alignment(number)
+
     def show_target(self, eye: Eye, depth_m: float) -> None:
-        """Let the headset draw the target of a trial for one eye, until φ is no longer judged.
+        """Show the target of a trial to one eye in the headset, while the solved φ is applied.
 
         Raises
         ------
@@ -200,7 +228,7 @@ class Station(Closable):
         self._target_E_m = {eye: corners_E_m}
 
     def hide_target(self) -> None:
-        """Take the target away, if it is shown."""
+        """Hide the target if it is shown."""
         if self._target_E_m:
             self._link.send_target(None)
             self._target_E_m = {}
@@ -216,7 +244,7 @@ class Station(Closable):
             self._simulation.restart()
 
     def close(self) -> None:
-        """Store what waits for it, and close everything; safe to call twice."""
+        """Write pending data and close everything; safe to call twice."""
         with suppress(FileError):
             self.calibration.store_waiting()
         self._stack.close()
@@ -249,9 +277,9 @@ class Station(Closable):
         )
 
     def _show(self, hand: PlacedHand) -> None:
-        """Draw the live hand in the headset, and what the eyes see of it for whoever watches."""
+        """Show the live hand in the headset, and render the wearer's views if requested."""
         if self.calibration.state is State.APPLIED:
-            # The wearer judges the calibration by this outline on the own hand.
+            # The wearer judges the calibration by this outline on their own hand.
             self._link.send_live_hand(hand.points_W_m, False)
         started_s = time.monotonic()
         if self.watch_views and started_s >= self._next_view_s:
@@ -259,7 +287,7 @@ class Station(Closable):
             self._views[eye] = self._see(eye, hand)
             self._viewed = eye
             ended_s = time.monotonic()
-            # On a busy computer the frames come first.
+            # On a busy computer frames have priority.
             self._next_view_s = ended_s + max(_VIEW_PERIOD_S, 3.0 * (ended_s - started_s))
 
     def _see(self, eye: Eye, hand: PlacedHand) -> EyeView:
@@ -279,7 +307,7 @@ class Station(Closable):
         else:
             eye_shift_m = drawn_shift_m
         T_E_W = view_of_eye(display, T_W_H)
-        return see(
+        return render_eye_view(
             eye,
             display,
             eye_shift_m,
@@ -322,7 +350,7 @@ class Station(Closable):
         )
 
     def _store_waiting(self) -> None:
-        """Try again now and then what the session could not take; read what it has taken."""
+        """Retry writing pending data now and then; read the session if it has changed."""
         now_s = time.monotonic()
         if self._not_stored and now_s < self._next_store_s:
             return
@@ -334,7 +362,9 @@ class Station(Closable):
                 self._revision = self.session.revision
             self._not_stored = ""
         except FileError as error:
-            self._not_stored = f"{error}. What cannot be written is kept until it can."
+            self._not_stored = (
+                f"{error}. The data are kept in memory and written as soon as possible."
+            )
 
 
 def _open_session(settings: StationSettings, wearer: str, resume: Path | None) -> Session:

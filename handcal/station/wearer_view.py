@@ -1,7 +1,7 @@
-"""What each eye sees through the display: the hand itself, and what the headset draws over it.
+"""The view of each eye through the display: the hand, and the overlay drawn by the headset.
 
-With the simulator the true eye is known to the simulator, which renders what it sees. With a real
-headset it is predicted: the eye is taken to be where the calibration says.
+The simulator knows the true eye and renders its view. For a real headset the view is predicted with
+the calibrated eye position.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ _NO_TARGET_M = np.empty((0, 3))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlay:
-    """The live hand's outline as a headset draws it, and by how much that misses the hand."""
+    """The live hand's outline as drawn by the headset, and its error on the hand."""
 
     outline_px: Float64
-    """(N, 2); point by point that of `EyeView.hand_px`."""
+    """(N, 2); point by point as `EyeView.hand_px`."""
     error_px: float | None
     error_arcmin: float | None
-    """Mean distance of these points; None without an outline."""
+    """Mean distance between these points; None without an outline."""
 
     def __post_init__(self) -> None:
         freeze(self, "outline_px", np.float64, None, 2)
@@ -44,21 +44,20 @@ class EyeView:
     hand_px: Float64
     """(N, 2); outline of the live hand as the eye sees it through the display."""
     drawn: Overlay
-    """With what the headset renders with now: on the hand if the calibration is right."""
+    """Drawn with the present φ; lies on the hand if the calibration is right."""
     offline: Overlay
-    """With the offline calibration, as before any alignment."""
+    """Drawn with the offline calibration, as before any alignment."""
     cursor_px: Float64
-    """(M, 2); the cursor as the headset draws it; empty if there is none."""
+    """(M, 2); the cursor as drawn by the headset; empty if there is none."""
     target_px: Float64
-    """(4, 2); the user test's target at its place, as the eye sees it; empty while it is not
+    """(4, 2); the user test's target as the eye sees it at its place; empty while it is not
     shown."""
     drawn_target_px: Float64
-    """(4, 2); the target as the headset draws it: on the other if the calibration is right."""
+    """(4, 2); the target as drawn by the headset; coincides if the calibration is right."""
     is_true: bool
-    """Whether the eye is the simulated wearer's true one; otherwise it is predicted."""
+    """True for the simulated wearer's true eye; False if the view is predicted."""
     image: UInt8 | None = None
-    """(h, w, 3); RGB of the world behind the display, stretched over it; None if it is not
-    known."""
+    """(h, w, 3); RGB of the world behind the display, scaled to it; None if unknown."""
 
     def __post_init__(self) -> None:
         freeze(self, "hand_px", np.float64, None, 2)
@@ -68,7 +67,7 @@ class EyeView:
         freeze(self, "image", np.uint8, None, None, 3)
 
 
-def see(
+def render_eye_view(
     eye: Eye,
     display: EyeDisplay,
     eye_shift_m: ArrayLike,
@@ -80,21 +79,21 @@ def see(
     is_true: bool,
     image: UInt8 | None = None,
 ) -> EyeView:
-    """Return what an eye at one place sees of a hand, drawn for an eye at another.
+    """Return the view of an eye, of a hand and the overlay drawn for an eye with another φ.
 
     Parameters
     ----------
     eye : {"left", "right"}
     display : EyeDisplay
     eye_shift_m : (3,) array_like
-        φ of the eye that looks.
+        φ of the viewing eye.
     drawn_shift_m : (3,) array_like
         φ that the headset renders with.
     outline_E_m : (N, 3) float64
         The live hand's outline.
     cursor_E_m : (M, 3) float64
     target_E_m : (4, 3) float64, optional
-        Corners of the user test's target, where it is shown.
+        Corners of the user test's target while it is shown.
     is_true, image
         As in `EyeView`.
     """

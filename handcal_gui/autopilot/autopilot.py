@@ -8,7 +8,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 
 from handcal.station.snapshot import Snapshot
-from handcal_gui.control.live import Live
+from handcal_gui.control.live import CalibrationController
 from handcal_gui.pages.wizard.steps import Action, View
 from handcal_gui.pages.wizard.wizard import WizardPanel
 
@@ -25,7 +25,7 @@ class Autopilot(QObject):
 
     Parameters
     ----------
-    live : Live
+    live : CalibrationController
     wizard_panel : WizardPanel
     look : callable, optional
         Called with every view before its button is pressed, and while the wearer aligns; may
@@ -44,7 +44,7 @@ class Autopilot(QObject):
 
     def __init__(
         self,
-        live: Live,
+        live: CalibrationController,
         wizard_panel: WizardPanel,
         look: Callable[[View], None] = lambda _view: None,
     ) -> None:

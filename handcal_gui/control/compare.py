@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 from PySide6.QtCore import QObject
 
+from handcal.progress import Progress
 from handcal.register.results import SolveSettings, solve_session
 from handcal.types import Alignment, Method, Rig
-from handcal_gui.engine.jobs import IsCancelled, Job, Report
+from handcal_gui.engine.jobs import Job
 from handcal_gui.panels.results.panel import ResultsPanel
 
 
@@ -24,14 +25,14 @@ class Comparison(QObject):
     def __init__(self, panel: ResultsPanel) -> None:
         super().__init__(panel)
         self._panel = panel
-        self._alignments: Sequence[Alignment] = ()
+        self._alignments: Mapping[int, Alignment] = {}
         self._rig: Rig | None = None
         self._settings = SolveSettings()
         self._job: Job | None = None
         panel.compare_requested.connect(self._start)
         panel.compare_cancelled.connect(self._give_up)
 
-    def use(self, alignments: Sequence[Alignment], rig: Rig, settings: SolveSettings) -> None:
+    def use(self, alignments: Mapping[int, Alignment], rig: Rig, settings: SolveSettings) -> None:
         """Compare these from now on."""
         self._alignments, self._rig, self._settings = alignments, rig, settings
 
@@ -53,9 +54,9 @@ class Comparison(QObject):
         alignments, rig = self._alignments, self._rig
         settings = replace(self._settings, method=method)
 
-        def work(report: Report, is_cancelled: IsCancelled) -> object:
+        def work(progress: Progress) -> object:
             assert rig is not None
-            return solve_session(alignments, rig, settings, report, is_cancelled)
+            return solve_session(alignments, rig, settings, progress)
 
         self._job = Job(work)
         self._job.succeeded.connect(self._panel.show_comparison)

@@ -17,7 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
-from handcal_gui.engine.engine_thread import Command, Stream
+from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.steps import Action, Step, Wizard
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.window import MainWindow, Panel
@@ -33,8 +33,8 @@ _PANELS_OF_STEPS = {
 _RECORD = "record the trial"
 
 
-class Live(QObject):
-    """Connects a stream with the window while a wearer is calibrated; one after the other.
+class CalibrationController(QObject):
+    """Connects a engine with the window while a wearer is calibrated; one after the other.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Live(QObject):
         self._wizard_panel = wizard_panel
         self._comparison = comparison
         self._solve_settings = SolveSettings()
-        self._stream: Stream | None = None
+        self._engine: EngineThread | None = None
         self._is_broken = False
         self._snapshot: Snapshot | None = None
         self._is_watching = False
@@ -92,29 +92,29 @@ class Live(QObject):
         self._is_watching = self._is_broken = False
         self._doing = self._shown = 0
         self._wizard_panel.start(Wizard(plan))
-        self._stream = Stream(open_station, self)
-        self._stream.opened.connect(self._take_station)
-        self._stream.obeyed.connect(self._take_answer)
-        self._stream.failed.connect(self._take_failure)
-        self._stream.ended.connect(self._take_end)
-        self._stream.start()
+        self._engine = EngineThread(open_station, self)
+        self._engine.opened.connect(self._on_opened)
+        self._engine.command_done.connect(self._on_command_done)
+        self._engine.failed.connect(self._on_command_failed)
+        self._engine.ended.connect(self._on_ended)
+        self._engine.start()
 
     def cancel(self) -> None:
         """Give up opening the station, without waiting; `ended` tells when it is closed again."""
-        if self._stream is not None:
-            self._stream.opened.disconnect(self._take_station)
-            self._stream.give_up()
+        if self._engine is not None:
+            self._engine.opened.disconnect(self._on_opened)
+            self._engine.request_stop()
 
     def stop(self) -> None:
         """End the calibration and wait for it; safe to call twice."""
         self._comparison.cancel()
-        stream = self._stream
-        if stream is not None:
+        engine = self._engine
+        if engine is not None:
             self._window.panels.fine_tune.settle()
             self._window.panels.session.flush()
-            stream.close()
-            stream.deleteLater()
-        self._stream = None
+            engine.close()
+            engine.deleteLater()
+        self._engine = None
         self._timer.stop()
         self._snapshot = None
         self._window.banner.show_condition("")
@@ -126,9 +126,9 @@ class Live(QObject):
         elif action is Action.NEXT_WEARER:
             self.next_wearer_requested.emit()
         elif self._snapshot is not None and self._shown >= self._doing:
-            self._go_on(action, self._snapshot)
+            self._perform(action, self._snapshot)
 
-    def _go_on(self, action: Action, snapshot: Snapshot) -> None:
+    def _perform(self, action: Action, snapshot: Snapshot) -> None:
         eyes = self._wizard_panel.wizard.eyes(snapshot)
         commands: dict[Action, Callable[[Calibration], object]] = {
             Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
@@ -140,7 +140,7 @@ class Live(QObject):
         if action in commands:
             self._doing = self._calibrate(action.value, commands[action])
         elif action is Action.FINISH:
-            self._doing = self._ask(action.value, Station.finish)
+            self._doing = self._submit(action.value, Station.finish)
         else:
             self._wizard_panel.wizard.move(action, snapshot)
             self._wizard_panel.show_snapshot(snapshot)
@@ -157,7 +157,7 @@ class Live(QObject):
         self._connect_fine_tuning()
         self._connect_session()
         panels.link.restart_headset_requested.connect(
-            lambda: self._ask("restart the headset", Station.restart_headset)
+            lambda: self._submit("restart the headset", Station.restart_headset)
         )
 
     def _connect_fine_tuning(self) -> None:
@@ -171,43 +171,35 @@ class Live(QObject):
         # What is shown for a comparison only is not the φ that a trial is about.
         trials.trial_requested.connect(fine_tune.settle)
         trials.trial_requested.connect(
-            lambda eye, depth_m: self._ask(_RECORD, lambda s: s.save_trial(eye, depth_m))
+            lambda eye, depth_m: self._submit(_RECORD, lambda s: s.save_trial(eye, depth_m))
         )
         trials.show_target_requested.connect(
-            lambda eye, depth_m: self._ask("show the target", lambda s: s.show_target(eye, depth_m))
+            lambda eye, depth_m: self._submit(
+                "show the target", lambda s: s.show_target(eye, depth_m)
+            )
         )
         trials.hide_target_requested.connect(
-            lambda: self._ask("take the target away", Station.hide_target)
+            lambda: self._submit("take the target away", Station.hide_target)
         )
-        trials.doubted.connect(partial(self._take_failure, _RECORD))
+        trials.doubted.connect(partial(self._on_command_failed, _RECORD))
 
     def _connect_session(self) -> None:
         session, trials = self._window.panels.session, self._window.panels.trials
-        session.delete_alignment_requested.connect(
-            lambda number: self._calibrate(
-                "delete the alignment", lambda c: c.delete_alignment(number)
-            )
-        )
-        session.restore_alignment_requested.connect(
-            lambda number: self._calibrate(
-                "restore the alignment", lambda c: c.restore_alignment(number)
-            )
-        )
         for panel in (session, trials):
-            panel.delete_trial_requested.connect(
-                lambda number: self._ask(
-                    "delete the trial", lambda s: s.session.delete_trial(number)
+            panel.delete_requested.connect(
+                lambda kind, number: self._submit(
+                    f"delete the {kind}", lambda s: s.delete(kind, number)
                 )
             )
-            panel.restore_trial_requested.connect(
-                lambda number: self._ask(
-                    "restore the trial", lambda s: s.session.restore_trial(number)
+            panel.restore_requested.connect(
+                lambda kind, number: self._submit(
+                    f"restore the {kind}", lambda s: s.restore(kind, number)
                 )
             )
         session.notes_changed.connect(self._save_notes)
 
-    def _ask(self, name: str, command: Command) -> int:
-        return self._stream.ask(name, command) if self._stream is not None else 0
+    def _submit(self, name: str, command: Command) -> int:
+        return self._engine.submit(name, command) if self._engine is not None else 0
 
     def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> int:
         """Ask the procedure; what it cannot write, it keeps, and the station tells of that."""
@@ -216,10 +208,10 @@ class Live(QObject):
             with suppress(FileError):
                 command(station.calibration)
 
-        return self._ask(name, obey)
+        return self._submit(name, obey)
 
     def _poll(self) -> None:
-        snapshot, shown = self._stream.newest() if self._stream is not None else (None, 0)
+        snapshot, shown = self._engine.newest() if self._engine is not None else (None, 0)
         if snapshot is None or snapshot is self._snapshot:
             return
         self._shown = shown
@@ -257,9 +249,9 @@ class Live(QObject):
         """Have the wearer's views rendered only while they are seen."""
         if wanted != self._is_watching:
             self._is_watching = wanted
-            self._ask("watch", lambda station: setattr(station, "watch_views", wanted))
+            self._submit("watch", lambda station: setattr(station, "watch_views", wanted))
 
-    def _take_station(self, station: Station) -> None:
+    def _on_opened(self, station: Station) -> None:
         panels = self._window.panels
         self._solve_settings = station.settings.calibration.solve
         host, port = station.address
@@ -275,12 +267,12 @@ class Live(QObject):
         self._timer.start()
         self.opened.emit(station.session.path)
 
-    def _take_answer(self, name: str, _answer: object) -> None:
+    def _on_command_done(self, name: str, _answer: object) -> None:
         # One thing that the wizard offers done makes up for another that could not be.
         if name == self._complained_of or {name, self._complained_of} <= set(Action):
             self._window.banner.clear()
 
-    def _take_failure(self, name: str, why: str) -> None:
+    def _on_command_failed(self, name: str, why: str) -> None:
         self._complained_of = name
         self._window.banner.show_message(f"Could not {name}: {why}")
 
@@ -290,9 +282,9 @@ class Live(QObject):
             with suppress(FileError), Session(self._snapshot.session_path) as session:
                 session.save_notes(text)
         else:
-            self._ask("save the notes", lambda station: station.session.save_notes(text))
+            self._submit("save the notes", lambda station: station.session.save_notes(text))
 
-    def _take_end(self, why: str) -> None:
+    def _on_ended(self, why: str) -> None:
         self._timer.stop()
         self._is_broken = bool(why)
         self._window.panels.session.flush()  # what was typed in the last moment

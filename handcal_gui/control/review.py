@@ -8,11 +8,12 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
+from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal_gui.control.compare import Comparison
-from handcal_gui.engine.jobs import IsCancelled, Job, Report
+from handcal_gui.engine.jobs import Job
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.window import MainWindow
 
@@ -26,7 +27,7 @@ class _Stored:
     results: Results | None
 
 
-class Review(QObject):
+class ReviewController(QObject):
     """Opens one stored session after the other, read-only.
 
     Parameters
@@ -60,10 +61,10 @@ class Review(QObject):
         """Read and solve a session, then show it."""
         self.close()
 
-        def work(report: Report, is_cancelled: IsCancelled) -> _Stored:
+        def work(progress: Progress) -> _Stored:
             record = Session.open(path)
             settings = stored_solve_settings(record)
-            results = solve_again(record, settings, report, is_cancelled)
+            results = solve_again(record, settings, progress)
             return _Stored(record, settings, results)
 
         self._job = Job(work)
@@ -106,15 +107,14 @@ class Review(QObject):
         panels = self._window.panels
         note = "" if stored.results else "It holds no alignment yet."
         self._page.show_session(record, stored.results, note)
-        numbered = dict(zip(record.alignment_numbers, record.alignments, strict=True))
-        panels.results.show_results(stored.results, numbered, record.rig)
+        panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
         if stored.results is not None:
-            last = record.alignments[-1]
-            residuals_m = stored.results.alignments[-1][last.eyes[0]].residuals_m
+            number, last = list(record.alignments.items())[-1]
+            residuals_m = stored.results.alignments[number][last.eyes[0]].residuals_m
             panels.cloud.show_alignment(last, residuals_m)
             self._comparison.use(record.alignments, record.rig, stored.settings)
         self._window.show_page("review")

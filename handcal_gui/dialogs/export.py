@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from handcal.export.export import ExportSettings, export_session
+from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
@@ -83,8 +83,8 @@ class ExportDialog(QDialog):
         self.remembered.emit(settings, self._choices.folder)
         export, record = self._export_session, self._record
 
-        def work(report: Any, is_cancelled: Any) -> object:
-            return export(record, target, settings, report, is_cancelled)
+        def work(progress: Progress) -> object:
+            return export(record, target, settings, progress)
 
         self._progress.begin()
         self._pages.setCurrentWidget(self._progress)

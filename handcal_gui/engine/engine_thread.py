@@ -19,7 +19,7 @@ _LOG = logging.getLogger(__name__)
 Command = Callable[[Station], object]
 
 
-class Stream(Worker):
+class EngineThread(Worker):
     """Runs a station in a thread until closed.
 
     Snapshots wait in a place for one: whoever polls gets the newest and never an old one, however
@@ -34,7 +34,7 @@ class Stream(Worker):
     ----------
     opened : Signal(Station)
         The station runs. Only its constants may be read in other threads.
-    obeyed : Signal(str, object)
+    command_done : Signal(str, object)
         A command is done: its name and what it returned.
     failed : Signal(str, str)
         A command failed: its name and why, for a person to read.
@@ -43,7 +43,7 @@ class Stream(Worker):
     """
 
     opened = Signal(object)
-    obeyed = Signal(str, object)
+    command_done = Signal(str, object)
     failed = Signal(str, str)
     ended = Signal(str)
 
@@ -59,7 +59,7 @@ class Stream(Worker):
         """Return the newest snapshot, None before the first, and how many commands it shows."""
         return self._newest
 
-    def ask(self, name: str, command: Command) -> int:
+    def submit(self, name: str, command: Command) -> int:
         """Have the engine's thread call `command` with the station, before its next frame.
 
         Returns
@@ -71,47 +71,47 @@ class Stream(Worker):
         self._asked += 1
         return self._asked
 
-    def give_up(self) -> None:
+    def request_stop(self) -> None:
         """End the thread without waiting for it; `ended` tells when it has."""
         self._closing.set()
 
     def close(self) -> None:
         """End the thread and close the station, and hear the last of it; safe to call twice."""
-        self.give_up()
+        self.request_stop()
         self.wait()
-        self._hear_all()
+        self._deliver_pending()
 
     def _run(self) -> None:
         why = ""
         try:
             with self._open_station() as station:
                 if not self._closing.is_set():
-                    self._say(self.opened.emit, station)
+                    self._emit_later(self.opened.emit, station)
                 try:
                     while not self._closing.is_set():
                         self._newest = station.step(), self._done
-                        self._obey(station)
+                        self._run_commands(station)
                 finally:
-                    self._obey(station)  # what was asked for just before the end, such as notes
+                    self._run_commands(station)  # those submitted last, such as saving notes
         except HandcalError as error:
             why = str(error)
         except Exception as error:
             _LOG.exception("the engine broke down")
-            why = f"handcal broke down ({_told(error)}); the session is kept"
-        self._say(self.ended.emit, why)
+            why = f"handcal broke down ({_describe(error)}); the session is kept"
+        self._emit_later(self.ended.emit, why)
 
-    def _obey(self, station: Station) -> None:
+    def _run_commands(self, station: Station) -> None:
         while not self._commands.empty():
             name, command = self._commands.get()
             try:
-                self._say(self.obeyed.emit, name, command(station))
+                self._emit_later(self.command_done.emit, name, command(station))
             except (HandcalError, ValueError) as error:
-                self._say(self.failed.emit, name, str(error))
+                self._emit_later(self.failed.emit, name, str(error))
             except Exception as error:
                 _LOG.exception("a command broke down: %s", name)
-                self._say(self.failed.emit, name, _told(error))
+                self._emit_later(self.failed.emit, name, _describe(error))
             self._done += 1
 
 
-def _told(error: Exception) -> str:
+def _describe(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"

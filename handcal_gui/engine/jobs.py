@@ -9,13 +9,15 @@ from collections.abc import Callable
 from PySide6.QtCore import Signal
 
 from handcal.errors import CancelledError, HandcalError
+from handcal.progress import Progress
 from handcal_gui.engine.worker import Worker
 
 _LOG = logging.getLogger(__name__)
+_STEPS = 1000
 
-Report = Callable[[str, float], None]
+Report = Callable[[str, float], object]
 IsCancelled = Callable[[], bool]
-Work = Callable[[Report, IsCancelled], object]
+Work = Callable[[Progress], object]
 
 
 class Job(Worker):
@@ -24,8 +26,7 @@ class Job(Worker):
     Parameters
     ----------
     work : callable
-        Given `report`, to be told what is going on and which share is done, and `is_cancelled`, to
-        be asked often; raises CancelledError when it stops early.
+        Given the job's progress, to report to often; raises CancelledError if it was cancelled.
 
     Attributes
     ----------
@@ -47,6 +48,7 @@ class Job(Worker):
         super().__init__("handcal job")
         self._work = work
         self._cancelled = threading.Event()
+        self._reported = "", -1
 
     def cancel(self) -> None:
         """Ask the work to stop; it says so by `cancelled`, unless it comes to its end first."""
@@ -56,20 +58,25 @@ class Job(Worker):
         """Have the work stop, and wait for it; nothing more is heard of it."""
         self.cancel()
         self.wait()
-        self._forget_all()
+        self._discard_pending()
 
     def _run(self) -> None:
         try:
-            done = self._work(self._report, self._cancelled.is_set)
+            done = self._work(Progress(self._report, self._cancelled.is_set))
         except CancelledError:
-            self._say(self.cancelled.emit)
+            self._emit_later(self.cancelled.emit)
         except HandcalError as error:
-            self._say(self.failed.emit, str(error))
+            self._emit_later(self.failed.emit, str(error))
         except Exception as error:
             _LOG.exception("a job broke down")
-            self._say(self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})")
+            self._emit_later(
+                self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})"
+            )
         else:
-            self._say(self.succeeded.emit, done)
+            self._emit_later(self.succeeded.emit, done)
 
     def _report(self, doing: str, share: float) -> None:
-        self._say(self.progressed.emit, doing, share)
+        """Emit the progress if it has changed visibly, as signals from a thread queue up."""
+        if self._reported != (doing, int(_STEPS * share)):
+            self._reported = doing, int(_STEPS * share)
+            self._emit_later(self.progressed.emit, doing, share)

@@ -52,7 +52,7 @@ class LatestJob(QObject):
     def _start(self) -> None:
         question = self._next.pop()
         self._question = question
-        self._job = Job(lambda _report, _is_cancelled: self._work(question))
+        self._job = Job(lambda _progress: self._work(question))
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
         self._job.start()

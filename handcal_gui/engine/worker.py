@@ -21,11 +21,11 @@ class Worker(QObject):
     parent : QObject, optional
     """
 
-    _said = Signal(object)
+    _posted = Signal(object)
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._said.connect(self._hear)
+        self._posted.connect(self._deliver)
         self._thread = threading.Thread(target=self._run, name=name)
 
     def start(self) -> None:
@@ -41,18 +41,18 @@ class Worker(QObject):
         """Do the work, in the thread."""
         raise NotImplementedError
 
-    def _say(self, emit: Callable[..., None], *what: object) -> None:
+    def _emit_later(self, emit: Callable[..., None], *what: object) -> None:
         """Have a signal emitted in the window's thread."""
-        self._said.emit((emit, what))
+        self._posted.emit((emit, what))
 
-    def _hear_all(self) -> None:
+    def _deliver_pending(self) -> None:
         """Emit at once what waits to be."""
         QCoreApplication.sendPostedEvents(self, QEvent.Type.MetaCall.value)
 
-    def _forget_all(self) -> None:
+    def _discard_pending(self) -> None:
         """Never emit what waits to be."""
         QCoreApplication.removePostedEvents(self, QEvent.Type.MetaCall.value)
 
-    def _hear(self, said: tuple[Callable[..., None], tuple[object, ...]]) -> None:
+    def _deliver(self, said: tuple[Callable[..., None], tuple[object, ...]]) -> None:
         emit, what = said
         emit(*what)

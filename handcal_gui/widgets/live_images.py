@@ -48,7 +48,7 @@ class LiveImages(Worker):
         """Close the cameras, and wait for that; nothing more is heard."""
         self._stopped.set()
         self.wait()
-        self._forget_all()
+        self._discard_pending()
 
     def _run(self) -> None:
         try:
@@ -60,7 +60,9 @@ class LiveImages(Worker):
                     except CameraTimeoutError:
                         continue
         except HandcalError as error:
-            self._say(self.failed.emit, str(error))
+            self._emit_later(self.failed.emit, str(error))
         except Exception as error:
             _LOG.exception("live images broke down")
-            self._say(self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})")
+            self._emit_later(
+                self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})"
+            )

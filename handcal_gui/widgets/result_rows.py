@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from handcal.register.results import Results
@@ -134,11 +134,11 @@ def eye_distance_text(results: Results) -> str:
     return NOTHING if distance_m is None else f"{1e3 * distance_m:.1f} mm"
 
 
-def alignment_rows(results: Results, names: Sequence[str], rig: Rig) -> list[Row]:
+def alignment_rows(results: Results, rig: Rig) -> list[Row]:
     """Return each alignment's φ by itself, one row for each eye."""
     return [
-        Row(f"{name} {eye}", tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
-        for name, shifts in zip(names, results.alignments, strict=True)
+        Row(f"{number} {eye}", tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
+        for number, shifts in results.alignments.items()
         for eye, shift in shifts.items()
     ]
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 import numpy as np
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal.session.state import SessionEvent
+from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import ErrorStatistics, TrialStatistics
 from handcal.types import EYES, Eye, EyeShift
 from handcal_gui.widgets.number_table import Row
@@ -19,8 +18,6 @@ from handcal_gui.widgets.numbers import signed
 from handcal_gui.widgets.record_table import Column
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
-
-Kind: TypeAlias = Literal["alignment", "trial"]
 
 _PHI = (
     "φ1, φ2 and φ3 of the {} from this alignment alone: how far the eye lies to the right of,\n"
@@ -83,17 +80,16 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
     ----------
     record : SessionRecord
     results : Results or None
-        Those of all the record's alignments; left out if there are more or fewer.
+        Those of all the record's alignments; left out if they are of others.
     """
-    solved = results.alignments if results else ()
-    if len(solved) != len(record.alignments):
-        solved = ({},) * len(record.alignments)
+    solved = results.alignments if results else {}
+    if set(solved) != set(record.alignments):
+        solved = {}
     saved = SessionEvent.ALIGNMENT_SAVED
     times = {event.data["number"]: event.time for event in record.events if event.name == saved}
     rows = {}
-    for number, alignment, shifts in zip(
-        record.alignment_numbers, record.alignments, solved, strict=True
-    ):
+    for number, alignment in record.alignments.items():
+        shifts = solved.get(number, {})
         angle_deg = np.degrees(np.linalg.norm(alignment.rotation_rad))
         alone = [shifts[eye] for eye in EYES if eye in shifts]
         rms = [f"{1e3 * shift.rms_m:.2f}" for shift in alone]
@@ -112,7 +108,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
 
 def trials_id(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
     """Return what tells trials from others: a number is never given twice."""
-    return record.path, record.trial_numbers
+    return record.path, tuple(record.trials)
 
 
 def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:
@@ -126,7 +122,7 @@ def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:
             f"{trial.error_arcmin.mean():.1f}",
             local_time(trial.time, _CLOCK),
         )
-        for number, trial in zip(record.trial_numbers, record.trials, strict=True)
+        for number, trial in record.trials.items()
     }
 
 

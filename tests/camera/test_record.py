@@ -15,6 +15,7 @@ from handcal.camera.record import Recorded, RecordSettings, record
 from handcal.camera.recordings import open_recording
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
 from handcal.io.closable import Closable
+from handcal.progress import Progress
 from handcal.types import Frame, Intrinsics
 
 CAMERA = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)
@@ -57,7 +58,10 @@ def run(
     """Record a script; return what is said of it, what plays back, and the shares reported."""
     shares: list[float] = []
     recorded = record(
-        Scripted(script), path, settings, lambda _, share: shares.append(share), is_stopped
+        Scripted(script),
+        path,
+        settings,
+        Progress(lambda _, share: shares.append(share), is_stopped),
     )
     with open_recording(path) as camera:
         frames = [camera.read() for _ in range(recorded.frames)]

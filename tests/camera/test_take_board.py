@@ -14,9 +14,9 @@ from handcal.camera.take_board import (
     DEPTH_TO_COLOR,
     IMAGER,
     TakeSettings,
+    capture_views,
     keep_imager,
     keep_images,
-    take_views,
 )
 from handcal.camera.viewpoint import open_viewpoint
 from handcal.cli.main import main
@@ -24,6 +24,7 @@ from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.geometry import interpolate_pose, rigid
 from handcal.io.closable import Closable
 from handcal.io.images import read_image
+from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal.rig.formats import read_intrinsics, read_pose
@@ -63,8 +64,12 @@ def test_each_rest_is_kept_once_and_in_pairs(videos: tuple[Path, Path], tmp_path
     folders = tmp_path / "depth", tmp_path / "headset"
     told: list[float] = []
     with open_viewpoint(videos[0]) as depth, open_viewpoint(videos[1]) as headset:
-        taken = take_views(
-            (depth, headset), folders, BOARD, TakeSettings(), lambda _, share: told.append(share)
+        taken = capture_views(
+            (depth, headset),
+            folders,
+            BOARD,
+            TakeSettings(),
+            Progress(lambda _, share: told.append(share)),
         )
     assert taken.kept == RESTS
     assert taken.looked_at == RESTS * (FRAMES_EACH + 1) - 1
@@ -81,7 +86,7 @@ def test_no_more_are_taken_than_asked_for(videos: tuple[Path, Path], tmp_path: P
     settings = TakeSettings(choose=ChooseSettings(most=2, apart_share=0.0))
     for _ in range(2):  # what is there stays
         with open_viewpoint(videos[0]) as camera:
-            taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
+            taken = capture_views((camera,), (tmp_path / "a",), BOARD, settings)
         assert taken.kept == 2
     names = [path.name for path in sorted((tmp_path / "a").iterdir())]
     assert names == [f"a-00{number}.png" for number in (1, 2, 3, 4)]
@@ -90,11 +95,17 @@ def test_no_more_are_taken_than_asked_for(videos: tuple[Path, Path], tmp_path: P
 def test_it_ends_when_time_is_up_or_when_stopped(videos: tuple[Path, Path], tmp_path: Path) -> None:
     with open_viewpoint(videos[0]) as camera:
         settings = TakeSettings(seconds=0.35)
-        taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
+        taken = capture_views((camera,), (tmp_path / "a",), BOARD, settings)
     assert (taken.kept, taken.looked_at) == (1, 4)
     with open_viewpoint(videos[0]) as camera:
-        taken = take_views(
-            *((camera,), (tmp_path / "b",), BOARD, TakeSettings(), lambda *_: None, lambda: True)
+        taken = capture_views(
+            *(
+                (camera,),
+                (tmp_path / "b",),
+                BOARD,
+                TakeSettings(),
+                Progress(is_cancelled=lambda: True),
+            )
         )
     assert taken.looked_at == 0
 
@@ -132,7 +143,7 @@ class LateCamera(Closable):
 def test_a_camera_that_falls_silent_is_told(tmp_path: Path) -> None:
     camera = LateCamera(2)
     with pytest.raises(CameraTimeoutError, match="no frame for 1 s"):
-        take_views((camera,), (tmp_path / "a",), BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
+        capture_views((camera,), (tmp_path / "a",), BOARD, TakeSettings())  # type: ignore[arg-type]
     assert camera.left < 1000  # after its first image
 
 
@@ -169,7 +180,7 @@ def test_cameras_of_different_paces_stay_together(
     monkeypatch.setattr("handcal.camera.take_board.see_board", look)
     cameras = [PacedCamera(pace_ms) for pace_ms in paces_ms]
     folders = tmp_path / "depth", tmp_path / "headset"
-    take_views(cameras, folders, BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
+    capture_views(cameras, folders, BOARD, TakeSettings())  # type: ignore[arg-type]
     assert len(apart_ms) == 11
     assert max(apart_ms) <= 20
 

@@ -290,7 +290,7 @@ def test_misuse_is_one_line_and_exit_code_2(
     ("line", "problem"),
     [
         ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
-        ("solve nowhere", "nowhere is no session"),
+        ("solve nowhere", "nowhere is not a session"),
         ("replay nowhere.db3", "there is no recording nowhere.db3"),
         ("replay text.txt", "text.txt is not a recording"),
         ("demo --rig nowhere.yaml --output out", "cannot read nowhere.yaml"),
@@ -394,7 +394,7 @@ def test_the_program_itself_ends_with_one_line(tmp_path: Path) -> None:
     assert program is not None, "install the project, which brings the command"
     ended = subprocess.run([program, "solve", tmp_path], capture_output=True, text=True)
     assert ended.returncode == 1
-    assert ended.stderr.startswith(f"handcal: {tmp_path} is no session")
+    assert ended.stderr.startswith(f"handcal: {tmp_path} is not a session")
     assert ended.stderr.count("\n") == 1
     assert ended.stdout == ""
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from handcal.export.outcome import Outcome, conclude
+from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.io.settings import settings_json
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import Z_E_S_M, example_rig
@@ -46,7 +46,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
         kept = [make_alignment(1, EYES), make_alignment(2, ("left",))]
         session.save_alignment(kept[0])
         session.save_alignment(make_alignment(3, EYES))
-        session.delete_alignment(2)
+        session.delete("alignment", 2)
         session.save_alignment(kept[1])
         session.record("refused", reason="turned", angle_deg=12.0)
         results = solve_session(kept, RIG, SolveSettings())
@@ -72,5 +72,5 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
 
 
 @pytest.fixture(scope="session")
-def outcome(record: SessionRecord) -> Outcome:
-    return conclude(record)
+def outcome(record: SessionRecord) -> SessionOutcome:
+    return load_outcome(record)

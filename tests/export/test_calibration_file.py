@@ -12,12 +12,12 @@ import pytest
 
 from handcal.conventions import opengl_projection, openxr_view, unity_world_to_camera
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
-from handcal.export.outcome import Origin, Outcome, conclude
+from handcal.export.outcome import Origin, SessionOutcome, load_outcome
 from handcal.session.session import SessionRecord
 from handcal.types import EYES, Eye, Rig
 
 
-def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: Outcome) -> None:
+def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: SessionOutcome) -> None:
     path = tmp_path / "calibration.yaml"
     write_calibration_yaml(path, outcome)
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
@@ -41,7 +41,7 @@ def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: Outcome) -
     assert storage.getNode("right").getNode("fine_tuned_shift_m").empty()
 
 
-def test_what_is_not_printable_is_replaced(tmp_path: Path, outcome: Outcome) -> None:
+def test_what_is_not_printable_is_replaced(tmp_path: Path, outcome: SessionOutcome) -> None:
     hostile = 'a"\n\x00\ud800' + "b" * 10_000
     named = replace(outcome, record=replace(outcome.record, wearer=hostile))
     write_calibration_yaml(tmp_path / "c.yaml", named)
@@ -51,7 +51,7 @@ def test_what_is_not_printable_is_replaced(tmp_path: Path, outcome: Outcome) -> 
 
 
 @pytest.mark.parametrize("wearer", ["", "true", '"\\', "a: b # c", "../../x", "µ Ω", "x" * 1000])
-def test_any_name_comes_back(tmp_path: Path, outcome: Outcome, wearer: str) -> None:
+def test_any_name_comes_back(tmp_path: Path, outcome: SessionOutcome, wearer: str) -> None:
     named = replace(outcome, record=replace(outcome.record, wearer=wearer))
     write_calibration_yaml(tmp_path / "c.yaml", named)
     storage = cv2.FileStorage(str(tmp_path / "c.yaml"), cv2.FILE_STORAGE_READ)
@@ -61,7 +61,9 @@ def test_any_name_comes_back(tmp_path: Path, outcome: Outcome, wearer: str) -> N
     assert json.loads((tmp_path / "c.json").read_text())["wearer"] == wearer
 
 
-def test_json_holds_every_origin_in_every_convention(tmp_path: Path, outcome: Outcome) -> None:
+def test_json_holds_every_origin_in_every_convention(
+    tmp_path: Path, outcome: SessionOutcome
+) -> None:
     write_calibration_json(tmp_path / "c.json", outcome, 0.2, 50.0)
     data = json.loads((tmp_path / "c.json").read_text())
     assert (data["near_m"], data["far_m"], data["alignments"]) == (0.2, 50.0, 2)
@@ -86,7 +88,7 @@ def test_json_holds_every_origin_in_every_convention(tmp_path: Path, outcome: Ou
 
 
 def test_a_point_lands_on_the_same_pixel_by_opencv_and_by_opengl(
-    tmp_path: Path, outcome: Outcome
+    tmp_path: Path, outcome: SessionOutcome
 ) -> None:
     write_calibration_json(tmp_path / "c.json", outcome, 0.1, 100.0)
     found = json.loads((tmp_path / "c.json").read_text())["eyes"]["left"]
@@ -107,7 +109,7 @@ def test_what_openxr_cannot_express_is_null_with_the_reason(
     skewed = np.array([[1.0, 0.01, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     eyes = {eye: replace(display, H0=skewed) for eye, display in record.rig.eyes.items()}
     rig = Rig("skewed", eyes, record.rig.T_H_D, record.rig.depth_intrinsics)
-    write_calibration_json(tmp_path / "c.json", conclude(replace(record, rig=rig)), 0.1, 10.0)
+    write_calibration_json(tmp_path / "c.json", load_outcome(replace(record, rig=rig)), 0.1, 10.0)
     each = json.loads((tmp_path / "c.json").read_text())["eyes"]["right"]["calibrations"]["solved"]
     assert each["openxr"] is None
     assert "skew" in each["openxr_reason"]
@@ -116,7 +118,7 @@ def test_what_openxr_cannot_express_is_null_with_the_reason(
 def test_without_alignments_it_is_the_offline_calibration(
     tmp_path: Path, empty: SessionRecord
 ) -> None:
-    outcome = conclude(empty)
+    outcome = load_outcome(empty)
     write_calibration_json(tmp_path / "c.json", outcome, 0.1, 10.0)
     write_calibration_yaml(tmp_path / "c.yaml", outcome)
     data = json.loads((tmp_path / "c.json").read_text())

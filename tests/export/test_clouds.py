@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.export.clouds import write_clouds
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
+from handcal.progress import Progress
 
 KINDS = {"double": "<f8", "uchar": "u1"}
 
@@ -20,17 +21,17 @@ def read(path: Path) -> NDArray[Any]:
     return np.frombuffer(body, [(name, KINDS[kind]) for kind, name in fields])
 
 
-def test_clouds_and_residuals_come_back(tmp_path: Path, outcome: Outcome) -> None:
+def test_clouds_and_residuals_come_back(tmp_path: Path, outcome: SessionOutcome) -> None:
     shares: list[float] = []
-    write_clouds(tmp_path / "clouds", outcome, shares.append)
+    write_clouds(tmp_path / "clouds", outcome, Progress(lambda _what, share: shares.append(share)))
     assert shares == [0.0, 0.5]
     assert sorted(path.name for path in (tmp_path / "clouds").iterdir()) == [
         f"alignment-{number}-{which}.ply" for number in (1, 3) for which in ("cursor", "hand")
     ]
     assert outcome.results is not None
-    for number, alignment, shifts in zip(
-        (1, 3), outcome.record.alignments, outcome.results.alignments, strict=True
-    ):
+    assert list(outcome.record.alignments) == list(outcome.results.alignments) == [1, 3]
+    for number, alignment in outcome.record.alignments.items():
+        shifts = outcome.results.alignments[number]
         cursor = read(tmp_path / "clouds" / f"alignment-{number}-cursor.ply")
         hand = read(tmp_path / "clouds" / f"alignment-{number}-hand.ply")
         for points, expected_m in ((cursor, alignment.cursor_m), (hand, alignment.hand_m)):

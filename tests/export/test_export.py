@@ -19,6 +19,7 @@ from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.formats import FORMATS, Format
 from handcal.io.settings import read_settings, settings_json
+from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 
 resource = pytest.importorskip("resource")
@@ -57,6 +58,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from handcal.export.export import ExportSettings, export_session
+from handcal.progress import Progress
 from handcal.session.session import Session
 
 def report(what, share):
@@ -64,16 +66,8 @@ def report(what, share):
         os.kill(os.getpid(), signal.SIGKILL)
 
 settings = ExportSettings(("csv", "yaml", "json", "ply", "zip"))
-export_session(Session.open(Path(sys.argv[1])), Path(sys.argv[2]), settings, report, lambda: False)
+export_session(Session.open(Path(sys.argv[1])), Path(sys.argv[2]), settings, Progress(report))
 """
-
-
-def ignore(_what: str, _share: float) -> None:
-    """Go on."""
-
-
-def never() -> bool:
-    return False
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -93,7 +87,7 @@ def test_everything_is_exported_and_told(tmp_path: Path, record: SessionRecord) 
         return False
 
     files = export_session(
-        record, tmp_path / "out", ExportSettings(), lambda *step: told.append(step), ask
+        record, tmp_path / "out", ExportSettings(), Progress(lambda *step: told.append(step), ask)
     )
     assert {path.relative_to(tmp_path / "out").as_posix() for path in files} == ALL_FILES
     assert set(tree(tmp_path)) == {f"out/{name}" for name in ALL_FILES}
@@ -108,7 +102,7 @@ def test_everything_is_exported_and_told(tmp_path: Path, record: SessionRecord) 
 def test_a_format_writes_what_its_patterns_say(
     tmp_path: Path, record: SessionRecord, name: Format
 ) -> None:
-    files = export_session(record, tmp_path, ExportSettings((name,)), ignore, never)
+    files = export_session(record, tmp_path, ExportSettings((name,)))
     matched = [path for pattern in FORMATS[name].patterns for path in tmp_path.glob(pattern)]
     assert sorted(matched) == sorted(files)
     assert set(tree(tmp_path)) <= ALL_FILES
@@ -123,15 +117,15 @@ def test_giving_up_at_any_time_leaves_all_as_it_was(
     before = tree(tmp_path)
     for after in (0, 1, 2):
         for folder in (tmp_path / "old", tmp_path / "new"):
-            give_up = partial(next, iter([False] * after), True)
+            give_up = Progress(is_cancelled=partial(next, iter([False] * after), True))
             with pytest.raises(CancelledError, match="nothing has changed"):
-                export_session(record, folder, ExportSettings((name,)), ignore, give_up)
+                export_session(record, folder, ExportSettings((name,)), give_up)
     assert tree(tmp_path) == before
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
 
 
 def test_a_full_disk_leaves_all_as_it_was(tmp_path: Path, record: SessionRecord) -> None:
-    export_session(record, tmp_path / "out", ExportSettings(("csv",)), ignore, never)
+    export_session(record, tmp_path / "out", ExportSettings(("csv",)))
     before = tree(tmp_path)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
@@ -139,7 +133,7 @@ def test_a_full_disk_leaves_all_as_it_was(tmp_path: Path, record: SessionRecord)
         for name in ("ply", "zip"):
             settings = ExportSettings(("csv", name))
             with pytest.raises(FileError, match="cannot write"):
-                export_session(record, tmp_path / "out", settings, ignore, never)
+                export_session(record, tmp_path / "out", settings)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert tree(tmp_path) == before
@@ -149,7 +143,7 @@ def test_a_killed_export_leaves_nothing_that_is_seen_and_the_next_cleans_up(
     tmp_path: Path, record: SessionRecord
 ) -> None:
     folder = tmp_path / "out"
-    export_session(record, folder, ExportSettings(("csv",)), ignore, never)
+    export_session(record, folder, ExportSettings(("csv",)))
     before = tree(folder)
     (tmp_path / "new").mkdir()
     for target in (folder, tmp_path / "new" / "one"):
@@ -162,16 +156,16 @@ def test_a_killed_export_leaves_nothing_that_is_seen_and_the_next_cleans_up(
     seen = {name: text for name, text in tree(folder).items() if not name.startswith(".")}
     assert seen == before
     assert all(path.name.startswith(".") for path in (tmp_path / "new").iterdir())
-    export_session(record, folder, ExportSettings(("json",)), ignore, never)
+    export_session(record, folder, ExportSettings(("json",)))
     assert set(tree(folder)) == {*before, "calibration.json"}
 
 
 def test_a_new_export_replaces_the_old_one_of_its_formats(
     tmp_path: Path, record: SessionRecord
 ) -> None:
-    export_session(record, tmp_path, ExportSettings(("csv", "ply")), ignore, never)
-    fewer = replace(record, alignments=record.alignments[:1], alignment_numbers=(1,))
-    export_session(fewer, tmp_path, ExportSettings(("ply",)), ignore, never)
+    export_session(record, tmp_path, ExportSettings(("csv", "ply")))
+    fewer = replace(record, alignments={1: record.alignments[1]})
+    export_session(fewer, tmp_path, ExportSettings(("ply",)))
     assert set(tree(tmp_path)) == {
         "clouds/alignment-1-cursor.ply",
         "clouds/alignment-1-hand.ply",
@@ -181,22 +175,22 @@ def test_a_new_export_replaces_the_old_one_of_its_formats(
 
 
 def test_a_session_without_alignments_is_exported_too(tmp_path: Path, empty: SessionRecord) -> None:
-    export_session(empty, tmp_path, ExportSettings(), ignore, never)
+    export_session(empty, tmp_path, ExportSettings())
     without = {name for name in ALL_FILES if not name.startswith(("clouds/", "figures/"))}
     assert set(tree(tmp_path)) == without
 
 
 def test_what_cannot_be_solved_is_not_exported(tmp_path: Path, record: SessionRecord) -> None:
-    bare = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
-    broken = replace(record, alignments=(bare,), alignment_numbers=(1,))
+    bare = replace(record.alignments[1], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
+    broken = replace(record, alignments={1: bare})
     with pytest.raises(FileError, match="cannot be solved"):
-        export_session(broken, tmp_path / "out", ExportSettings(), ignore, never)
+        export_session(broken, tmp_path / "out", ExportSettings())
     assert not list(tmp_path.iterdir())
 
 
 def test_the_session_itself_stays_as_it_is(tmp_path: Path, record: SessionRecord) -> None:
     before = tree(record.path)
-    export_session(record, tmp_path, ExportSettings(LIGHT), ignore, never)
+    export_session(record, tmp_path, ExportSettings(LIGHT))
     assert tree(record.path) == before
 
 

@@ -12,15 +12,15 @@ from handcal.export.figure_rows import (
     running_mean_rows,
 )
 from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
-from handcal.export.outcome import Outcome
+from handcal.export.outcome import SessionOutcome
 from handcal.export.report import session_report
 from handcal.geometry import transform
 
 
-def test_convergence_ends_at_what_was_solved(outcome: Outcome) -> None:
+def test_convergence_ends_at_what_was_solved(outcome: SessionOutcome) -> None:
     assert outcome.results is not None
-    rows = list(convergence_rows([1, 3], outcome.results))
-    for number, shifts in zip([1, 3], outcome.results.alignments, strict=True):
+    rows = list(convergence_rows(outcome.results))
+    for number, shifts in outcome.results.alignments.items():
         for eye, shift in shifts.items():
             found = [row for row in rows if (row["alignment"], row["eye"]) == (number, eye)]
             assert [row["iteration"] for row in found] == list(range(1, len(found) + 1))
@@ -30,9 +30,9 @@ def test_convergence_ends_at_what_was_solved(outcome: Outcome) -> None:
             )
 
 
-def test_residuals_are_the_means_of_the_points_in_each_cell(outcome: Outcome) -> None:
+def test_residuals_are_the_means_of_the_points_in_each_cell(outcome: SessionOutcome) -> None:
     assert outcome.results is not None
-    alignment, shift = outcome.record.alignments[0], outcome.results.alignments[0]["left"]
+    alignment, shift = outcome.record.alignments[1], outcome.results.alignments[1]["left"]
     cells = residual_cells(alignment, "left", shift)
     rows = list(residual_rows(1, {"left": cells}))
     hand_mm = 1e3 * transform(alignment.T_E_W["left"], alignment.hand_m)[:, :2]
@@ -56,24 +56,26 @@ def test_outlines_are_told_corner_by_corner() -> None:
     assert [[row["x_px"], row["y_px"]] for row in rows[:4]] == square.tolist()
 
 
-def test_the_outline_of_what_covers_part_of_the_display_surrounds_it(outcome: Outcome) -> None:
-    alignment, display = outcome.record.alignments[0], outcome.record.rig.eyes["left"]
+def test_the_outline_of_what_covers_part_of_the_display_surrounds_it(
+    outcome: SessionOutcome,
+) -> None:
+    alignment, display = outcome.record.alignments[1], outcome.record.rig.eyes["left"]
     found = overlay_outlines(display, alignment, "left", np.zeros(3))
     assert set(found) == {"hand", "cursor"}
     for outline in found["hand"] + found["cursor"]:
         np.testing.assert_array_equal(outline[0], outline[-1])
 
 
-def test_the_running_mean_is_of_each_eye_alone(outcome: Outcome) -> None:
+def test_the_running_mean_is_of_each_eye_alone(outcome: SessionOutcome) -> None:
     record = outcome.record
-    rows = list(running_mean_rows(record.trial_numbers, record.trials))
+    rows = list(running_mean_rows(record.trials))
     for eye in ("left", "right"):
-        means = [trial.error_arcmin.mean() for trial in record.trials if trial.eye == eye]
+        means = [trial.error_arcmin.mean() for trial in record.trials.values() if trial.eye == eye]
         found = [row["mean_so_far_arcmin"] for row in rows if row["eye"] == eye]
         np.testing.assert_allclose(np.array(found, dtype=float), np.cumsum(means) / [1, 2])
 
 
-def test_every_figure_of_the_report_has_its_numbers(outcome: Outcome) -> None:
+def test_every_figure_of_the_report_has_its_numbers(outcome: SessionOutcome) -> None:
     figures = {figure.name: figure for figure in session_report(outcome).figures}
     assert {name for name, figure in figures.items() if not figure.rows} <= {
         "overlay-left",  # too sparse clouds have no outline

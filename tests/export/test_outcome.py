@@ -9,17 +9,20 @@ import pytest
 
 from handcal.display import projection_matrix
 from handcal.errors import FileError
-from handcal.export.outcome import Outcome, conclude
+from handcal.export.outcome import SessionOutcome, load_outcome
+from handcal.progress import Progress
 from handcal.register.results import results_json
 from handcal.session.session import SessionRecord
 
 
-def test_the_session_is_solved_to_what_it_was(outcome: Outcome) -> None:
+def test_the_session_is_solved_to_what_it_was(outcome: SessionOutcome) -> None:
     assert outcome.results is not None
     assert results_json(outcome.results) == outcome.record.results
 
 
-def test_what_was_tuned_by_hand_is_final_and_what_was_solved_otherwise(outcome: Outcome) -> None:
+def test_what_was_tuned_by_hand_is_final_and_what_was_solved_otherwise(
+    outcome: SessionOutcome,
+) -> None:
     assert list(outcome.shifts_m["left"]) == ["fine_tuned", "solved", "offline"]
     assert list(outcome.shifts_m["right"]) == ["solved", "offline"]
     assert (outcome.final("left"), outcome.final("right")) == ("fine_tuned", "solved")
@@ -27,18 +30,18 @@ def test_what_was_tuned_by_hand_is_final_and_what_was_solved_otherwise(outcome: 
     np.testing.assert_allclose(moved_m, [0.001, 0.0, 0.0], atol=1e-15)
 
 
-def test_applied_is_what_the_headset_rendered_with_in_the_end(outcome: Outcome) -> None:
+def test_applied_is_what_the_headset_rendered_with_in_the_end(outcome: SessionOutcome) -> None:
     assert outcome.is_applied("left", "fine_tuned")
     assert not outcome.is_applied("left", "solved")
     assert outcome.is_applied("right", "solved")
     assert not outcome.is_applied("right", "offline")
-    never = conclude(replace(outcome.record, applied_shift_m={}, fine_tuned=None))
+    never = load_outcome(replace(outcome.record, applied_shift_m={}, fine_tuned=None))
     assert never.final("left") == "solved"
     assert not never.is_applied("left", "solved")
     assert never.is_applied("left", "offline")
 
 
-def test_projections_are_those_of_each_shift(outcome: Outcome) -> None:
+def test_projections_are_those_of_each_shift(outcome: SessionOutcome) -> None:
     display = outcome.record.rig.eyes["left"]
     for origin, shift_m in outcome.shifts_m["left"].items():
         projection = outcome.projection("left", origin)
@@ -47,7 +50,7 @@ def test_projections_are_those_of_each_shift(outcome: Outcome) -> None:
 
 
 def test_without_alignments_there_is_only_the_offline_calibration(empty: SessionRecord) -> None:
-    outcome = conclude(empty)
+    outcome = load_outcome(empty)
     assert outcome.results is None
     assert outcome.final("left") == "offline"
     assert outcome.is_applied("left", "offline")
@@ -55,11 +58,11 @@ def test_without_alignments_there_is_only_the_offline_calibration(empty: Session
 
 def test_it_tells_how_far_it_is(record: SessionRecord) -> None:
     shares: list[float] = []
-    conclude(record, shares.append)
+    load_outcome(record, Progress(lambda _what, share: shares.append(share)))
     assert shares == [0.0, 0.5]
 
 
 def test_what_cannot_be_solved_is_refused_in_one_line(record: SessionRecord) -> None:
-    few = replace(record.alignments[0], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
+    few = replace(record.alignments[1], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
     with pytest.raises(FileError, match=r"one cannot be solved: hand_m has 5 points"):
-        conclude(replace(record, alignments=(few,), alignment_numbers=(1,)))
+        load_outcome(replace(record, alignments={1: few}))

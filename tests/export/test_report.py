@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from handcal.errors import CancelledError
-from handcal.export.outcome import Outcome, conclude
+from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.pdf import compose, write_pdf
@@ -30,7 +30,7 @@ def ignore(_share: float) -> None:
 
 
 @pytest.fixture(scope="module")
-def pages(outcome: Outcome) -> list[Figure]:
+def pages(outcome: SessionOutcome) -> list[Figure]:
     return compose(session_report(outcome), ignore)
 
 
@@ -42,7 +42,7 @@ def mm(value_m: float) -> str:
     return f"{1e3 * value_m:.2f}".replace("-", "−")
 
 
-def test_it_says_what_was_found(pages: list[Figure], outcome: Outcome) -> None:
+def test_it_says_what_was_found(pages: list[Figure], outcome: SessionOutcome) -> None:
     found = texts(pages)
     assert outcome.results is not None
     for eye, shift in outcome.results.eyes.items():
@@ -57,7 +57,7 @@ def test_it_says_what_was_found(pages: list[Figure], outcome: Outcome) -> None:
     assert "=P-07, $x_" in found
     assert "50 % humidity: $\\frac{1}{2" in found
     assert "1335" in found
-    assert f"{outcome.record.trials[0].error_arcmin.mean():.2f}" in found
+    assert f"{outcome.record.trials[1].error_arcmin.mean():.2f}" in found
     headings = ["Eye shift φ", "Alignments", "Convergence", "User test", "Notes", "Definitions"]
     large = [text for page in pages for text in page.texts if text.get_fontsize() == 12.5]
     assert [text.get_text() for text in large if text.get_text() in headings] == headings
@@ -75,14 +75,14 @@ def test_nothing_overlaps_or_leaves_its_page(pages: list[Figure]) -> None:
                 assert overlap is None or min(overlap.width, overlap.height) < 1.5
 
 
-def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: Outcome) -> None:
+def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: SessionOutcome) -> None:
     def said(trials: Sequence[Trial]) -> str:
-        record = replace(outcome.record, trials=tuple(trials))
+        record = replace(outcome.record, trials=dict(enumerate(trials, 1)))
         report = session_report(replace(outcome, record=record))
         (test,) = (section for section in report.sections if section.title == "User test")
         return next(item for item in test.items if isinstance(item, str))
 
-    trials = list(outcome.record.trials)
+    trials = list(outcome.record.trials.values())
     assert "no interval" in said(trials)
     again = replace(trials[-1], calibrated_shift_m=np.zeros(3), error_arcmin=np.full(4, 20.0))
     first = np.mean([trial.error_arcmin.mean() for trial in trials[:-1]])
@@ -94,20 +94,20 @@ def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: Outcome)
 @pytest.mark.parametrize("text", HOSTILE)
 def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: str) -> None:
     hostile = replace(empty, wearer=text, notes=text, settings={text: {text: [text]}})
-    outcome = replace(conclude(empty), record=hostile)
+    outcome = replace(load_outcome(empty), record=hostile)
     write_pdf(tmp_path / "report.pdf", session_report(outcome), ignore)
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 
 def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
-    found = texts(compose(session_report(conclude(empty)), ignore))
+    found = texts(compose(session_report(load_outcome(empty)), ignore))
     assert "Nothing is solved: the session holds no alignment." in found
     assert "Convergence" not in found
 
 
 def test_the_file_is_a4_with_its_fonts_and_all_pages(
-    tmp_path: Path, outcome: Outcome, pages: list[Figure]
+    tmp_path: Path, outcome: SessionOutcome, pages: list[Figure]
 ) -> None:
     shares: list[float] = []
     path = tmp_path / "report.pdf"
@@ -126,7 +126,9 @@ def test_the_file_is_a4_with_its_fonts_and_all_pages(
 
 
 @pytest.mark.parametrize("after", [0, 5, 200])
-def test_giving_up_at_any_time_leaves_no_file(tmp_path: Path, outcome: Outcome, after: int) -> None:
+def test_giving_up_at_any_time_leaves_no_file(
+    tmp_path: Path, outcome: SessionOutcome, after: int
+) -> None:
     asked = 0
 
     def give_up(_share: float) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.export.outcome import Origin, Outcome
+from handcal.export.outcome import Origin, SessionOutcome
 from handcal.export.tables import write_parameters, write_trials
 from handcal.types import Eye, Float64
 
@@ -24,7 +24,7 @@ def triple(row: dict[str, str], name: str) -> list[float]:
 
 
 def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
-    tmp_path: Path, outcome: Outcome
+    tmp_path: Path, outcome: SessionOutcome
 ) -> None:
     write_parameters(tmp_path / "p.csv", outcome)
     rows = read(tmp_path / "p.csv")
@@ -42,7 +42,7 @@ def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
         ("yes", "yes"),
     ]
     assert outcome.results is not None
-    alone, fused = outcome.results.alignments[1]["left"], outcome.results.eyes["right"]
+    alone, fused = outcome.results.alignments[3]["left"], outcome.results.eyes["right"]
     assert triple(rows[2], "phi{}_mm") == (1e3 * alone.shift_m).tolist()
     assert triple(rows[4], "sigma{}_mm") == np.sqrt(np.diag(1e6 * fused.covariance_m2)).tolist()
     assert float(rows[4]["covariance23_mm2"]) == 1e6 * fused.covariance_m2[1, 2]
@@ -54,12 +54,12 @@ def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
     assert rows[5]["sigma1_mm"] == ""
 
 
-def test_trials_hold_every_corner(tmp_path: Path, outcome: Outcome) -> None:
+def test_trials_hold_every_corner(tmp_path: Path, outcome: SessionOutcome) -> None:
     write_trials(tmp_path / "t.csv", outcome)
     rows = read(tmp_path / "t.csv")
     trials = outcome.record.trials
     assert len(rows) == 4 * len(trials)
-    row, trial = rows[4 * 2 + 3], trials[2]
+    row, trial = rows[4 * 2 + 3], trials[3]
     assert (row["trial"], row["corner"], row["eye"]) == ("3", "4", trial.eye)
     assert float(row["target_depth_m"]) == trial.target_depth_m
     assert [float(row["truth_x_px"]), float(row["truth_y_px"])] == trial.truth_px[3].tolist()
@@ -68,7 +68,7 @@ def test_trials_hold_every_corner(tmp_path: Path, outcome: Outcome) -> None:
 
 
 def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
-    tmp_path: Path, outcome: Outcome
+    tmp_path: Path, outcome: SessionOutcome
 ) -> None:
     wearer = 'a,"b"\r\n=1+1 φ'
     write_trials(
@@ -81,7 +81,7 @@ def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
-def test_no_text_becomes_a_formula(tmp_path: Path, outcome: Outcome, start: str) -> None:
+def test_no_text_becomes_a_formula(tmp_path: Path, outcome: SessionOutcome, start: str) -> None:
     wearer = f'{start}HYPERLINK("x")'
     write_parameters(
         tmp_path / "p.csv", replace(outcome, record=replace(outcome.record, wearer=wearer))
@@ -89,7 +89,7 @@ def test_no_text_becomes_a_formula(tmp_path: Path, outcome: Outcome, start: str)
     assert {row["wearer"] for row in read(tmp_path / "p.csv")} == {f"'{wearer}"}
 
 
-def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: Outcome) -> None:
+def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcome) -> None:
     shifts_m: dict[Eye, dict[Origin, Float64]] = {
         "left": {"fine_tuned": np.full(3, -0.001), "offline": np.zeros(3)},
         "right": {},

@@ -34,10 +34,11 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.station.procedure import CalibrationSettings, Observation, PlacedHand, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import CalibrationSettings, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
-from handcal.station.wearer_view import EyeView, see
+from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig, UInt8
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -125,7 +126,7 @@ def snapshot(
 ) -> Callable[..., Snapshot]:
     """Return a maker of snapshots: of a state, aligning by default, with changes to it.
 
-    ``snapshot(State.ALIGN, observation={"is_red": True}, camera={"dropped": 3}, number=2)``
+    ``snapshot(State.ALIGN, observation={"is_over_limit": True}, camera={"dropped": 3}, number=2)``
     changes fields of the parts `observation`, `procedure`, `camera` and `link`, and of the
     snapshot itself; ``observation=None`` leaves it out.
     """
@@ -361,7 +362,7 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
         refusal="",
         refused=0,
         guard_limit_rad=float(np.radians(9.0)),
-        alignments=(),
+        alignments={},
         results=results if is_solved else None,
         applied_shift_m=applied_m,
         is_applied=state is not State.APPLYING,
@@ -377,5 +378,7 @@ def _views(rig: Rig, shots: Shots) -> dict[Eye, EyeView]:
             for hand in (shots.live, shots.cursor)
         )
         shift_m = np.array([0.002, -0.001, 0.003])
-        views[eye] = see(eye, display, shift_m, np.zeros(3), outline_E_m, cursor_E_m, is_true=True)
+        views[eye] = render_eye_view(
+            eye, display, shift_m, np.zeros(3), outline_E_m, cursor_E_m, is_true=True
+        )
     return views

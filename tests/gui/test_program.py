@@ -176,7 +176,7 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     record = live.record
     assert record.is_finished
     assert record.wearer == "Ada"
-    assert [alignment.eyes for alignment in record.alignments] == [("left",), ("right",)]
+    assert [alignment.eyes for alignment in record.alignments.values()] == [("left",), ("right",)]
     for eye in ("left", "right"):
         P = studio.headset.shown.projections[eye].P
         assert not np.allclose(P, live.snapshot.record.rig.eyes[eye].K @ np.eye(3, 4))
@@ -217,14 +217,18 @@ def test_a_hand_lost_is_said_and_nothing_can_be_made_of_it(live: Technician, stu
 def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> None:
     make_cursor(live, studio)
     studio.camera.shows = "turned"
-    live.wait(lambda: live.snapshot.observation is not None and live.snapshot.observation.is_red)
+    live.wait(
+        lambda: live.snapshot.observation is not None and live.snapshot.observation.is_over_limit
+    )
     studio.headset.confirm()
     live.wait(lambda: live.snapshot.procedure.refused == 1)
     assert "more than 9°" in live.child(QLabel, "wizardNote").text()
-    assert live.record.alignments == ()
+    assert live.record.alignments == {}
     studio.camera.shows = "live"
     live.wait(
-        lambda: live.snapshot.observation is not None and not live.snapshot.observation.is_red
+        lambda: (
+            live.snapshot.observation is not None and not live.snapshot.observation.is_over_limit
+        )
     )
     live.qtbot.wait(300)
     studio.headset.confirm()
@@ -286,7 +290,7 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     live.wait(lambda: "cannot write" in live.banner)
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
-    assert live.snapshot.record.alignments == ()
+    assert live.snapshot.record.alignments == {}
     live.wait(lambda: "1 alignment confirmed" in shown_checks(live))
     away.rename(path)
     live.wait(lambda: live.banner == "")
@@ -298,14 +302,14 @@ def test_alignments_are_deleted_and_restored(live: Technician, studio: Any) -> N
     align(live, studio)
     solve_and_apply(live)
     session = live.program.window.panels.session
-    session.delete_alignment_requested.emit(1)
-    live.wait(lambda: live.snapshot.record.alignments == ())
+    session.delete_requested.emit("alignment", 1)
+    live.wait(lambda: live.snapshot.record.alignments == {})
     assert live.snapshot.procedure.results is None
-    session.restore_alignment_requested.emit(1)
+    session.restore_requested.emit("alignment", 1)
     live.wait(lambda: len(live.snapshot.record.alignments) == 1)
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
-    session.delete_alignment_requested.emit(7)
+    session.delete_requested.emit("alignment", 7)
     live.wait(lambda: live.banner.startswith("Could not delete the alignment: "))
     QTest.keyClick(live.program.window, Qt.Key.Key_Escape)
     assert live.banner == ""
@@ -346,7 +350,7 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
 
     QTest.keyClick(window, Qt.Key.Key_T)
     live.wait(lambda: len(live.snapshot.record.trials) == 1)
-    (trial,) = live.snapshot.record.trials
+    (trial,) = live.snapshot.record.trials.values()
     t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
     np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, trial.corners_E_m)
     # It would be the right eye's turn, which has not been aligned.

@@ -197,7 +197,10 @@ def test_a_technician_calibrates_with_the_keyboard_alone(
     assert session is not None
     assert session.wearer == "Ada"
     assert session.is_finished
-    assert {eye for alignment in session.alignments for eye in alignment.eyes} == {"left", "right"}
+    assert {eye for alignment in session.alignments.values() for eye in alignment.eyes} == {
+        "left",
+        "right",
+    }
     (report,) = reports()
     assert report.read_bytes().startswith(b"%PDF")
     assert json.loads(preferences.read_text())["wearers"] == ["Bob", "Ada"]

@@ -120,7 +120,7 @@ def test_loss_only_thins_the_live_hand(server: HeadsetServer, pairing_key: bytes
     with HeadsetClient(server.address, pairing_key, impairment=BAD) as client:
         server.wait_connected(5.0)
         for i in range(20):
-            server.send_live_hand(hand(i), red=i % 2 == 0)
+            server.send_live_hand(hand(i), is_over_limit=i % 2 == 0)
             time.sleep(0.03)
             state = client.state()
             if state.live_W_m is not None:
@@ -133,10 +133,10 @@ def test_the_live_hand_carries_its_colour_and_its_absence(
 ) -> None:
     with HeadsetClient(server.address, pairing_key) as client:
         server.wait_connected(5.0)
-        server.send_live_hand(hand(), red=True)
-        eventually(lambda: client.state().live_W_m is not None and client.state().live_red)
-        server.send_live_hand(np.empty((0, 3)), red=False)
-        eventually(lambda: client.state().live_W_m is None and not client.state().live_red)
+        server.send_live_hand(hand(), is_over_limit=True)
+        eventually(lambda: client.state().live_W_m is not None and client.state().is_over_limit)
+        server.send_live_hand(np.empty((0, 3)), is_over_limit=False)
+        eventually(lambda: client.state().live_W_m is None and not client.state().is_over_limit)
 
 
 def test_a_cursor_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -> None:

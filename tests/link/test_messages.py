@@ -33,7 +33,7 @@ def test_a_cursor_is_true_to_half_a_quantum(points: Float64) -> None:
 
 @given(CLOUDS)
 def test_live_chunks_hold_every_point_once_and_fit_a_datagram(points: Float64) -> None:
-    envelopes = messages.live_hand(points, red=True, frame=3)
+    envelopes = messages.live_hand(points, is_over_limit=True, frame=3)
     assert all(envelope.ByteSize() <= MAX_PAYLOAD_BYTES for envelope in envelopes)
     chunks = [sent(envelope).live_hand for envelope in envelopes]
     assert {(c.frame, c.chunk_count, c.red) for c in chunks} == {(3, len(chunks), True)}

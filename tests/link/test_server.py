@@ -230,7 +230,7 @@ def test_a_closed_link_refuses_and_leaves_no_thread(pairing_key: bytes) -> None:
     assert threading.active_count() == before
     for use in (
         lambda: server.send_cursor(np.zeros((1, 3)), 1),
-        lambda: server.send_live_hand(np.zeros((1, 3)), red=False),
+        lambda: server.send_live_hand(np.zeros((1, 3)), is_over_limit=False),
         server.confirmations,
         lambda: server.pose_at_host_ns(0),
     ):

@@ -8,7 +8,6 @@ from handcal.geometry import invert, rigid, transform
 from handcal.lab.bench.trials import trial_hand
 from handcal.register.fuse import (
     FuseSettings,
-    covariances_after_another,
     fuse_alignments,
     with_eye_box,
 )
@@ -82,7 +81,7 @@ def test_estimates_are_unbiased_and_their_covariance_honest(alignments: list[Ali
         drawn_m = rng.multivariate_normal(np.zeros(6), _prior_m2())
         true_m: dict[Eye, Float64] = {"left": drawn_m[:3], "right": drawn_m[3:]}
         solved = [_align(rng, alignment, true_m) for alignment in alignments]
-        for eye, fused in fuse_alignments(solved, RIG, SETTINGS).items():
+        for eye, fused in fuse_alignments(solved, RIG, SETTINGS).shifts.items():
             error_m = fused.shift_m - true_m[eye]
             errors_m.append(error_m)
             squares.append(error_m @ np.linalg.solve(fused.covariance_m2, error_m))
@@ -94,7 +93,7 @@ def test_estimates_are_unbiased_and_their_covariance_honest(alignments: list[Ali
 
 def test_one_alignment_with_one_eye_is_the_estimate_with_the_prior() -> None:
     seen_m = np.array([0.003, -0.002, 0.004])
-    fused = fuse_alignments([(ONE["left"], {"left": _shift(seen_m)})], RIG, SETTINGS)
+    fused = fuse_alignments([(ONE["left"], {"left": _shift(seen_m)})], RIG, SETTINGS).shifts
     assert set(fused) == {"left"}
     prior, noise = _prior_m2()[:3, :3], REGISTRATION_M2 + _wearer_m2()
     gain = prior @ np.linalg.inv(prior + noise)
@@ -104,7 +103,7 @@ def test_one_alignment_with_one_eye_is_the_estimate_with_the_prior() -> None:
 
 
 def _sigma_x_m(solved: list[tuple[Alignment, dict[Eye, EyeShift]]], eye: Eye = "left") -> float:
-    fused = fuse_alignments(solved, RIG, SETTINGS)[eye]
+    fused = fuse_alignments(solved, RIG, SETTINGS).shifts[eye]
     return float(np.sqrt(fused.covariance_m2[0, 0]))
 
 
@@ -120,7 +119,7 @@ def test_only_one_eye_at_a_time_shows_the_eye_distance() -> None:
     each: list[tuple[Alignment, dict[Eye, EyeShift]]] = [
         (ONE[eye], {eye: _shift(true_m[eye])}) for eye in EYES
     ]
-    at_once, apart = (fuse_alignments(s, RIG, SETTINGS) for s in ([both] * 4, each * 4))
+    at_once, apart = (fuse_alignments(s, RIG, SETTINGS).shifts for s in ([both] * 4, each * 4))
     for eye, shift_m in true_m.items():
         np.testing.assert_allclose(at_once[eye].shift_m, [0.001, 0, 0], atol=5e-5)
         np.testing.assert_allclose(apart[eye].shift_m, shift_m, atol=2e-4)
@@ -143,7 +142,7 @@ def test_disagreement_widens_the_covariance() -> None:
         pair: list[tuple[Alignment, dict[Eye, EyeShift]]] = [
             (ONE["left"], {"left": _shift(sign * offset_m)}) for sign in (-1, 1)
         ]
-        return fuse_alignments(pair, RIG, SETTINGS)["left"]
+        return fuse_alignments(pair, RIG, SETTINGS).shifts["left"]
 
     agreeing, disagreeing = fused(0.1 * aside_m), fused(aside_m)
     noise = REGISTRATION_M2 + _wearer_m2()
@@ -163,14 +162,14 @@ def test_another_alignment_is_worth_what_a_repetition_brings(
     rng = np.random.default_rng(2)
     true_m: dict[Eye, Float64] = {"left": np.zeros(3), "right": np.full(3, 0.001)}
     once = [_align(rng, alignment, true_m) for alignment in alignments]
-    predicted_m2 = covariances_after_another(once * times, RIG, SETTINGS)
+    predicted_m2 = fuse_alignments(once * times, RIG, SETTINGS).covariances_after_another_m2
     after_m2 = {
         eye: shift.covariance_m2
-        for eye, shift in fuse_alignments(once * (times + 1), RIG, SETTINGS).items()
+        for eye, shift in fuse_alignments(once * (times + 1), RIG, SETTINGS).shifts.items()
     }
     now_m2 = {
         eye: shift.covariance_m2
-        for eye, shift in fuse_alignments(once * times, RIG, SETTINGS).items()
+        for eye, shift in fuse_alignments(once * times, RIG, SETTINGS).shifts.items()
     }
     assert set(predicted_m2) == set(after_m2)
     for eye, covariance_m2 in predicted_m2.items():
@@ -187,7 +186,7 @@ def test_the_fit_of_all_alignments_is_summed_up() -> None:
     )
     fused = fuse_alignments(
         [(ONE["left"], {"left": good}), (ONE["left"], {"left": bad})], RIG, SETTINGS
-    )["left"]
+    ).shifts["left"]
     assert fused.method == "fused"
     assert fused.rms_m == pytest.approx(np.sqrt((1e-6 + 9e-6) / 2))
     assert fused.inlier_ratio == pytest.approx(0.7)
@@ -251,6 +250,6 @@ def test_both_eyes_see_what_the_weights_say(apart_m: float) -> None:
     assert np.sign(apart_m) * solved["left"].shift_m[2] > 0.007
     # Whoever holds the eyes for well placed, but knows no eye distance, must find it from this.
     unknowing = FuseSettings(eye_difference_sigma_m=(0.1, 1e-6, 1e-6), eye_box_sigma_m=0.003)
-    fused = fuse_alignments([(alignment, solved)], RIG, unknowing)
+    fused = fuse_alignments([(alignment, solved)], RIG, unknowing).shifts
     for eye, shift_m in true_m.items():
         np.testing.assert_allclose(fused[eye].shift_m, shift_m, atol=5e-4)

@@ -13,6 +13,7 @@ import pytest
 from handcal.errors import CancelledError
 from handcal.io.files import write_json
 from handcal.io.settings import read_settings, settings_json
+from handcal.progress import Progress
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.register.verdict import VerdictSettings, expected_error_arcmin
 from handcal.rig.example import Z_E_S_M, example_rig
@@ -103,7 +104,10 @@ def test_it_reports_and_can_be_cancelled_between_alignments(left: Alignment) -> 
 
     def solve(is_cancelled: Callable[[], bool]) -> None:
         solve_session(
-            [left] * 2, RIG, SolveSettings(), lambda *said: reports.append(said), is_cancelled
+            [left] * 2,
+            RIG,
+            SolveSettings(),
+            Progress(lambda *said: reports.append(said), is_cancelled),
         )
 
     solve(lambda: False)
@@ -124,7 +128,7 @@ def test_a_slow_method_can_be_cancelled_in_the_middle(left: Alignment, method: M
         return asked > 3
 
     with pytest.raises(CancelledError):
-        solve_session([left], RIG, SolveSettings(method), is_cancelled=is_cancelled)
+        solve_session([left], RIG, SolveSettings(method), Progress(is_cancelled=is_cancelled))
     assert asked == 4  # before the alignment, and before three iterations
 
 

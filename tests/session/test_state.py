@@ -1,66 +1,57 @@
 import contextlib
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.session.journal import Event
-from handcal.session.state import History, SessionEvent, Shelf, read_shifts
+from handcal.session.state import NumberedItems, SessionEvent, SessionState
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))
-def test_a_shelf_keeps_everything_once_and_in_order(operations: list[tuple[str, int]]) -> None:
-    shelf = Shelf[str]("thing", 5)
+def test_items_are_kept_once_and_in_order(operations: list[tuple[str, int]]) -> None:
+    items = NumberedItems[str]("trial", 5)
     saved = 0
     for operation, number in operations:
         with contextlib.suppress(ValueError):
             if operation == "save":
-                shelf.save(number, f"thing {number}")
+                items.save(number, f"trial {number}")
                 saved += 1
             else:
-                getattr(shelf, operation)(number)
-        assert sorted([*shelf.kept, *shelf.deleted]) == list(range(1, saved + 1))
-        assert list(shelf.kept) == sorted(shelf.kept)
-        assert all(item == f"thing {number}" for number, item in shelf.kept.items())
+                getattr(items, operation)(number)
+        assert sorted([*items.active, *items.deleted]) == list(range(1, saved + 1))
+        assert list(items.active) == sorted(items.active)
+        assert all(item == f"trial {number}" for number, item in items.active.items())
     assert saved <= 5
 
 
 def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
-    history = History()
+    state = SessionState()
     for name, data, problem in (
         (SessionEvent.ALIGNMENT_SAVED, {"number": 2, "sha256": "x"}, "alignment 2 is not the next"),
         (SessionEvent.ALIGNMENT_DELETED, {"number": 1}, "there is no alignment 1"),
         (SessionEvent.TRIAL_RESTORED, {"number": 1}, "there is no deleted trial 1"),
         (SessionEvent.TRIAL_SAVED, {"number": 1, "trial": {}}, "the trial has no 'target_depth_m'"),
         (SessionEvent.FINE_TUNED, {}, "fine_tuned lacks 'shift_m'"),
-        (SessionEvent.CREATED, {"rig_sha256": "x", "wearer": 3}, "holds something wrong"),
+        (SessionEvent.CREATED, {"rig_sha256": "x", "wearer": 3}, "contains invalid data"),
     ):
         with pytest.raises(ValueError, match=problem):
-            history.take(Event(1, "", name, data))
+            state.apply(Event(1, "", name, data))
 
 
 @pytest.mark.parametrize("number", [True, 1.0, "1", None])
 @pytest.mark.parametrize("event", [SessionEvent.ALIGNMENT_SAVED, SessionEvent.ALIGNMENT_DELETED])
 def test_what_equals_a_number_but_is_none_is_refused(number: object, event: SessionEvent) -> None:
-    history = History()
+    state = SessionState()
     if event == SessionEvent.ALIGNMENT_DELETED:
-        history.take(Event(1, "", SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}))
+        state.apply(Event(1, "", SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}))
     with pytest.raises(ValueError, match="a number is whole"):
-        history.take(Event(2, "", event, {"number": number, "sha256": "x"}))
+        state.apply(Event(2, "", event, {"number": number, "sha256": "x"}))
 
 
 def test_an_event_of_others_changes_nothing_but_that_it_goes_on() -> None:
-    history = History()
-    history.take(Event(1, "", SessionEvent.FINISHED, {}))
-    assert history.is_finished
-    history.take(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
-    assert not history.is_finished
-
-
-def test_shifts_are_read_only_and_in_the_order_of_the_eyes() -> None:
-    read = read_shifts({"right": [1, 2, 3], "left": [0, 0, 0]})
-    assert list(read) == ["left", "right"]
-    np.testing.assert_array_equal(read["right"], [1.0, 2.0, 3.0])
-    with pytest.raises(ValueError, match="read-only"):
-        read["right"][0] = 0.0
+    state = SessionState()
+    state.apply(Event(1, "", SessionEvent.FINISHED, {}))
+    assert state.is_finished
+    state.apply(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
+    assert not state.is_finished

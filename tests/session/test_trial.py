@@ -61,7 +61,7 @@ def test_a_shift_aside_by_hand() -> None:
 
 @pytest.mark.parametrize("depth_m", [0.0, -0.5, np.nan, np.inf])
 def test_a_target_that_does_not_stand_before_the_eye(depth_m: float) -> None:
-    with pytest.raises(ValueError, match="stand before the eye"):
+    with pytest.raises(ValueError, match="in front of the eye"):
         trial(depth_m)
 
 
@@ -79,12 +79,12 @@ def test_it_comes_back_from_json_bit_for_bit() -> None:
         ({"eye": "middle"}, "left or right"),
         ({"eye": ["left"]}, "left or right"),
         ({"target_depth_m": "far"}, "convert string"),
-        ({"target_depth_m": [0.5]}, "something else than numbers"),
+        ({"target_depth_m": [0.5]}, "something other than numbers"),
         ({"truth_px": [[1.0, 2.0]]}, "truth_px: expected an array of shape 4×2, got 1×2"),
         ({"error_px": [1.0, 2.0, 3.0, None]}, "error_px"),
         ({"error_px": [1.0, 2.0, 3.0, float("nan")]}, "error_px: must be finite"),
-        ({"error_px": {"a": 1}}, "something else than numbers"),
-        ({"adjusted_shift_m": [0, 0, 10**400]}, "something else than numbers"),
+        ({"error_px": {"a": 1}}, "something other than numbers"),
+        ({"adjusted_shift_m": [0, 0, 10**400]}, "something other than numbers"),
     ],
 )
 def test_what_is_no_trial_is_refused(change: dict[str, Any], problem: str) -> None:
@@ -133,5 +133,6 @@ def test_trials_of_one_calibration_are_told_from_others() -> None:
         for eye in EYES
         for depth_m in (0.4, 0.6)
     ]
-    assert calibration_numbers(trials) == (1, 1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1)
-    assert calibration_numbers([]) == ()
+    of_calibration = (1, 1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1)
+    assert calibration_numbers(dict(enumerate(trials))) == dict(enumerate(of_calibration))
+    assert calibration_numbers({}) == {}

@@ -17,7 +17,7 @@ def test_only_those_not_finished_are_listed_the_newest_first(
     with make(tmp_path, "b-first", "P7") as first:
         first.save_alignment(alignment)
         first.save_alignment(alignment)
-        first.delete_alignment(1)
+        first.delete("alignment", 1)
         first.finish()
         first.record("went_on")
     with make(tmp_path, "c-done") as done:

@@ -109,7 +109,7 @@ def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) ->
     text, path = tmp_path / "hand.txt", tmp_path / "hand.db3"
     text.touch()
     finding = find("camera", replace(played, recording=str(text)))
-    assert finding.found == "hand.txt is no recording"
+    assert finding.found == "hand.txt is not a recording"
     assert ".db3 or .bag file, or a folder" in finding.advice
     with_path = replace(played, recording=str(path))
     assert find("camera", with_path).found == f"there is no recording {path}"
@@ -117,7 +117,7 @@ def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) ->
     path.write_bytes(bytes(2**21))
     assert find("camera", with_path).found.startswith(f"{path} is not a recording")
     path.write_bytes(b"SQLite format 3".ljust(2**21, b"\0"))
-    assert find("camera", with_path).found == "2.0 MiB, played over and over"
+    assert find("camera", with_path).found == "2.0 MiB, played in a loop"
     assert find("camera", replace(played, recording="\0.db3")).health is Health.BROKEN
 
 
@@ -131,7 +131,7 @@ def test_a_recorded_folder_needs_no_sdk(
     camera = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
     record_folder(tmp_path / "hand", [Frame(1, 1, 0, np.ones((3, 4), np.uint16), 1e-3, camera)])
     finding = find("camera", replace(played, recording=str(tmp_path / "hand")))
-    assert finding.found == "Recording hand, played over and over"
+    assert finding.found == "Recording hand, played in a loop"
     assert finding.health is Health.GOOD
     once = replace(played, recording=str(tmp_path / "hand"), playback=PlaybackSettings())
     assert find("camera", once).found == "Recording hand, played once"
@@ -157,7 +157,7 @@ def test_a_network_headset_cannot_be_waited_for(
     assert "cannot listen" in find("headset", replace(live, port=taken_port)).found
     assert find("headset", replace(live, host="192.0.2.1")).health is Health.BROKEN
     assert find("headset", replace(live, host="pc")).found == "'pc' is not an address"
-    assert find("headset", replace(live, port=70_000)).found == "70000 is no port"
+    assert find("headset", replace(live, port=70_000)).found == "70000 is not a valid port"
     assert find("headset", live, key="short").found == "the pairing key is too short"
     everywhere = replace(live, host="0.0.0.0")
     monkeypatch.setattr(preflight, "reachable_address", lambda bound: ("192.168.1.20", bound[1]))

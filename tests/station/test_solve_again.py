@@ -38,6 +38,6 @@ def test_nothing_comes_of_no_alignment(record: SessionRecord) -> None:
 
 def test_what_cannot_be_solved_is_named(record: SessionRecord, alignment: Alignment) -> None:
     none = replace(alignment, hand_m=np.empty((0, 3)), hand_is_cut=np.empty(0, bool))
-    hopeless = replace(record, alignments=(none,), alignment_numbers=(1,))
+    hopeless = replace(record, alignments={1: none})
     with pytest.raises(FileError, match=f"{record.path.name} cannot be solved"):
         solve_again(hopeless, SolveSettings())

@@ -4,7 +4,7 @@ import pytest
 from handcal.display import eye_projection, reprojection_error_px, target_corners_m
 from handcal.geometry import project
 from handcal.rig.example import FOCAL_PX, example_rig
-from handcal.station.wearer_view import EyeView, see
+from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["left"]
@@ -14,7 +14,9 @@ NONE_M = np.empty((0, 3))
 
 
 def _see(drawn_shift_m: Float64, outline_m: Float64 = OUTLINE_M) -> EyeView:
-    return see("left", DISPLAY, SHIFT_M, drawn_shift_m, outline_m, OUTLINE_M, is_true=True)
+    return render_eye_view(
+        "left", DISPLAY, SHIFT_M, drawn_shift_m, outline_m, OUTLINE_M, is_true=True
+    )
 
 
 def test_right_projection_draws_the_outline_onto_the_hand() -> None:
@@ -44,13 +46,17 @@ def test_offline_projection_stays_for_comparison() -> None:
 def test_target_is_seen_at_its_place_and_drawn_with_what_the_headset_has() -> None:
     corners_m = target_corners_m(0.5)
     wrong_m = np.zeros(3)
-    view = see("left", DISPLAY, SHIFT_M, wrong_m, NONE_M, NONE_M, corners_m, is_true=True)
+    view = render_eye_view(
+        "left", DISPLAY, SHIFT_M, wrong_m, NONE_M, NONE_M, corners_m, is_true=True
+    )
     np.testing.assert_allclose(view.target_px, project(eye_projection(DISPLAY, SHIFT_M), corners_m))
     np.testing.assert_allclose(
         np.linalg.norm(view.drawn_target_px - view.target_px, axis=1),
         reprojection_error_px(DISPLAY, wrong_m, SHIFT_M, corners_m),
     )
-    right = see("left", DISPLAY, SHIFT_M, SHIFT_M, NONE_M, NONE_M, corners_m, is_true=True)
+    right = render_eye_view(
+        "left", DISPLAY, SHIFT_M, SHIFT_M, NONE_M, NONE_M, corners_m, is_true=True
+    )
     np.testing.assert_allclose(right.drawn_target_px, right.target_px)
 
 

@@ -155,9 +155,9 @@ def _unfit(record: SessionRecord, kept: Mapping[Path, SessionRecord]) -> str:
 
 def _corners(name: str, record: SessionRecord) -> Iterator[CornerRow]:
     """Yield the rows of a session; a wearer without name is one of their own."""
-    calibrations = dict(zip(record.trial_numbers, calibration_numbers(record.trials), strict=True))
+    calibrations = calibration_numbers(record.trials)
     whose = {"wearer": record.wearer or f"not named, {name}", "session": name}
-    for row in trial_rows(record.trial_numbers, record.trials):
+    for row in trial_rows(record.trials):
         yield {**whose, "calibration": calibrations[row["trial"]], **row}
 
 

@@ -78,7 +78,7 @@ def _errors(test: UserTest, result: UserTestResult) -> Section:
             f"Standard deviation of wearers' mean errors {found.between:.2f} arcmin, of the errors "
             f"of one wearer {found.within:.2f} arcmin (analysis of variance)."
         )
-    trials = [trial for record in test.sessions.values() for trial in record.trials]
+    trials = [trial for record in test.sessions.values() for trial in record.trials.values()]
     figure = Figure(
         "errors",
         "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
@@ -168,7 +168,7 @@ def _sessions(test: UserTest) -> Section:
             record.wearer or "not named",
             at_minute(record.events[0].time),
             record.rig.name,
-            str(len(set(calibration_numbers(record.trials)))),
+            str(len(set(calibration_numbers(record.trials).values()))),
             str(len(record.trials)),
         ]
         for name, record in test.sessions.items()

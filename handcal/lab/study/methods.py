@@ -346,5 +346,5 @@ def _align_in_turn(
         )
         solved.append((alignment, solve_alignment(alignment, wearer.rig)))
         fused = fuse_alignments(solved, wearer.rig, FuseSettings())
-        shift_m = shift_m | {eye: found.shift_m for eye, found in fused.items()}
+        shift_m = shift_m | {eye: found.shift_m for eye, found in fused.shifts.items()}
         yield alignment, shift_m

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.session.journal import read_journal
-from handcal.session.state import History
+from handcal.session.state import SessionState
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
 from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.times import local_time
@@ -57,17 +57,17 @@ def _unfinished(session: UnfinishedSession) -> Entry:
 
 
 def _recent(path: Path) -> Entry | None:
-    history = History()
+    state = SessionState()
     try:
         events = read_journal(path / "journal.jsonl").events
         for event in events:
-            history.take(event)
+            state.apply(event)
     except (FileError, ValueError) as error:
         return Entry(path, f"{path.name}: {error}", is_enabled=False)
-    alignments, trials = history.alignments, history.trials
-    if not (alignments.kept or alignments.deleted or trials.kept or trials.deleted):
+    alignments, trials = state.alignments, state.trials
+    if not (alignments.active or alignments.deleted or trials.active or trials.deleted):
         return None
-    text = _text(history.wearer, events[0].time, len(alignments.kept), len(trials.kept))
+    text = _text(state.wearer, events[0].time, len(alignments.active), len(trials.active))
     return Entry(path, text)
 
 

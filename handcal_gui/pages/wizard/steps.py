@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -89,7 +89,7 @@ class View:
     """What just happened or goes on, such as a refusal; empty if nothing."""
 
 
-def next_eyes(plan: EyePlan, alignments: Sequence[Alignment]) -> tuple[Eye, ...]:
+def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ...]:
     """Return the eyes that the next alignment is for."""
     if plan == "both":
         return EYES
@@ -99,7 +99,7 @@ def next_eyes(plan: EyePlan, alignments: Sequence[Alignment]) -> tuple[Eye, ...]
     return ("right",) if counts["right"] < counts["left"] else ("left",)
 
 
-def is_complete(plan: EyePlan, alignments: Sequence[Alignment]) -> bool:
+def is_complete(plan: EyePlan, alignments: Collection[Alignment]) -> bool:
     """Tell whether every eye of the plan has been aligned."""
     eyes = (plan,) if plan in EYES else EYES
     return all(any(eye in alignment.eyes for alignment in alignments) for eye in eyes)
@@ -160,7 +160,7 @@ class Wizard:
         """Return the eyes that the next alignment is for."""
         if self._repeat is not None:
             return (self._repeat,)
-        return next_eyes(self.plan, snapshot.procedure.alignments)
+        return next_eyes(self.plan, snapshot.procedure.alignments.values())
 
     def _connect(self, snapshot: Snapshot) -> View:
         camera, link = snapshot.camera, snapshot.link
@@ -210,7 +210,7 @@ class Wizard:
     def _align(self, snapshot: Snapshot) -> View:
         procedure, seen = snapshot.procedure, snapshot.observation
         hand = _hand_check(snapshot)
-        is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_red
+        is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
         limit_deg = np.degrees(procedure.guard_limit_rad)
         cursor = procedure.cursor
         # A second press of what made the cursor must not confirm a hand that has not moved.
@@ -265,7 +265,7 @@ class Wizard:
                 Offer(Action.SOLVE, "Solve"),
                 (Offer(Action.ANOTHER, "Add alignment"),),
             )
-        if not is_complete(self.plan, snapshot.procedure.alignments):
+        if not is_complete(self.plan, snapshot.procedure.alignments.values()):
             eyes = _names(self.eyes(snapshot))
             return View(
                 Step.VERIFY,

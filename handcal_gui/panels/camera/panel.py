@@ -191,9 +191,11 @@ class _Pictures(QWidget):
             return
         cloud = seen.cloud
         depth_px, color_px = contour_px(cloud, frame)
-        self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_red).draw)
+        self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_over_limit).draw)
         if color_px is not None:
-            self._color.show_overlay(HandOverlay(cloud, depth_px, color_px, seen.is_red).draw)
+            self._color.show_overlay(
+                HandOverlay(cloud, depth_px, color_px, seen.is_over_limit).draw
+            )
 
     def show_text(self, *, message: str, caption: str = "") -> None:
         self._depth.show_text(message=message, caption=caption)
@@ -258,6 +260,6 @@ def _age(age_ms: float | None) -> str:
 
 def _caption(seen: Observation) -> str:
     """Return a caption for the hand."""
-    if seen.is_red and seen.rotation_rad is not None:
+    if seen.is_over_limit and seen.rotation_rad is not None:
         return f"Turned by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
     return sentence(seen.problem)

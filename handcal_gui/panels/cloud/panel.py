@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, 
 
 from handcal.geometry import invert, transform
 from handcal.register.pairs import matched_pairs
-from handcal.station.procedure import PlacedHand
+from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.panels.cloud.cloud_view import CloudView
@@ -117,7 +117,7 @@ class CloudPanel(QWidget):
             return
         self._pairs.setEnabled(True)
         axes = _live_axes(cursor, placed)
-        is_red = seen is not None and seen.is_red
+        is_red = seen is not None and seen.is_over_limit
         role = "red" if is_red else "live"
         self._show(
             None if cursor is None else _Cloud("Cursor", "cursor", axes.mm(cursor.points_W_m)),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
@@ -28,10 +26,10 @@ class ConvergencePlot(Plot):
         )
         self.show_legend()
 
-    def show_results(self, results: Results, names: Sequence[str]) -> None:
-        """Replace the lines; each ends in its alignment's name."""
+    def show_results(self, results: Results) -> None:
+        """Replace the lines; each ends in its alignment's number."""
         self.clear()
-        for alignment, shifts in zip(names, results.alignments, strict=True):
+        for number, shifts in results.alignments.items():
             for eye, shift in shifts.items():
                 rms_mm = 1e3 * np.sqrt(shift.history_m2)
                 line = self.add_line(
@@ -41,6 +39,6 @@ class ConvergencePlot(Plot):
                     symbol=_SYMBOLS[eye] if len(rms_mm) <= _MAX_SYMBOLS else None,
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
-                self.add_text(alignment, len(rms_mm), float(rms_mm[-1]))
-        lengths = [len(s.history_m2) for eyes in results.alignments for s in eyes.values()]
+                self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))
+        lengths = [len(s.history_m2) for eyes in results.alignments.values() for s in eyes.values()]
         self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with room for the names

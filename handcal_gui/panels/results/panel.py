@@ -19,7 +19,6 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
-    NOTHING,
     PHI,
     alignment_rows,
     another_text,
@@ -70,8 +69,7 @@ class ResultsPanel(QWidget):
         """Show the results of a snapshot, if they are others than those shown."""
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
-            numbered = dict(zip(record.alignment_numbers, record.alignments, strict=True))
-            self.show_results(procedure.results, numbered, record.rig)
+            self.show_results(procedure.results, record.alignments, record.rig)
 
     def show_results(
         self, results: Results | None, alignments: Mapping[int, Alignment], rig: Rig
@@ -82,8 +80,8 @@ class ResultsPanel(QWidget):
         ----------
         results : Results or None
         alignments : mapping of int to Alignment
-            Those that were solved, by number, in the same order, and maybe later ones. The last
-            may be missing, as on a full disk; of them no residual map is shown.
+            By number. No residual map is shown of a solved alignment that is missing here, such as
+            one that could not be written to a full disk.
         rig : Rig
         """
         self._results = results
@@ -94,11 +92,9 @@ class ResultsPanel(QWidget):
             card.show_verdict(results.verdicts.get(eye))
         eyes = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(eyes, result_rows(results, rig))
-        count = len(results.alignments)
-        names = [*map(str, alignments), *count * [NOTHING]][:count]
-        self._convergence.show_results(results, names)
+        self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
-        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, names, rig))
+        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, rig))
         self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
 

@@ -38,8 +38,11 @@ class ResidualsTab(QWidget):
 
     def show_results(self, results: Results, alignments: Mapping[int, Alignment]) -> None:
         """Show the first alignment's map and offer the others, as far as their clouds are known."""
-        solved = zip(alignments.items(), results.alignments, strict=False)
-        self._solved = {number: (alignment, shifts) for (number, alignment), shifts in solved}
+        self._solved = {
+            number: (alignments[number], shifts)
+            for number, shifts in results.alignments.items()
+            if number in alignments
+        }
         self._choice.clear()
         for number, (_, shifts) in self._solved.items():
             for eye in shifts:

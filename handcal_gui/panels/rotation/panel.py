@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal.register.guard import turn_advice
-from handcal.station.procedure import Observation, PlacedHand, State
+from handcal.station.hands import PlacedHand
+from handcal.station.procedure import Observation, State
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.types import Float64
 from handcal_gui.panels.rotation.dial import RotationDial
@@ -77,12 +78,12 @@ class RotationPanel(QWidget):
             self._show_nothing("? No hand", sentence(observation.problem) or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
-        if angle_rad < _STRAIGHT_RAD and not observation.is_red:
+        if angle_rad < _STRAIGHT_RAD and not observation.is_over_limit:
             self._dial.show_angle(angle_rad, self._limit_rad, "✓ Hold still")
             self._hand.show_turn("")
             self._advice.setText(_STRAIGHT)
             return
-        word = "▲ Turn back" if observation.is_red else "✓ Near enough"
+        word = "▲ Turn back" if observation.is_over_limit else "✓ Near enough"
         advice = turn_advice(observation.rotation_rad)
         self._dial.show_angle(angle_rad, self._limit_rad, word)
         self._hand.show_turn(advice.axis, positive=advice.angle_rad > 0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
@@ -24,7 +26,6 @@ from handcal_gui.widgets.record_tabs import RecordTabs
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     TRIAL_COLUMNS,
-    Deletion,
     alignment_rows,
     deletions,
     trial_rows,
@@ -39,19 +40,15 @@ class SessionPanel(QWidget):
 
     Attributes
     ----------
-    delete_alignment_requested, restore_alignment_requested : Signal(int)
-        The alignment's number.
-    delete_trial_requested, restore_trial_requested : Signal(int)
-        The trial's number.
+    delete_requested, restore_requested : Signal(str, int)
+        Kind and number of the alignment or trial.
     notes_changed : Signal(str)
         All notes, 0.8 s after the last key.
     export_requested : Signal()
     """
 
-    delete_alignment_requested = Signal(int)
-    restore_alignment_requested = Signal(int)
-    delete_trial_requested = Signal(int)
-    restore_trial_requested = Signal(int)
+    delete_requested = Signal(str, int)
+    restore_requested = Signal(str, int)
     notes_changed = Signal(str)
     export_requested = Signal()
 
@@ -66,15 +63,17 @@ class SessionPanel(QWidget):
         self._alignments = RecordTable(
             "Alignments", ALIGNMENT_COLUMNS, "Confirmed alignments appear here"
         )
-        self._alignments.delete_requested.connect(self.delete_alignment_requested)
+        self._alignments.delete_requested.connect(partial(self.delete_requested.emit, "alignment"))
         self._trials = RecordTable(
             "Trials of the session", TRIAL_COLUMNS, "Recorded trials appear here"
         )
-        self._trials.delete_requested.connect(self.delete_trial_requested)
+        self._trials.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
         self._notes = NotesEditor()
         self._notes.changed.connect(self.notes_changed)
         self._strip = UndoStrip(self)
-        self._strip.restore_requested.connect(self._restore)
+        self._strip.restore_requested.connect(
+            lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
+        )
         self._tabs = RecordTabs()
         self._open_folder = QPushButton("Open folder")
         self._export = QPushButton("Export…")
@@ -113,12 +112,6 @@ class SessionPanel(QWidget):
     def flush(self) -> None:
         """Ask now for notes to be saved that wait for that."""
         self._notes.flush()
-
-    def _restore(self, deletion: Deletion) -> None:
-        if deletion.kind == "alignment":
-            self.restore_alignment_requested.emit(deletion.number)
-        else:
-            self.restore_trial_requested.emit(deletion.number)
 
     def _refresh(self) -> None:
         record = self._record

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
@@ -59,16 +61,16 @@ class TrialsPanel(QWidget):
     hide_target_requested : Signal()
     doubted : Signal(str)
         Why a trial is asked for only if the user asks again.
-    delete_trial_requested, restore_trial_requested : Signal(int)
-        The trial's number.
+    delete_requested, restore_requested : Signal(str, int)
+        "trial", and its number.
     """
 
     trial_requested = Signal(str, float)
     show_target_requested = Signal(str, float)
     hide_target_requested = Signal()
     doubted = Signal(str)
-    delete_trial_requested = Signal(int)
-    restore_trial_requested = Signal(int)
+    delete_requested = Signal(str, int)
+    restore_requested = Signal(str, int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -89,12 +91,12 @@ class TrialsPanel(QWidget):
         self._table = RecordTable(
             "Trials", TRIAL_COLUMNS, "Trials appear here as they are recorded"
         )
-        self._table.delete_requested.connect(self.delete_trial_requested)
+        self._table.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
         self._statistics = NumberTable("Statistics of trials")
         self._plot = TrialPlot()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
-            lambda deletion: self.restore_trial_requested.emit(deletion.number)
+            lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
         )
         self._lay_out()
         self._refresh()
@@ -110,11 +112,11 @@ class TrialsPanel(QWidget):
         """Show the trials of a session."""
         before, self._record = self._record, record
         if before is None or trials_id(before) != trials_id(record):
-            statistics = summarise(record.trials)
+            statistics = summarise(record.trials.values())
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(statistics))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(statistics))
-            self._plot.show_trials(record.trials, statistics)
+            self._plot.show_trials(record.trials.values(), statistics)
         self._show_deletions()
 
     def set_read_only(self, is_read_only: bool) -> None:
@@ -129,7 +131,7 @@ class TrialsPanel(QWidget):
         chosen: Eye | None = self._eyes.currentData()
         if chosen is not None:
             return chosen
-        trials = self._record.trials if self._record else ()
+        trials = tuple(self._record.trials.values()) if self._record else ()
         return "right" if trials and trials[-1].eye == "left" else "left"
 
     def _why_not(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 
 import numpy as np
 from PySide6.QtWidgets import QWidget
@@ -36,7 +36,7 @@ class TrialPlot(Plot):
             eye: self.add_line(eye, name=EYE_NAMES[eye], symbol=_SIGNS[eye][0]) for eye in EYES
         }
 
-    def show_trials(self, trials: Sequence[Trial], statistics: TrialStatistics) -> None:
+    def show_trials(self, trials: Collection[Trial], statistics: TrialStatistics) -> None:
         """Show other trials with their statistics."""
         for eye, line in self._errors.items():
             seen = [trial for trial in trials if trial.eye == eye]

@@ -95,7 +95,7 @@ class EvaluationPage(QWidget):
         self._results.show_outcome(None)
         self._bar.run(
             "Beginning",
-            lambda tell, is_cancelled: self._evaluation.run(entries, tell, is_cancelled),
+            lambda progress: self._evaluation.run(entries, progress.report, progress.is_cancelled),
             self._show_outcome,
         )
 

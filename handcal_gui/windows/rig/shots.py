@@ -9,12 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.errors import CancelledError, FileError
+from handcal.errors import FileError
 from handcal.io.images import read_image
+from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.views import View, image_files, pair_views, read_views
 from handcal.types import UInt8
-from handcal_gui.engine.jobs import IsCancelled, Report
 
 _SMALL_PX = 96
 _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
@@ -42,7 +42,7 @@ class Shot:
 
 
 def look(
-    folders: Sequence[Path], board: Board, report: Report, is_cancelled: IsCancelled
+    folders: Sequence[Path], board: Board, progress: Progress = Progress()
 ) -> tuple[Shot, ...]:
     """Look for the board in one folder of images, or in two whose images belong together.
 
@@ -57,9 +57,7 @@ def look(
     for number, folder in enumerate(folders):
 
         def told(name: str, share: float, number: int = number) -> None:
-            if is_cancelled():
-                raise CancelledError("the search was cancelled")
-            report(f"Looking for the board in {name}", (number + share) / len(folders))
+            progress.at((number + share) / len(folders), f"Looking for the board in {name}")
 
         paths = image_files([folder])
         views = read_views(paths, board, told)

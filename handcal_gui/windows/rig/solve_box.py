@@ -7,10 +7,9 @@ from typing import Any
 
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from handcal.errors import CancelledError
+from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.types import Origin
-from handcal_gui.engine.jobs import IsCancelled, Report
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import main_button
 from handcal_gui.widgets.finding_line import FindingLine
@@ -49,10 +48,9 @@ class SolveBox(QWidget):
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
         """Solve in a job; `then` takes what it comes to."""
 
-        def solve(_report: Report, is_cancelled: IsCancelled) -> object:
+        def solve(progress: Progress) -> object:
             solved = work()
-            if is_cancelled():
-                raise CancelledError("given up")
+            progress.check()
             return solved
 
         self.bar.run("Solving", solve, then)

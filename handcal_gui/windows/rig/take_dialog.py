@@ -12,11 +12,11 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.take_board import keep_imager, keep_images, see_board
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
+from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings, ViewChooser
 from handcal.rig.views import View, view
 from handcal.station.doctor import Finding, Health
-from handcal_gui.engine.jobs import IsCancelled, Report
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, named
@@ -112,7 +112,7 @@ class TakeDialog(QDialog):
         if images is None or self._bar.is_busy:
             return
 
-        def work(_report: Report, _is_cancelled: IsCancelled) -> object:
+        def work(_progress: Progress) -> object:
             names = keep_images(images, tuple(self._folders.values()))
             return [view(name, one, self._board) for name, one in zip(names, images, strict=True)]
 

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QLabel, QProgressDialog, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError
+from handcal.progress import Progress
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.preferences import PreferencesFile
@@ -37,12 +38,10 @@ class Solver:
         self.began = threading.Event()
         self.was_cancelled = threading.Event()
 
-    def __call__(
-        self, _alignments: Any, _rig: Any, _settings: Any, report: Any, is_cancelled: Any
-    ) -> Results:
-        report("Solving alignment 1 of 2", 0.0)
+    def __call__(self, _alignments: Any, _rig: Any, _settings: Any, progress: Progress) -> Results:
+        progress.at(0.0, "Solving alignment 1 of 2")
         self.began.set()
-        while not is_cancelled():
+        while not progress.is_cancelled():
             threading.Event().wait(0.01)
         self.was_cancelled.set()
         raise CancelledError("solving was cancelled")

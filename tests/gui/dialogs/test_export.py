@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,8 +20,9 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CancelledError, FileError
+from handcal.errors import FileError
 from handcal.export.export import ExportSettings
+from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.widgets.path_field import PathField
@@ -41,15 +42,13 @@ class Exporter:
         _: SessionRecord,
         folder: Path,
         settings: ExportSettings,
-        report: Callable[[str, float], None],
-        is_cancelled: Callable[[], bool],
+        progress: Progress,
     ) -> tuple[Path, ...]:
         self.folders.append(folder)
         self.settings.append(settings)
-        report("Report (PDF)", 0.25)
+        progress.at(0.25, "Report (PDF)")
         while not self.may_end.wait(0.01):
-            if is_cancelled():
-                raise CancelledError("cancelled")
+            progress.check()
         if self.failure:
             raise FileError(self.failure)
         return folder / "a.csv", folder / "clouds" / "b.ply"

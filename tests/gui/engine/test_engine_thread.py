@@ -14,7 +14,7 @@ from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.station.procedure import ProcedureError
 from handcal.station.station import Station
-from handcal_gui.engine.engine_thread import Stream
+from handcal_gui.engine.engine_thread import EngineThread
 
 
 class FakeStation(Closable):
@@ -42,52 +42,52 @@ def write_notes(station: FakeStation, text: str, _station: Station) -> None:
 
 
 @contextmanager
-def streaming(qtbot: QtBot, station: FakeStation) -> Iterator[Stream]:
-    stream = Stream(lambda: cast(Station, station))
-    with qtbot.waitSignal(stream.opened, timeout=5000):
-        stream.start()
-    yield stream
-    stream.close()
+def streaming(qtbot: QtBot, station: FakeStation) -> Iterator[EngineThread]:
+    engine = EngineThread(lambda: cast(Station, station))
+    with qtbot.waitSignal(engine.opened, timeout=5000):
+        engine.start()
+    yield engine
+    engine.close()
     assert station.is_closed
 
 
 def test_the_newest_snapshot_waits_and_no_old_one(qtbot: QtBot) -> None:
     station = FakeStation()
-    with streaming(qtbot, station) as stream:
+    with streaming(qtbot, station) as engine:
         qtbot.waitUntil(lambda: station.steps > 20)
-        assert cast(int, stream.newest()[0]) >= 20
+        assert cast(int, engine.newest()[0]) >= 20
 
 
 def test_it_tells_which_commands_the_newest_snapshot_shows(qtbot: QtBot) -> None:
-    with streaming(qtbot, FakeStation()) as stream:
-        assert stream.newest()[1] == 0
-        numbers = [stream.ask("wait", lambda _station: time.sleep(0.01)) for _ in range(2)]
+    with streaming(qtbot, FakeStation()) as engine:
+        assert engine.newest()[1] == 0
+        numbers = [engine.submit("wait", lambda _station: time.sleep(0.01)) for _ in range(2)]
         assert numbers == [1, 2]
-        qtbot.waitUntil(lambda: stream.newest()[1] == 2)
+        qtbot.waitUntil(lambda: engine.newest()[1] == 2)
 
 
 def test_closing_it_tells_all_that_it_had_to_say_at_once(qtbot: QtBot) -> None:
     def fail(_station: Station) -> None:
         raise ZeroDivisionError("oh")
 
-    stream = Stream(lambda: cast(Station, FakeStation()))
+    engine = EngineThread(lambda: cast(Station, FakeStation()))
     heard: list[str] = []
-    stream.opened.connect(lambda _station: heard.append("opened"))
-    stream.failed.connect(lambda _name, why: heard.append(why))
-    stream.ended.connect(lambda why: heard.append(f"ended {why}"))
-    stream.ask("fail", fail)
-    stream.start()
-    stream.close()
+    engine.opened.connect(lambda _station: heard.append("opened"))
+    engine.failed.connect(lambda _name, why: heard.append(why))
+    engine.ended.connect(lambda why: heard.append(f"ended {why}"))
+    engine.submit("fail", fail)
+    engine.start()
+    engine.close()
     assert heard == ["opened", "ZeroDivisionError: oh", "ended "]
 
 
 def test_commands_run_in_the_engine_s_thread_and_answer_in_the_window_s(qtbot: QtBot) -> None:
     heard: list[threading.Thread] = []
-    with streaming(qtbot, FakeStation()) as stream:
-        stream.obeyed.connect(lambda *_: heard.append(threading.current_thread()))
-        with qtbot.waitSignal(stream.obeyed, timeout=5000) as obeyed:
-            stream.ask("where", lambda _station: threading.current_thread().name)
-    assert obeyed.args == ["where", "handcal engine"]
+    with streaming(qtbot, FakeStation()) as engine:
+        engine.command_done.connect(lambda *_: heard.append(threading.current_thread()))
+        with qtbot.waitSignal(engine.command_done, timeout=5000) as command_done:
+            engine.submit("where", lambda _station: threading.current_thread().name)
+    assert command_done.args == ["where", "handcal engine"]
     assert heard == [threading.main_thread()]
 
 
@@ -99,9 +99,9 @@ def test_a_command_that_fails_is_told_and_the_engine_goes_on(
         raise error
 
     station = FakeStation()
-    with streaming(qtbot, station) as stream:
-        with qtbot.waitSignal(stream.failed, timeout=5000) as failed:
-            stream.ask("apply", fail)
+    with streaming(qtbot, station) as engine:
+        with qtbot.waitSignal(engine.failed, timeout=5000) as failed:
+            engine.submit("apply", fail)
         steps = station.steps
         qtbot.waitUntil(lambda: station.steps > steps + 3)
     assert failed.args == ["apply", "solve first"]
@@ -109,9 +109,9 @@ def test_a_command_that_fails_is_told_and_the_engine_goes_on(
 
 def test_what_was_asked_for_just_before_the_end_is_done(qtbot: QtBot) -> None:
     station = FakeStation()
-    with streaming(qtbot, station) as stream:
+    with streaming(qtbot, station) as engine:
         for text in ("a", "ab", "abc"):
-            stream.ask("notes", partial(write_notes, station, text))
+            engine.submit("notes", partial(write_notes, station, text))
     assert station.notes == "abc"
 
 
@@ -119,19 +119,19 @@ def test_a_station_that_cannot_be_opened_says_why(qtbot: QtBot) -> None:
     def fail() -> Station:
         raise FileError("there is no rig file")
 
-    stream = Stream(fail)
-    with qtbot.waitSignal(stream.ended, timeout=5000) as ended:
-        stream.start()
-    stream.close()
+    engine = EngineThread(fail)
+    with qtbot.waitSignal(engine.ended, timeout=5000) as ended:
+        engine.start()
+    engine.close()
     assert ended.args == ["there is no rig file"]
 
 
 def test_an_engine_that_breaks_down_closes_the_station_and_says_so(qtbot: QtBot) -> None:
     station = FakeStation()
     station.breaks_at = 5
-    stream = Stream(lambda: cast(Station, station))
-    with qtbot.waitSignal(stream.ended, timeout=5000) as ended:
-        stream.start()
-    stream.close()
+    engine = EngineThread(lambda: cast(Station, station))
+    with qtbot.waitSignal(engine.ended, timeout=5000) as ended:
+        engine.start()
+    engine.close()
     assert ended.args == ["handcal broke down (ZeroDivisionError: oh); the session is kept"]
     assert station.is_closed

@@ -6,13 +6,14 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CancelledError, FileError
-from handcal_gui.engine.jobs import IsCancelled, Job, Report
+from handcal.errors import FileError
+from handcal.progress import Progress
+from handcal_gui.engine.jobs import Job
 
 
 def test_progress_and_result_reach_the_window_s_thread(qtbot: QtBot) -> None:
-    def work(report: Report, _is_cancelled: IsCancelled) -> str:
-        report("half", 0.5)
+    def work(progress: Progress) -> str:
+        progress.at(0.5, "half")
         return f"done in {threading.current_thread().name}"
 
     job = Job(work)
@@ -28,11 +29,10 @@ def test_progress_and_result_reach_the_window_s_thread(qtbot: QtBot) -> None:
 def test_cancel_stops_the_work(qtbot: QtBot) -> None:
     started = threading.Event()
 
-    def work(_report: Report, is_cancelled: IsCancelled) -> None:
+    def work(progress: Progress) -> None:
         started.set()
-        while not is_cancelled():
-            pass
-        raise CancelledError("as asked")
+        while True:
+            progress.check()
 
     job = Job(work)
     job.start()
@@ -50,7 +50,7 @@ def test_cancel_stops_the_work(qtbot: QtBot) -> None:
     ],
 )
 def test_failure_is_told_in_words(qtbot: QtBot, error: Exception, text: str) -> None:
-    def work(_report: Report, _is_cancelled: IsCancelled) -> None:
+    def work(_progress: Progress) -> None:
         raise error
 
     job = Job(work)
@@ -61,7 +61,7 @@ def test_failure_is_told_in_words(qtbot: QtBot, error: Exception, text: str) -> 
 
 
 def test_nothing_is_heard_of_a_job_that_was_abandoned(qtbot: QtBot) -> None:
-    job = Job(lambda report, _is_cancelled: report("half", 0.5))
+    job = Job(lambda progress: progress.at(0.5, "half"))
     heard: list[object] = []
     job.progressed.connect(lambda *what: heard.append(what))
     job.succeeded.connect(heard.append)

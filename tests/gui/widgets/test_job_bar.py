@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CancelledError, FileError
-from handcal_gui.engine.jobs import IsCancelled, Report
+from handcal.errors import FileError
+from handcal.progress import Progress
 from handcal_gui.widgets.job_bar import JobBar
 
 
@@ -21,18 +21,18 @@ def bar(qtbot: QtBot) -> Iterator[JobBar]:
     bar.stop()
 
 
-def until_cancelled(report: Report, is_cancelled: IsCancelled) -> object:
-    report("Counting", 0.25)
-    while not is_cancelled():
+def until_cancelled(progress: Progress) -> object:
+    progress.at(0.25, "Counting")
+    while True:
         threading.Event().wait(0.005)
-    raise CancelledError("given up")
+        progress.check()
 
 
 def test_a_job_is_shown_and_its_result_taken(qtbot: QtBot, bar: JobBar) -> None:
     may_end, taken = threading.Event(), list[object]()
 
-    def work(report: Report, _is_cancelled: IsCancelled) -> object:
-        report("Counting", 0.25)
+    def work(progress: Progress) -> object:
+        progress.at(0.25, "Counting")
         may_end.wait(10)
         return 42
 
@@ -62,7 +62,7 @@ def test_a_job_is_cancelled(qtbot: QtBot, bar: JobBar) -> None:
 
 
 def test_a_failure_is_told(qtbot: QtBot, bar: JobBar) -> None:
-    def work(_report: Report, _is_cancelled: IsCancelled) -> object:
+    def work(_progress: Progress) -> object:
         raise FileError("no such folder")
 
     with qtbot.waitSignal(bar.failed) as failed:
@@ -74,6 +74,6 @@ def test_a_failure_is_told(qtbot: QtBot, bar: JobBar) -> None:
 def test_the_newest_job_counts(qtbot: QtBot, bar: JobBar) -> None:
     taken = list[object]()
     bar.run("First", until_cancelled, taken.append)
-    bar.run("Second", lambda _report, _is_cancelled: "second", taken.append)
+    bar.run("Second", lambda _progress: "second", taken.append)
     qtbot.waitUntil(lambda: not bar.is_busy)
     assert taken == ["second"]

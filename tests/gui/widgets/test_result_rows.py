@@ -74,14 +74,14 @@ def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -
         assert left != NOTHING
         assert right == NOTHING
     assert cells(rows, "Eye distance") == (NOTHING,)
-    assert [row.label for row in alignment_rows(left_only, ["1"], rig)] == ["1 left"]
+    assert [row.label for row in alignment_rows(left_only, rig)] == ["1 left"]
     assert "right" not in another_text(left_only, rig)
 
 
 def test_each_alignment_is_told_alone(results: Results, rig: Rig) -> None:
-    rows = alignment_rows(results, ["2", NOTHING], rig)
-    assert [row.label for row in rows] == ["2 left", "2 right", "– left", "– right"]
-    expected = PHI[2].text(results.alignments[1]["left"], rig.eyes["left"])
+    rows = alignment_rows(results, rig)
+    assert [row.label for row in rows] == ["1 left", "1 right", "2 left", "2 right"]
+    expected = PHI[2].text(results.alignments[2]["left"], rig.eyes["left"])
     assert rows[2].cells[2] == expected
 
 

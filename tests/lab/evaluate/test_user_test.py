@@ -69,7 +69,7 @@ def test_sessions_are_read_once_and_others_named(user_test: UserTest, folder: Pa
     assert "holds no trial" in left_out["no-trial"]
     assert "line 1 is not an event" in left_out["broken"]
     assert left_out["zz-copy"] == f"is a copy of {folder / 'one'}"
-    assert "is no session" in left_out["missing"]
+    assert "is not a session" in left_out["missing"]
 
 
 def test_each_corner_is_an_error(user_test: UserTest) -> None:
@@ -81,7 +81,7 @@ def test_each_corner_is_an_error(user_test: UserTest) -> None:
 
 def test_errors_are_those_of_the_trials(user_test: UserTest) -> None:
     result = evaluate_user_test(user_test)
-    trials = [trial for record in user_test.sessions.values() for trial in record.trials]
+    trials = [trial for record in user_test.sessions.values() for trial in record.trials.values()]
     arcmin = np.concatenate([trial.error_arcmin for trial in trials])
     assert result.total.arcmin.mean == pytest.approx(arcmin.mean())
     assert result.total.arcmin.median == pytest.approx(np.median(arcmin))
@@ -122,7 +122,7 @@ def test_a_single_wearers_interval_is_over_calibrations(folder: Path) -> None:
 def test_without_trials_there_is_nothing_to_evaluate(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"no trial of the user test.*no-trial: holds no trial"):
         read_user_test([folder / "no-trial"])
-    with pytest.raises(FileError, match="is no session"):
+    with pytest.raises(FileError, match="is not a session"):
         read_user_test([tmp_path])
 
 

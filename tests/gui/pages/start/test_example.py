@@ -17,8 +17,8 @@ def test_the_example_is_copied_once_and_is_complete(tmp_path: Path) -> None:
     record = Session.open(path)
     assert record.is_finished
     assert record.is_solved
-    assert {eye for alignment in record.alignments for eye in alignment.eyes} == set(EYES)
-    assert {(trial.eye, trial.target_depth_m) for trial in record.trials} == {
+    assert {eye for alignment in record.alignments.values() for eye in alignment.eyes} == set(EYES)
+    assert {(trial.eye, trial.target_depth_m) for trial in record.trials.values()} == {
         (eye, depth_m) for eye in EYES for depth_m in (0.4, 0.5, 0.6)
     }
     with Session(path) as session:

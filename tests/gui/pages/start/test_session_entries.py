@@ -47,7 +47,7 @@ def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(
 ) -> None:
     nameless = make(tmp_path, "", [alignment, alignment], is_done=True)
     with Session(nameless) as session:
-        session.delete_alignment(1)
+        session.delete("alignment", 1)
     unused = make(tmp_path, "Cid", [], is_done=True)
     damaged = tmp_path / "damaged"
     damaged.mkdir()

@@ -34,13 +34,15 @@ def actions(view: View) -> list[Action]:
 
 
 def aligned(record: SessionRecord, alignment: Alignment, *eyes: tuple[Eye, ...]) -> SessionRecord:
-    return replace(record, alignments=tuple(replace(alignment, eyes=those) for those in eyes))
+    return replace(
+        record, alignments={n: replace(alignment, eyes=those) for n, those in enumerate(eyes, 1)}
+    )
 
 
 @pytest.fixture
 def start(snapshot: Maker, record: SessionRecord) -> Snapshot:
     """Return a station just opened: everything connected, a hand held still, nothing aligned."""
-    return snapshot(State.SHOW_HAND, record=replace(record, alignments=()))
+    return snapshot(State.SHOW_HAND, record=replace(record, alignments={}))
 
 
 @pytest.mark.parametrize(
@@ -142,7 +144,7 @@ def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
 
 def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) -> None:
     refusal = "Your hand is turned by 14.0°, more than 9°."
-    seen = {"is_red": True}
+    seen = {"is_over_limit": True}
     view = Wizard().view(
         snapshot(procedure={"eyes": ("left",), "refusal": refusal}, observation=seen)
     )

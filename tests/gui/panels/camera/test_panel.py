@@ -109,13 +109,13 @@ def test_the_hand_is_drawn_in_both_pictures(panel: CameraPanel, snapshot: Maker)
         without = picture(panel, name)
         panel.show_snapshot(snapshot())
         blue = picture(panel, name)
-        panel.show_snapshot(snapshot(observation={"is_red": True}))
+        panel.show_snapshot(snapshot(observation={"is_over_limit": True}))
         assert without != blue
         assert blue != picture(panel, name)
 
 
 def test_a_turned_hand_is_called_so_in_words(panel: CameraPanel, snapshot: Maker) -> None:
-    turned = {"is_red": True, "rotation_rad": np.radians([0.0, 0.0, 12.34])}
+    turned = {"is_over_limit": True, "rotation_rad": np.radians([0.0, 0.0, 12.34])}
     panel.show_snapshot(snapshot(observation=turned))
     assert view(panel, "colour").caption == "Turned by 12.3°: too far"
 

@@ -83,7 +83,7 @@ def test_cursor_and_hand_are_shown_about_the_cursor(
 def test_hand_beyond_the_guard_is_red_and_said_to_be(
     panel: CloudPanel, snapshot: MakeSnapshot
 ) -> None:
-    panel.show_snapshot(snapshot(observation={"is_red": True}))
+    panel.show_snapshot(snapshot(observation={"is_over_limit": True}))
     assert "turned too far" in _view(panel).accessibleDescription()
     assert _count(panel, colors().red) > 100
     assert _count(_view(panel), colors().live) == 0
@@ -134,7 +134,7 @@ def test_finished_alignment_shows_residuals_on_a_scale(
     scale = panel.findChild(ResidualScale)
     assert scale is not None
     assert not scale.isVisible()
-    panel.show_alignment(alignments[0], results.alignments[0]["left"].residuals_m)
+    panel.show_alignment(alignments[0], results.alignments[1]["left"].residuals_m)
     assert scale.isVisible()
     assert _legend(panel) == ["Cursor 600", "Hand 600"]
     assert _count(_view(panel), colors().live) == 0
@@ -201,7 +201,7 @@ def test_mouse_turns_moves_and_goes_back(panel: CloudPanel, snapshot: MakeSnapsh
 
 
 def test_it_fits_into_a_small_dock(panel: CloudPanel, snapshot: MakeSnapshot) -> None:
-    panel.show_snapshot(snapshot(observation={"is_red": True}))
+    panel.show_snapshot(snapshot(observation={"is_over_limit": True}))
     hint = panel.minimumSizeHint()
     assert hint.width() <= 300
     assert hint.height() <= 220

@@ -109,7 +109,7 @@ def test_an_eye_without_part_is_not_judged(
     panel: ResultsPanel, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
     one = replace(alignments[0], eyes=("right",))
-    panel.show_results(solve_session([one], rig, SolveSettings()), {3: one}, rig)
+    panel.show_results(solve_session({3: one}, rig, SolveSettings()), {3: one}, rig)
     card = child(panel, VerdictCard, "verdict-left")
     texts = [label.text() for label in card.findChildren(QLabel)]
     assert "– Not solved" in texts
@@ -123,7 +123,7 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
     lines = child(solved, ConvergencePlot).item.listDataItems()
     assert len(lines) == 4
     iterations, rms_mm = lines[2].getData()
-    history_m2 = results.alignments[1]["left"].history_m2
+    history_m2 = results.alignments[2]["left"].history_m2
     np.testing.assert_array_equal(iterations, np.arange(1, len(history_m2) + 1))
     np.testing.assert_allclose((rms_mm / 1e3) ** 2, history_m2)
 
@@ -137,7 +137,7 @@ def test_the_map_shows_each_point_of_the_chosen_hand_once(
     inliers, outliers = (
         np.column_stack(scatter.getData()) for scatter in child(solved, ResidualMap).scatters
     )
-    is_outlier = np.isnan(results.alignments[1]["left"].residuals_m)
+    is_outlier = np.isnan(results.alignments[2]["left"].residuals_m)
     places_mm = 1e3 * transform(alignments[1].T_E_W["left"], alignments[1].hand_m)[:, :2]
     np.testing.assert_allclose(inliers, places_mm[~is_outlier])
     np.testing.assert_allclose(outliers, places_mm[is_outlier])

@@ -49,8 +49,8 @@ def history(panel: RotationPanel) -> tuple[Any, Any]:
 
 def turned(snapshot: Make, rotation_deg: Any, t_s: float = 0.0) -> Snapshot:
     rotation_rad = np.radians(rotation_deg)
-    is_red = bool(np.linalg.norm(rotation_rad) > np.radians(9.0))
-    seen = {"rotation_rad": rotation_rad, "is_red": is_red}
+    is_over = bool(np.linalg.norm(rotation_rad) > np.radians(9.0))
+    seen = {"rotation_rad": rotation_rad, "is_over_limit": is_over}
     return snapshot(observation=seen, t_host_ns=round(1e9 * t_s))
 
 
@@ -73,7 +73,7 @@ def test_the_word_says_whether_it_may_be_confirmed(
 
 
 def test_a_strict_limit_is_told_however_small(panel: RotationPanel, snapshot: Make) -> None:
-    seen = {"rotation_rad": np.radians([0.0, 1.5, 0.0]), "is_red": True}
+    seen = {"rotation_rad": np.radians([0.0, 1.5, 0.0]), "is_over_limit": True}
     limit = {"guard_limit_rad": float(np.radians(1.0))}
     panel.show_snapshot(snapshot(observation=seen, procedure=limit))
     assert word(panel) == "▲ Turn back"

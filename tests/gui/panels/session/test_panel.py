@@ -89,20 +89,20 @@ def test_deletes_and_takes_back(
     panel.show_record(record, results)
     alignments = table(panel, "alignments")
     alignments.selectRow(1)
-    with qtbot.waitSignal(panel.delete_alignment_requested) as asked:
+    with qtbot.waitSignal(panel.delete_requested) as asked:
         tool(panel, "Delete").click()
-    assert asked.args == [2]
+    assert asked.args == ["alignment", 2]
     with Session(record.path) as session:
-        session.delete_alignment(2)
+        session.delete("alignment", 2)
     panel.show_record(Session.open(record.path), None)
     assert alignments.model().rowCount() == 1
     assert undo_text(panel) == "Alignment 2 deleted."
     alignments.setFocus()
-    with qtbot.waitSignal(panel.restore_alignment_requested) as asked:
+    with qtbot.waitSignal(panel.restore_requested) as asked:
         QTest.keyClick(alignments, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert asked.args == [2]
+    assert asked.args == ["alignment", 2]
     with Session(record.path) as session:
-        session.restore_alignment(2)
+        session.restore("alignment", 2)
     panel.show_record(Session.open(record.path), None)
     assert alignments.model().rowCount() == 2
     assert undo_text(panel) == ""
@@ -116,17 +116,17 @@ def test_deletes_trials_and_takes_back(
         trial = make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [0.001, 0.0, 0.0])
         for _ in range(2):
             session.save_trial(trial)
-        session.delete_trial(2)
+        session.delete("trial", 2)
     panel.show_record(Session.open(record.path), None)
     [tabs] = panel.findChildren(QTabWidget)
     tabs.setCurrentIndex(1)
     table(panel, "trials-of-the-session").selectRow(0)
-    with qtbot.waitSignal(panel.delete_trial_requested) as asked:
+    with qtbot.waitSignal(panel.delete_requested) as asked:
         tool(panel, "Delete").click()
-    assert asked.args == [1]
-    with qtbot.waitSignal(panel.restore_trial_requested) as asked:
+    assert asked.args == ["trial", 1]
+    with qtbot.waitSignal(panel.restore_requested) as asked:
         tool(panel, "Undo").click()
-    assert asked.args == [2]
+    assert asked.args == ["trial", 2]
     tabs.setCurrentIndex(2)
     assert not tool(panel, "Delete").isVisible()
 
@@ -144,7 +144,7 @@ def test_a_finished_session_is_only_looked_at(
     qtbot: QtBot, panel: SessionPanel, record: SessionRecord
 ) -> None:
     with Session(record.path) as session:
-        session.delete_alignment(2)
+        session.delete("alignment", 2)
         session.finish()
     panel.set_read_only(True)
     panel.show_record(Session.open(record.path), None)

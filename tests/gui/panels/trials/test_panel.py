@@ -38,7 +38,7 @@ def tried(record: SessionRecord, rig: Rig) -> SessionRecord:
     with Session(record.path) as session:
         for eye, depth_m in trials:
             session.save_trial(make_trial(rig.eyes[eye], eye, depth_m, np.zeros(3), [1e-3, 0, 0]))
-        session.delete_trial(2)
+        session.delete("trial", 2)
     return Session.open(record.path)
 
 
@@ -202,7 +202,7 @@ def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -
     [table] = panel.findChildren(RecordTable)
     numbers = [table.model().index(row, 0).data() for row in range(table.model().rowCount())]
     assert numbers == ["1", "3"]
-    mean = np.concatenate([trial.error_arcmin for trial in tried.trials]).mean()
+    mean = np.concatenate([trial.error_arcmin for trial in tried.trials.values()]).mean()
     assert label(panel, "summary").startswith(f"2 trials: {mean:.1f} ±")
     [statistics] = panel.findChildren(NumberTable)
     assert "0.4 m" in statistics.as_text()
@@ -214,29 +214,29 @@ def test_plots_every_corner_and_each_median(panel: TrialsPanel, tried: SessionRe
     [plot] = panel.findChildren(TrialPlot)
     drawn = {line.name(): line.getData() for line in plot.item.listDataItems()}
     _, errors = drawn["Left eye"]
-    expected = np.concatenate([trial.error_arcmin for trial in tried.trials])
+    expected = np.concatenate([trial.error_arcmin for trial in tried.trials.values()])
     np.testing.assert_allclose(errors[~np.isnan(errors)], expected)
     at_m, medians = drawn["Median"]
     np.testing.assert_allclose(np.nanmean(at_m.reshape(2, 3), axis=1), (0.4, 0.6))
     np.testing.assert_allclose(
         np.nanmean(medians.reshape(2, 3), axis=1),
-        [np.median(trial.error_arcmin) for trial in tried.trials],
+        [np.median(trial.error_arcmin) for trial in tried.trials.values()],
     )
 
 
 def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: SessionRecord) -> None:
     with Session(tried.path) as session:
-        session.delete_alignment(1)
+        session.delete("alignment", 1)
     panel.show_record(Session.open(tried.path))
     [table] = panel.findChildren(RecordTable)
     table.selectRow(1)
-    with qtbot.waitSignal(panel.delete_trial_requested) as asked:
+    with qtbot.waitSignal(panel.delete_requested) as asked:
         tool(panel, "Delete").click()
-    assert asked.args == [3]
+    assert asked.args == ["trial", 3]
     assert label(panel, "undoText") == "Trial 2 deleted.", "alignments are not of this panel"
-    with qtbot.waitSignal(panel.restore_trial_requested) as asked:
+    with qtbot.waitSignal(panel.restore_requested) as asked:
         QTest.keyClick(panel, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert asked.args == [2]
+    assert asked.args == ["trial", 2]
 
 
 def test_a_finished_session_is_only_looked_at(panel: TrialsPanel, tried: SessionRecord) -> None:

@@ -5,7 +5,7 @@ from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.station.wearer_view import EyeView, see
+from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import Float64, UInt8
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.theme import colors
@@ -21,7 +21,7 @@ def _view(
     outline_m: Float64 = RING_M, drawn_shift_m: Float64 | None = None, image: UInt8 | None = None
 ) -> EyeView:
     drawn_m = np.zeros(3) if drawn_shift_m is None else drawn_shift_m
-    return see(
+    return render_eye_view(
         "left", DISPLAY, np.zeros(3), drawn_m, outline_m, RING_M[:0], is_true=True, image=image
     )
 
@@ -106,7 +106,7 @@ def test_world_and_outline_lie_where_the_display_has_them(canvas: EyeCanvas) -> 
 def test_target_is_shown_as_seen_and_as_drawn(canvas: EyeCanvas) -> None:
     none_m, corners_m = RING_M[:0], RING_M[::25]  # slanting lines have pixels of full colour
     eye_m, drawn_m = np.zeros(3), np.array([0.02, 0.0, 0.0])
-    view = see("left", DISPLAY, eye_m, drawn_m, none_m, none_m, corners_m, is_true=True)
+    view = render_eye_view("left", DISPLAY, eye_m, drawn_m, none_m, none_m, corners_m, is_true=True)
     canvas.show_view(view)
     corners_px = np.vstack([view.target_px, view.drawn_target_px])
     assert all(canvas.crop_px.contains(x, y) for x, y in corners_px.tolist())

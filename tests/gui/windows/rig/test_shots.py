@@ -6,22 +6,15 @@ import pytest
 
 from handcal.camera.take_board import keep_images
 from handcal.errors import CancelledError, FileError
+from handcal.progress import Progress
 from handcal.rig.views import ViewsError
 from handcal_gui.windows.rig.shots import look, without
-
-
-def silent(_what: str, _share: float) -> None:
-    pass
-
-
-def go_on() -> bool:
-    return False
 
 
 def test_pairs_are_looked_through(photographs: Any) -> None:
     told: list[float] = []
     folders = [photographs.folder / name for name in ("depth", "headset")]
-    shots = look(folders, photographs.work.board, lambda _, share: told.append(share), go_on)
+    shots = look(folders, photographs.work.board, Progress(lambda _, share: told.append(share)))
     assert [shot.name for shot in shots][::8] == ["depth-001.png", "depth-099.png"]
     assert shots[0].files == tuple(folder / f"{folder.name}-001.png" for folder in folders)
     assert all(view.found for shot in shots[:8] for view in shot.views)
@@ -33,23 +26,27 @@ def test_pairs_are_looked_through(photographs: Any) -> None:
 
 
 def test_what_is_left_out_is_marked(photographs: Any) -> None:
-    shots = look([photographs.folder / "grid-left"], photographs.work.board, silent, go_on)
+    shots = look([photographs.folder / "grid-left"], photographs.work.board)
     views = without(shots, ["grid-left-002.png"])
     assert [[view.dropped for view in one] for one in views] == [[False], [True]]
 
 
 def test_looking_can_be_given_up(photographs: Any) -> None:
     with pytest.raises(CancelledError):
-        look([photographs.folder / "depth"], photographs.work.board, silent, lambda: True)
+        look(
+            [photographs.folder / "depth"],
+            photographs.work.board,
+            Progress(is_cancelled=lambda: True),
+        )
 
 
 def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path: Path) -> None:
     keep_images([np.zeros((100, 100, 3), np.uint8)] * 2, [tmp_path / "a", tmp_path / "b"])
     (tmp_path / "b" / "b-001.png").rename(tmp_path / "b" / "b-7.png")
     with pytest.raises(ViewsError, match="belong together"):
-        look([tmp_path / "a", tmp_path / "b"], photographs.work.board, silent, go_on)
+        look([tmp_path / "a", tmp_path / "b"], photographs.work.board)
 
 
 def test_an_empty_folder_is_told(photographs: Any, tmp_path: Path) -> None:
     with pytest.raises(FileError, match="no PNG"):
-        look([tmp_path], photographs.work.board, silent, go_on)
+        look([tmp_path], photographs.work.board)

@@ -37,7 +37,7 @@ RIG = example_rig()
 def shots_of(photographs: Any, *folders: str, board: Any = None) -> tuple[Shot, ...]:
     paths = [photographs.folder / folder for folder in folders]
     board = board or photographs.work.board
-    return look(paths, board, lambda _what, _share: None, lambda: False)
+    return look(paths, board)
 
 
 @pytest.fixture(scope="module")

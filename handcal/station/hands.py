@@ -1,0 +1,147 @@
+"""The hands seen recently, placed in the world by the headset's pose at their exposure."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.errors import HandError, PoseError, PosePendingError
+from handcal.geometry import transform
+from handcal.types import Float64, HandCloud
+
+_KEEP_S = 1.0
+"""Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""
+_MEDIAN_STRIDE = 8
+"""Every eighth point is enough for the median; all of them take half a millisecond."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedHand:
+    """A hand cloud with its place in the world."""
+
+    cloud: HandCloud
+    t_host_ns: int
+    """Time of its exposure on the host's monotonic clock."""
+    T_W_D: Float64
+    """(4, 4)."""
+    points_W_m: Float64
+    """(N, 3); the cloud's surface."""
+    middle_W_m: Float64
+    """(3,); its median, to a millimetre."""
+
+
+class RecentHands:
+    """The hands of the last second or so, in the order of their exposure.
+
+    A hand is placed once the headset's pose at its exposure is known, which may be some frames
+    after its own.
+
+    Parameters
+    ----------
+    pose_at_host_ns : callable
+        Returns T_W_H (4, 4) at a host time, or raises PosePendingError or PoseError.
+    T_H_D : (4, 4) float64
+        From the depth camera to the headset.
+    steady_s, steady_m : float
+        A hand is steady if it moved less than `steady_m` for `steady_s`.
+    """
+
+    def __init__(
+        self,
+        pose_at_host_ns: Callable[[int], Float64],
+        T_H_D: Float64,
+        steady_s: float,
+        steady_m: float,
+    ) -> None:
+        self._pose_at_host_ns = pose_at_host_ns
+        self._T_H_D = T_H_D
+        self._steady_ns = round(1e9 * steady_s)
+        self._steady_m = steady_m
+        self._keep_ns = round(1e9 * (steady_s + _KEEP_S))
+        self._placed: deque[PlacedHand] = deque()
+        self._unplaced: deque[tuple[HandCloud, int]] = deque()
+        self._seen_ns = 0
+
+    def add(self, cloud: HandCloud | None, t_host_ns: int) -> tuple[PlacedHand | None, str]:
+        """Take the cloud of a new frame, None if it shows no hand, and place what can be placed.
+
+        Returns
+        -------
+        tuple of (PlacedHand or None, str)
+            The newest hand placed now, and the reason if none was.
+        """
+        self._seen_ns = t_host_ns
+        if cloud is not None:
+            self._unplaced.append((cloud, t_host_ns))
+        self._forget_old()
+        hand, problem = None, ""
+        while self._unplaced:
+            waiting, t_ns = self._unplaced[0]
+            try:
+                hand = self._place(waiting, t_ns)
+            except PosePendingError as error:
+                problem = str(error)
+                break
+            except PoseError as error:
+                problem = str(error)
+            else:
+                self._placed.append(hand)
+            self._unplaced.popleft()
+        return hand, problem
+
+    def newest(self, max_age_s: float) -> PlacedHand | None:
+        """Return the newest placed hand unless it is older than this at the newest frame."""
+        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > 1e9 * max_age_s:
+            return None
+        return self._placed[-1]
+
+    def steady(self) -> PlacedHand | None:
+        """Return the newest hand if it is in view and has hardly moved for a while, else None."""
+        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > self._steady_ns:
+            return None
+        since_ns = self._seen_ns - self._steady_ns
+        before = [hand.middle_W_m for hand in self._placed if hand.t_host_ns <= since_ns]
+        after = [hand.middle_W_m for hand in self._placed if hand.t_host_ns > since_ns]
+        # From the last one before, so that a slow camera gives enough of them too.
+        places = before[-1:] + after
+        is_long_enough = bool(before and after)
+        if is_long_enough and float(np.ptp(places, axis=0).max()) < self._steady_m:
+            return self._placed[-1]
+        return None
+
+    def placed_until_ns(self) -> int:
+        """Return the time up to which every hand seen has been placed."""
+        if not self._unplaced:
+            return self._seen_ns
+        return self._placed[-1].t_host_ns if self._placed else 0
+
+    def nearest(self, t_host_ns: int, tolerance_s: float) -> PlacedHand:
+        """Return the hand nearest in time; HandError if none is within the tolerance."""
+        near = [
+            hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= 1e9 * tolerance_s
+        ]
+        if not near:
+            raise HandError("The camera did not see your hand")
+        return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
+
+    def clear(self) -> None:
+        """Forget all hands."""
+        self._placed.clear()
+        self._unplaced.clear()
+
+    def _place(self, cloud: HandCloud, t_host_ns: int) -> PlacedHand:
+        T_W_D = self._pose_at_host_ns(t_host_ns) @ self._T_H_D
+        points_W_m = transform(T_W_D, cloud.points_m)
+        middle_W_m = np.median(points_W_m[::_MEDIAN_STRIDE], axis=0)
+        return PlacedHand(cloud, t_host_ns, T_W_D, points_W_m, middle_W_m)
+
+    def _forget_old(self) -> None:
+        """Forget what is too old both for a confirmation and for judging steadiness."""
+        oldest_ns = self._seen_ns - self._keep_ns
+        while self._placed and self._placed[0].t_host_ns < oldest_ns:
+            self._placed.popleft()
+        while self._unplaced and self._unplaced[0][1] < oldest_ns:
+            self._unplaced.popleft()
