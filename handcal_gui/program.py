@@ -45,8 +45,8 @@ from handcal_gui.windows.rig.wizard import RigWizard
 from handcal_gui.windows.rig.work import WorkFolder
 
 _KEYS = (
-    ("Space", "Press the large button at the lower right, from everywhere but a text field"),
-    ("Ctrl+Return", "Press the large button, from a text field too"),
+    ("Space", "Press the large button, except from a text field"),
+    ("Ctrl+Return", "Press the large button from anywhere"),
     ("Return", "Press the button, or open the list, that has the focus"),
     ("Alt and the underlined letter", "Press a button at the lower left"),
     ("Esc", "Close the message at the top"),

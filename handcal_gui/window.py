@@ -9,7 +9,15 @@ from functools import partial
 from typing import Literal, Protocol
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence, QPainter, QPaintEvent
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QColor,
+    QKeyEvent,
+    QKeySequence,
+    QPainter,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -37,7 +45,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.banner import Banner
 
 Page = Literal["start", "live", "review"]
@@ -132,7 +140,8 @@ class MainWindow(QMainWindow):
         layout.addWidget(self.banner)
         layout.addWidget(self._stack, 1)
         self.setCentralWidget(middle)
-        self.setStatusBar(_Strip(wizard.bar))
+        self._bar = wizard.bar
+        self.setStatusBar(_Strip(self._bar))
         # Grouped: a dock without title is taken out by its tab.
         options = QMainWindow.DockOption
         self.setDockOptions(
@@ -238,17 +247,25 @@ class MainWindow(QMainWindow):
         if event.key() == Qt.Key.Key_Escape:
             self.banner.clear()
         elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._page == "live":
-            if not event.isAutoRepeat():
+            if not self._bar.is_repeat:
                 _press(QApplication.focusWidget())
         else:
             super().keyPressEvent(event)
 
+    def event(self, event: QEvent) -> bool:
+        """Let the bar see whether a key is only held down."""
+        if isinstance(event, QKeyEvent):
+            self._bar.notice_key(event)
+        return super().event(event)
+
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Take the keys that a floating dock has no use for, as from one in its place."""
         is_apart = isinstance(watched, QDockWidget) and watched.window() is not self
-        if is_apart and isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
-            self.keyPressEvent(event)
-            return event.isAccepted()
+        if is_apart and isinstance(event, QKeyEvent):
+            self._bar.notice_key(event)
+            if event.type() == QEvent.Type.KeyPress:
+                self.keyPressEvent(event)
+                return event.isAccepted()
         return super().eventFilter(watched, event)
 
     def changeEvent(self, event: QEvent) -> None:
@@ -309,8 +326,7 @@ class MainWindow(QMainWindow):
         self.resizeDocks([docks["camera"], docks["cloud"]], [camera, height - camera], down)
         rotation = height * 42 // 100
         self.resizeDocks([docks["rotation"], docks["results"]], [rotation, height - rotation], down)
-        bar = self.statusBar().sizeHint().height()
-        self.resizeDocks([docks["wearer_view"]], [height - wizard - bar], down)
+        self.resizeDocks([docks["wearer_view"]], [height - wizard - self._bar.height()], down)
 
     def _draw_title_buttons(self) -> None:
         """Draw the buttons of docks as other icons are: Qt's own are dark in the dark, too."""
@@ -363,7 +379,7 @@ class _Strip(QStatusBar):
     def paintEvent(self, _event: QPaintEvent) -> None:
         """Draw a line above the bar."""
         painter = QPainter(self)
-        painter.setPen(self.palette().mid().color())
+        painter.setPen(QColor(colors().muted))
         painter.drawLine(0, 0, self.width(), 0)
         painter.end()
 

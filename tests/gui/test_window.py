@@ -253,9 +253,9 @@ def test_nothing_moves_the_main_button(
         for shown in (view, replace(view, sentence=LONG, note=LONG, checks=checks)):
             say(program, now, shown)
             look()
-        window.banner.show_message(LONG)
-        look()
-        window.banner.clear()
+    window.banner.show_message(LONG)
+    look()
+    window.banner.clear()
     for condition in (LONG, ""):
         window.banner.show_condition(condition)
         look()
@@ -275,8 +275,12 @@ def test_nothing_moves_the_main_button(
         look()
     window.reset_layout()
     look()
+    for show in (window.showMaximized, window.showNormal):
+        show()
+        places.add(corner_px(window))
     window.show_page("review")
     window.show_page("live")
+    window.resize(*size_px)
     look()
     assert len(places) == 1
 

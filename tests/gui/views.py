@@ -36,4 +36,4 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
     assert {view.step for view in views} == set(Step)
     offers = [offer for view in views for offer in (view.main, *view.others)]
     assert {offer.action for offer in offers} == set(Action)
-    return views
+    return list(dict.fromkeys(views))

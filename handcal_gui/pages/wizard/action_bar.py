@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -48,6 +48,8 @@ class ActionBar(QWidget):
         super().__init__(parent)
         self.setObjectName("actionBar")
         self._view: View | None = None
+        self._is_repeat = False
+        self._released = (0, 0)  # key, and time in ms
         self._main = main_button("wizardMain")
         self._main.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._main.setToolTip(f"{_native(_KEY)}, or {_native(_TEXT_KEY)} from a text field")
@@ -63,7 +65,7 @@ class ActionBar(QWidget):
         for keys in _KEYS:
             # Always enabled: the key of a disabled shortcut would go to what has the focus.
             shortcut = QShortcut(QKeySequence(keys), self, autoRepeat=False)
-            shortcut.activated.connect(self._main.click)
+            shortcut.activated.connect(self._take_key)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
@@ -80,6 +82,23 @@ class ActionBar(QWidget):
             if offer != was:
                 button.clearFocus()  # which was given to what the button was before
                 self._show_offer(button, offer)
+
+    @property
+    def is_repeat(self) -> bool:
+        """Whether the newest key is only held down."""
+        return self._is_repeat
+
+    def notice_key(self, event: QKeyEvent) -> None:
+        """Look at a key that the window gets, before it has an effect.
+
+        An X server repeats a held key as a release and a press at the same instant, which Qt does
+        not always recognise.
+        """
+        key = (event.key(), event.timestamp())
+        if event.type() == QEvent.Type.KeyRelease:
+            self._released = key
+        elif event.type() == QEvent.Type.ShortcutOverride:
+            self._is_repeat = event.isAutoRepeat() or (key[1] > 0 and key == self._released)
 
     def press_main(self) -> None:
         """Do what the main button does."""
@@ -99,7 +118,7 @@ class ActionBar(QWidget):
         self._draw_key()
         scale_font(self._key, 0.9)
         widest = max(self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in _KEYS)
-        self._key.setFixedWidth(widest + 2 * SPACING_PX)
+        self._key.setFixedSize(widest + 2 * SPACING_PX, 3 * SPACING_PX)
         self._show_key(None, None)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(2 * SPACING_PX, SPACING_PX, 2 * SPACING_PX, SPACING_PX)
@@ -128,6 +147,10 @@ class ActionBar(QWidget):
             button.setToolTip(f"{letter}, or Return while this button has the focus")
             button.setEnabled(offer.is_enabled)
 
+    def _take_key(self) -> None:
+        if not self._is_repeat:
+            self._main.click()
+
     def _arm(self) -> None:
         for i, button in enumerate(self._others):
             offer = self._offer(i)
@@ -148,7 +171,7 @@ class ActionBar(QWidget):
         shade = colors().muted
         self._key.setStyleSheet(
             f"color: {shade}; border: 1px solid {shade}; border-bottom-width: 3px;"
-            " border-radius: 4px; padding: 1px 0;"
+            " border-radius: 4px; padding: 0;"
         )
 
 
