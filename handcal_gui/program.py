@@ -45,7 +45,10 @@ from handcal_gui.windows.rig.wizard import RigWizard
 from handcal_gui.windows.rig.work import WorkFolder
 
 _KEYS = (
-    ("Space", "What the wizard's large button says"),
+    ("Space", "Press the large button, except from a text field"),
+    ("Ctrl+Return", "Press the large button from anywhere"),
+    ("Return", "Press the button, or open the list, that has the focus"),
+    ("Alt and the underlined letter", "Press a button at the lower left"),
     ("Esc", "Close the message at the top"),
     ("Tab", "Go to the next button or field"),
     ("F", "Freeze the camera's picture"),

@@ -1,4 +1,4 @@
-"""The main window: pages in the middle, panels in docks around them, menus above."""
+"""The main window: pages in the middle, panels in docks around them, menus above, a bar below."""
 
 from __future__ import annotations
 
@@ -9,15 +9,25 @@ from functools import partial
 from typing import Literal, Protocol
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QColor,
+    QKeyEvent,
+    QKeySequence,
+    QPainter,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
+    QComboBox,
     QDockWidget,
     QFrame,
     QMainWindow,
     QScrollArea,
     QStackedWidget,
+    QStatusBar,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -35,7 +45,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, colors, icon
 from handcal_gui.widgets.banner import Banner
 
 Page = Literal["start", "live", "review"]
@@ -108,12 +118,9 @@ class MainWindow(QMainWindow):
     ----------
     closing : Signal()
         The window is about to close.
-    space_pressed : Signal()
-        The space bar, where nothing else takes it.
     """
 
     closing = Signal()
-    space_pressed = Signal()
 
     def __init__(
         self, start: StartPage, wizard: WizardPanel, review: QWidget, panels: Panels
@@ -133,6 +140,8 @@ class MainWindow(QMainWindow):
         layout.addWidget(self.banner)
         layout.addWidget(self._stack, 1)
         self.setCentralWidget(middle)
+        self._bar = wizard.bar
+        self.setStatusBar(_Strip(self._bar))
         # Grouped: a dock without title is taken out by its tab.
         options = QMainWindow.DockOption
         self.setDockOptions(
@@ -151,7 +160,7 @@ class MainWindow(QMainWindow):
         self._arrange()
         self._default_layout = self.saveState(_LAYOUT_VERSION)
         self._make_menus()
-        self._give_space_to_the_wizard()
+        self._keep_focus_off_clicked_buttons()
         self.show_page("start")
 
     @property
@@ -168,6 +177,7 @@ class MainWindow(QMainWindow):
         """Show a page with the docks that belong to it, laid out as they were left."""
         self._keep_layout()
         self._page = page
+        self.statusBar().setVisible(page == "live")
         self._stack.setCurrentIndex(list(self._pages).index(page))
         self.restoreState(self._layouts.get(page, self._default_layout), _LAYOUT_VERSION)
         for name, dock in self._docks.items():
@@ -183,10 +193,12 @@ class MainWindow(QMainWindow):
         self._leave_titles_to_tabs()
 
     def bring_up(self, name: str) -> None:
-        """Bring a panel before those that share its place, unless the user is at work in one."""
-        docks, focus = self._docks.values(), QApplication.focusWidget()
-        if name in self._docks and not any(focus and dock.isAncestorOf(focus) for dock in docks):
-            self._docks[name].raise_()
+        """Bring a panel before those that share its place, unless one of them has the keyboard."""
+        dock, focus = self._docks.get(name), QApplication.focusWidget()
+        if dock is not None:
+            others = self.tabifiedDockWidgets(dock)
+            if not any(focus and other.isAncestorOf(focus) for other in others):
+                dock.raise_()
 
     def go_to(self, name: str) -> None:
         """Show a panel before the others and give it the keyboard, if it belongs to the page."""
@@ -231,20 +243,29 @@ class MainWindow(QMainWindow):
         return action
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Let the space bar do what comes next, and Esc close the message."""
-        if event.key() == Qt.Key.Key_Space and not event.isAutoRepeat():
-            self.space_pressed.emit()
-        elif event.key() == Qt.Key.Key_Escape:
+        """Let Return press what has the focus, as Space does not, and Esc close the message."""
+        if event.key() == Qt.Key.Key_Escape:
             self.banner.clear()
+        elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._page == "live":
+            if not self._bar.is_repeat:
+                _press(QApplication.focusWidget())
         else:
             super().keyPressEvent(event)
+
+    def event(self, event: QEvent) -> bool:
+        """Let the bar see whether a key is only held down."""
+        if isinstance(event, QKeyEvent):
+            self._bar.notice_key(event)
+        return super().event(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Take the keys that a floating dock has no use for, as from one in its place."""
         is_apart = isinstance(watched, QDockWidget) and watched.window() is not self
-        if is_apart and isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
-            self.keyPressEvent(event)
-            return event.isAccepted()
+        if is_apart and isinstance(event, QKeyEvent):
+            self._bar.notice_key(event)
+            if event.type() == QEvent.Type.KeyPress:
+                self.keyPressEvent(event)
+                return event.isAccepted()
         return super().eventFilter(watched, event)
 
     def changeEvent(self, event: QEvent) -> None:
@@ -299,13 +320,13 @@ class MainWindow(QMainWindow):
         if self._page == "review":  # which needs little room itself
             page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
             left = right = (width - page) // 2
-        wizard = self._pages["live"].sizeHint().height() + 12 * SPACING_PX  # with the banner
+        wizard = self._pages["live"].sizeHint().height() + 14 * SPACING_PX  # with the banner
         self.resizeDocks([docks["camera"], docks["rotation"]], [left, right], across)
         camera = left * 9 // 16 + 15 * SPACING_PX
         self.resizeDocks([docks["camera"], docks["cloud"]], [camera, height - camera], down)
         rotation = height * 42 // 100
         self.resizeDocks([docks["rotation"], docks["results"]], [rotation, height - rotation], down)
-        self.resizeDocks([docks["wearer_view"]], [height - wizard], down)
+        self.resizeDocks([docks["wearer_view"]], [height - wizard - self._bar.height()], down)
 
     def _draw_title_buttons(self) -> None:
         """Draw the buttons of docks as other icons are: Qt's own are dark in the dark, too."""
@@ -339,11 +360,36 @@ class MainWindow(QMainWindow):
         for dock in self._docks.values():
             view.addAction(dock.toggleViewAction())
 
-    def _give_space_to_the_wizard(self) -> None:
-        """Keep the focus off buttons that are clicked, which would take the space bar."""
+    def _keep_focus_off_clicked_buttons(self) -> None:
+        """Leave the keyboard to what has it when a button is clicked."""
         for button in self.findChildren(QAbstractButton):
             if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
                 button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+
+
+class _Strip(QStatusBar):
+    """The window's bottom strip, below all docks; holds a bar and nothing else."""
+
+    def __init__(self, bar: QWidget) -> None:
+        super().__init__()
+        self.setSizeGripEnabled(False)  # which comes and goes, and moves the bar
+        self.setContentsMargins(0, 0, 0, 0)
+        self.addPermanentWidget(bar, 1)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """Draw a line above the bar."""
+        painter = QPainter(self)
+        painter.setPen(QColor(colors().muted))
+        painter.drawLine(0, 0, self.width(), 0)
+        painter.end()
+
+
+def _press(widget: QWidget | None) -> None:
+    """Press a button, or open a list, that has the focus."""
+    if isinstance(widget, QAbstractButton):
+        widget.click()
+    elif isinstance(widget, QComboBox) and not widget.isEditable():
+        widget.showPopup()
 
 
 def _scrollable(page: QWidget) -> QScrollArea:

@@ -151,7 +151,6 @@ class CalibrationController(QObject):
         self._wizard_panel.step_changed.connect(
             lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
         )
-        self._window.space_pressed.connect(self._wizard_panel.press_main)
         for name, dock in self._window.docks.items():
             dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
         self._connect_fine_tuning()

@@ -190,6 +190,36 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert stored.station == studio.settings
 
 
+def test_space_never_discards_wherever_tab_leads(live: Technician, studio: Any) -> None:
+    window = live.program.window
+    handle = window.windowHandle()
+    align(live, studio)
+    live.wait(lambda: live.can(Action.SOLVE))
+    live.wait(live.child(QPushButton, "wizardOther0").isEnabled)
+    live.child(QPushButton, "wizardMain").setEnabled(False)  # as when there is no hand
+    for _ in range(40):
+        QTest.keyClick(handle, Qt.Key.Key_Tab)
+        if live.program.window.focusWidget() is not live.child(QPlainTextEdit, ""):
+            QTest.keyClick(handle, Qt.Key.Key_Space)
+    live.qtbot.wait(300)
+    assert live.snapshot.procedure.state is State.ALIGNED
+    assert len(live.record.alignments) == 1
+    live.child(QPushButton, "wizardMain").setEnabled(True)
+    QTest.keyClick(handle, Qt.Key.Key_Space)
+    live.wait_for_state(State.SOLVED)
+
+
+def test_an_alignment_is_discarded_by_its_own_key_only(live: Technician, studio: Any) -> None:
+    align(live, studio)
+    live.wait(lambda: live.can(Action.SOLVE))
+    live.wait(live.child(QPushButton, "wizardOther0").isEnabled)
+    QTest.keyClick(
+        live.program.window.windowHandle(), Qt.Key.Key_D, Qt.KeyboardModifier.AltModifier
+    )
+    live.wait_for_state(State.SHOW_HAND)
+    live.wait(lambda: live.record.alignments == ())
+
+
 def shown_checks(technician: Technician) -> list[str]:
     """Return what the wizard says that there is, and is not."""
     shown = technician.program.wizard_panel.shown

@@ -60,6 +60,12 @@ class Window(Closable):
     def press(self, *keys: str) -> None:
         self._xdotool("key", *keys)
 
+    def hold(self, key: str, seconds: float) -> None:
+        """Keep a key down, which the X server repeats."""
+        self._xdotool("keydown", key)
+        time.sleep(seconds)
+        self._xdotool("keyup", key)
+
     def type(self, text: str) -> None:
         self._xdotool("type", text)
 
@@ -204,6 +210,45 @@ def test_a_technician_calibrates_with_the_keyboard_alone(
     (report,) = reports()
     assert report.read_bytes().startswith(b"%PDF")
     assert json.loads(preferences.read_text())["wearers"] == ["Bob", "Ada"]
+
+
+def test_the_space_bar_deletes_nothing_and_presses_once(
+    display: str, tmp_path: Path, preferences: Path
+) -> None:
+    def events() -> list[str]:
+        session = newest_session(tmp_path / "sessions")
+        return [event.name for event in session.events] if session else []
+
+    with Window(display, "--preferences", preferences) as window:
+        window.find()
+        time.sleep(2.0)
+        window.type("Ada")
+        window.press("Return")
+        wait_for("a session", lambda: bool(events()), window)
+        time.sleep(2.0)
+        for key in ("alt+y", "Down", "Escape", "Tab"):  # into the list of eyes, and on
+            window.press(key)
+            time.sleep(0.3)
+
+        def has_cursor() -> bool:
+            if "cursor_made" not in events():
+                window.press("space")
+                time.sleep(0.8)
+            return "cursor_made" in events()
+
+        wait_for("a cursor", has_cursor, window)
+        wait_for("an alignment", lambda: "alignment_saved" in events(), window)
+        time.sleep(2.0)  # until the button says so
+        window.hold("space", 3.0)
+        wait_for("a solution", lambda: "solved" in events(), window)
+        time.sleep(2.0)
+        window.shoot("real-7-held")
+        assert "applied" not in events()  # the next that the button offered
+        window.press("space")
+        wait_for("the projections", lambda: "applied" in events(), window)
+        assert "alignment_deleted" not in events()
+        window.press("ctrl+q")
+        window.end_well()
 
 
 def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(

@@ -1,16 +1,37 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QTabWidget,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
+from handcal.session.session import SessionRecord
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal_gui.pages.wizard.action_bar import ActionBar
+from handcal_gui.pages.wizard.steps import Action, Offer, Step, View, Wizard
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.window import MainWindow
+from tests.gui.views import all_views
 
 TABBED = ("results", "fine_tune", "trials", "session", "link")
 
@@ -28,6 +49,18 @@ def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
 @pytest.fixture
 def window(program: Program) -> MainWindow:
     return program.window
+
+
+def main_button(window: MainWindow) -> QPushButton:
+    found = window.findChild(QPushButton, "wizardMain")
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def offer_solve(window: MainWindow) -> None:
+    bar = window.findChild(ActionBar)
+    assert isinstance(bar, ActionBar)
+    bar.show_view(View(Step.SOLVE, "Solve.", (), Offer(Action.SOLVE, "Solve")))
 
 
 def shown(window: MainWindow) -> set[str]:
@@ -85,7 +118,8 @@ def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
     window: MainWindow, qtbot: QtBot
 ) -> None:
     window.show_page("live")
-    with qtbot.waitSignal(window.space_pressed, timeout=1000):
+    offer_solve(window)
+    with qtbot.waitSignal(main_button(window).clicked, timeout=1000):
         QTest.keyClick(window, Qt.Key.Key_Space)
     window.banner.show_message("Could not solve")
     QTest.keyClick(window, Qt.Key.Key_Escape)
@@ -128,7 +162,8 @@ def test_the_space_bar_is_the_wizards_in_a_dock_of_its_own_too(
     window.show_page("live")
     dock = window.docks["link"]
     dock.setFloating(True)
-    with qtbot.waitSignal(window.space_pressed, timeout=1000):
+    offer_solve(window)
+    with qtbot.waitSignal(main_button(window).clicked, timeout=1000):
         QTest.keyClick(dock.widget(), Qt.Key.Key_Space)
     window.banner.show_message("Could not solve")
     QTest.keyClick(dock.widget(), Qt.Key.Key_Escape)
@@ -163,3 +198,243 @@ def test_panels_are_reached_by_keys(qtbot: QtBot, window: MainWindow) -> None:
     window.show_page("start")
     QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
     assert not is_in_front(window, "trials")
+
+
+LONG = "The hand is cut by the image border, and the headset does not answer. " * 6
+_NONE = Qt.KeyboardModifier.NoModifier
+SIZES_PX = ((1280, 720), (1366, 768), (1920, 1080))
+Maker = Callable[..., Snapshot]
+
+
+class Saying(Wizard):
+    """A wizard that says what it is given."""
+
+    said: View
+
+    def view(self, _snapshot: Snapshot) -> View:
+        return self.said
+
+
+def say(program: Program, snapshot: Snapshot, view: View) -> None:
+    program.wizard_panel.wizard = wizard = Saying()
+    wizard.said = view
+    program.wizard_panel.show_snapshot(snapshot)
+
+
+def corner_px(window: MainWindow) -> tuple[int, int]:
+    """Return how far the main button's lower right corner is from the window's."""
+    for _ in range(3):  # a layout may ask for another
+        QApplication.processEvents()
+    main = main_button(window)
+    assert main.isVisible()
+    corner = main.mapTo(window, main.rect().bottomRight())
+    return window.width() - corner.x(), window.height() - corner.y()
+
+
+@pytest.mark.parametrize("size_px", SIZES_PX)
+def test_nothing_moves_the_main_button(
+    program: Program, snapshot: Maker, record: SessionRecord, size_px: tuple[int, int]
+) -> None:
+    window, now = program.window, snapshot()
+    window.show_page("live")
+    window.resize(*size_px)
+    places = {corner_px(window)}
+
+    def look() -> None:
+        places.add(corner_px(window))
+        assert window.size().toTuple() == size_px
+        assert window.statusBar().width() == window.width()
+
+    for panel in window.panels.all():
+        panel.show_snapshot(now)
+    look()
+    for view in all_views(snapshot, record):
+        checks = tuple(replace(check, text=LONG) for check in view.checks)
+        for shown in (view, replace(view, sentence=LONG, note=LONG, checks=checks)):
+            say(program, now, shown)
+            look()
+    window.banner.show_message(LONG)
+    look()
+    window.banner.clear()
+    for condition in (LONG, ""):
+        window.banner.show_condition(condition)
+        look()
+    for name, dock in window.docks.items():
+        for is_floating in (True, False):
+            dock.setFloating(is_floating)
+            look()
+        dock.close()
+        look()
+        if name != "link":
+            dock.show()
+    bottom = Qt.DockWidgetArea.BottomDockWidgetArea
+    window.addDockWidget(bottom, window.docks["results"])
+    look()
+    for dock in window.docks.values():
+        dock.close()
+        look()
+    window.reset_layout()
+    look()
+    for show in (window.showMaximized, window.showNormal):
+        show()
+        places.add(corner_px(window))
+    window.show_page("review")
+    window.show_page("live")
+    window.resize(*size_px)
+    look()
+    assert len(places) == 1
+
+
+def focusable(window: MainWindow) -> Iterator[QWidget]:
+    """Give every widget of the calibration page that can have the keyboard, tab after tab."""
+    seen: set[QWidget] = set()
+    for dock in window.docks.values():
+        dock.show()
+        dock.raise_()
+        tabs = dock.findChildren(QTabWidget)
+        for i in range(max([1, *(tab.count() for tab in tabs)])):
+            for tab in tabs:
+                tab.setCurrentIndex(i)
+            QApplication.processEvents()
+            for widget in window.findChildren(QWidget):
+                is_ready = widget.isVisible() and widget.isEnabled() and widget.window() is window
+                if is_ready and widget.focusPolicy() != Qt.FocusPolicy.NoFocus:
+                    if widget not in seen:
+                        yield widget
+                    seen.add(widget)
+
+
+TEXT_FIELDS = (QLineEdit, QPlainTextEdit, QAbstractSpinBox)
+
+
+def offer(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[object]:
+    """Show a page with everything on it, ready for keys; return the list of what will be asked."""
+    window = program.window
+    window.show_page("live")
+    window.activateWindow()
+    window.panels.fine_tune.set_rig(snapshot.record.rig)
+    for panel in window.panels.all():
+        panel.show_snapshot(snapshot)
+    discard = Offer(Action.REDO, "&Discard and repeat", discards="Deletes the last alignment")
+    others = (discard, Offer(Action.ANOTHER, "&Add alignment"), Offer(Action.BACK, "&Back"))
+    main = Offer(Action.SOLVE, "Solve", is_enabled)
+    say(program, snapshot, View(Step.SOLVE, "", (), main, others))
+    asked: list[object] = []
+    program.wizard_panel.asked.connect(asked.append)
+    for table in window.findChildren(RecordTable):
+        table.selectRow(0)
+    return asked
+
+
+def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NONE) -> None:
+    """Press a key as the window system does."""
+    QTest.keyClick(window.windowHandle(), key, modifiers)
+
+
+def watch_clicks(window: MainWindow) -> list[QAbstractButton]:
+    """Return the list of the buttons, other than the main one, that will be pressed."""
+    clicked: list[QAbstractButton] = []
+    for button in window.findChildren(QAbstractButton):
+        if button is not main_button(window):
+            button.clicked.connect(lambda _checked=False, button=button: clicked.append(button))
+    return clicked
+
+
+@pytest.mark.parametrize("is_enabled", [True, False])
+def test_space_presses_only_the_main_button_from_every_focus(
+    qtbot: QtBot, program: Program, snapshot: Maker, is_enabled: bool
+) -> None:
+    window = program.window
+    asked = offer(program, snapshot(State.APPLIED), is_enabled=is_enabled)
+    qtbot.waitActive(window)
+    wrong: list[object] = []
+    window.panels.session.delete_alignment_requested.connect(wrong.append)
+    clicked = watch_clicks(window)
+    expected = [Action.SOLVE] if is_enabled else []
+    texts, kinds = 0, set()
+    for widget in focusable(window):
+        widget.setFocus()
+        focused = window.focusWidget()
+        assert focused is not None
+        kinds.add(type(focused).__name__)
+        is_text = isinstance(focused, TEXT_FIELDS) and not focused.isReadOnly()
+        texts += is_text
+        asked.clear()
+        press(window, Qt.Key.Key_Space)
+        assert asked == ([] if is_text else expected), focused
+        if isinstance(focused, QPlainTextEdit) and is_text:
+            assert focused.toPlainText().count(" ") == 1
+        asked.clear()
+        press(window, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+        assert asked == expected, focused
+        assert wrong == clicked == []
+        assert QApplication.activePopupWidget() is None
+    assert {"QComboBox", "QCheckBox", "QToolButton", "QPushButton"} <= kinds
+    assert texts >= 4
+
+
+def test_return_presses_the_button_or_opens_the_list_that_has_the_focus(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    window = program.window
+    asked = offer(program, snapshot(State.APPLIED), is_enabled=True)
+    qtbot.waitActive(window)
+    clicked = watch_clicks(window)
+    boxes = window.panels.cloud.findChildren(QCheckBox)
+    add = window.findChild(QPushButton, "wizardOther1")
+    assert isinstance(add, QPushButton)
+    for button in (*boxes, add):
+        button.setFocus()
+        clicked.clear()
+        press(window, Qt.Key.Key_Return)
+        assert clicked == [button]
+    assert asked == [Action.ANOTHER]
+    plan = window.findChild(QComboBox, "wizardPlan")
+    assert isinstance(plan, QComboBox)
+    plan.setEnabled(True)
+    plan.setFocus()
+    press(window, Qt.Key.Key_Return)
+    assert plan.view().isVisible()
+    QTest.keyClick(plan.view(), Qt.Key.Key_Escape)
+
+
+def test_tab_leads_to_nothing_that_discards_or_deletes(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    window = program.window
+    offer(program, snapshot(State.APPLIED), is_enabled=True)
+    qtbot.waitActive(window)
+    reached: set[str] = set()
+    for name, dock in window.docks.items():
+        dock.raise_()
+        if name == "session":
+            dock.findChildren(RecordTable)[0].setFocus()
+        for _ in range(60):
+            press(window, Qt.Key.Key_Tab)
+            focused = window.focusWidget()
+            if isinstance(focused, QAbstractButton):
+                reached.add(focused.objectName() or focused.text())
+    assert {"wizardOther1", "wizardOther2", "Open folder", "Record trial"} <= reached
+    assert not {"wizardMain", "wizardOther0", "Delete"} & reached
+
+
+def test_keys_belong_to_other_pages_and_dialogs_as_usual(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    window = program.window
+    asked = offer(program, snapshot(State.APPLIED), is_enabled=True)
+    dialog = QDialog(window)
+    box = QCheckBox("Really", dialog)
+    dialog.open()
+    dialog.activateWindow()
+    qtbot.waitActive(dialog)
+    box.setFocus()
+    QTest.keyClick(dialog.windowHandle(), Qt.Key.Key_Space)
+    assert box.isChecked()
+    dialog.close()
+    window.show_page("review")
+    window.activateWindow()
+    qtbot.waitActive(window)
+    press(window, Qt.Key.Key_Space)
+    press(window, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert asked == []

@@ -71,7 +71,10 @@ class Offer:
 
     action: Action
     label: str
+    """Of a button other than the main one, with & before the letter that presses it with Alt."""
     is_enabled: bool = True
+    discards: str = ""
+    """What is lost, if anything is: then only a click or the letter presses the button."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,9 +188,9 @@ class Wizard:
         )
 
     def _show_hand(self, snapshot: Snapshot) -> View:
-        back = Offer(Action.BACK, "Back")
+        back = Offer(Action.BACK, "&Back")
         if snapshot.procedure.state is State.SHOW_HAND and snapshot.procedure.alignments:
-            back = Offer(Action.SOLVE, "Keep the alignments so far")
+            back = Offer(Action.SOLVE, "Keep the alignments &so far")
         return View(
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
@@ -204,7 +207,7 @@ class Wizard:
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
             (_hand_check(snapshot), Check("Hand held still", is_steady)),
             Offer(Action.MAKE_CURSOR, "Make cursor", is_steady),
-            (Offer(Action.BACK, "Back"),),
+            (Offer(Action.BACK, "&Back"),),
         )
 
     def _align(self, snapshot: Snapshot) -> View:
@@ -223,7 +226,7 @@ class Wizard:
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
             (hand, Check(f"Hand turned by less than {limit_deg:.0f}°", is_straight)),
             Offer(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
-            (Offer(Action.REDO, "Make another cursor"),),
+            (Offer(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
             procedure.refusal,
         )
 
@@ -231,7 +234,11 @@ class Wizard:
         procedure = snapshot.procedure
         count = len(snapshot.procedure.alignments)
         aligned = Check(f"{counted(count, 'alignment')} confirmed", True)
-        redo = Offer(Action.REDO, "Discard and repeat")
+        redo = Offer(
+            Action.REDO,
+            "&Discard and repeat",
+            discards="Deletes the last alignment; the session panel can restore it",
+        )
         if procedure.state is State.ALIGNED or procedure.results is None:
             return View(
                 Step.SOLVE,
@@ -263,7 +270,7 @@ class Wizard:
                 "The alignments have changed. Solve again.",
                 checks,
                 Offer(Action.SOLVE, "Solve"),
-                (Offer(Action.ANOTHER, "Add alignment"),),
+                (Offer(Action.ANOTHER, "&Add alignment"),),
             )
         if not is_complete(self.plan, snapshot.procedure.alignments.values()):
             eyes = _names(self.eyes(snapshot))
@@ -272,7 +279,7 @@ class Wizard:
                 f"Now the same with {eyes}.",
                 checks,
                 Offer(Action.ANOTHER, f"Align {eyes}"),
-                (Offer(Action.NEXT, "Leave it at one eye"),),
+                (Offer(Action.NEXT, "Leave it at &one eye"),),
             )
         return View(
             Step.VERIFY,
@@ -281,15 +288,15 @@ class Wizard:
             checks,
             Offer(Action.NEXT, "It fits"),
             (
-                Offer(Action.ANOTHER, "Add alignment"),
-                Offer(Action.REPEAT_LEFT, "Add left eye"),
-                Offer(Action.REPEAT_RIGHT, "Add right eye"),
+                Offer(Action.ANOTHER, "&Add alignment"),
+                Offer(Action.REPEAT_LEFT, "Add l&eft eye"),
+                Offer(Action.REPEAT_RIGHT, "Add &right eye"),
             ),
         )
 
     def _save(self, snapshot: Snapshot) -> View:
         where = snapshot.session_path
-        others = (Offer(Action.EXPORT, "Export…"), Offer(Action.BACK, "Back"))
+        others = (Offer(Action.EXPORT, "E&xport…"), Offer(Action.BACK, "&Back"))
         if snapshot.record.is_finished:
             return View(
                 Step.SAVE,

@@ -1,4 +1,4 @@
-"""The wizard's face: the steps, one sentence, what is still missing, and the buttons."""
+"""The wizard's face: the steps, one sentence, what is still missing; its buttons are in a bar."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from PySide6.QtWidgets import (
 
 from handcal.station.snapshot import Snapshot
 from handcal.types import EyePlan
-from handcal_gui.pages.wizard.steps import PLANS, STEPS, Check, Offer, Step, View, Wizard
+from handcal_gui.pages.wizard.action_bar import ActionBar
+from handcal_gui.pages.wizard.steps import PLANS, STEPS, Check, Step, View, Wizard
 from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
-from handcal_gui.widgets.fields import button, main_button
 
 _MOST_CHECKS = 3
-_MOST_OTHERS = 3
 
 
 class WizardPanel(QWidget):
@@ -28,6 +27,8 @@ class WizardPanel(QWidget):
     Attributes
     ----------
     wizard : Wizard
+    bar : ActionBar
+        Its buttons, for the window's bottom strip.
     shown : View or None
         What it says now; None before the first snapshot.
     asked : Signal(Action)
@@ -52,14 +53,11 @@ class WizardPanel(QWidget):
         self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
         self._note = QLabel(wordWrap=True)
         self._note.setObjectName("wizardNote")
-        self._main = main_button("wizardMain")
-        self._others = [button(f"wizardOther{i}", "") for i in range(_MOST_OTHERS)]
+        self.bar = ActionBar()
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
-        self._main.clicked.connect(lambda: self._ask(self.shown.main if self.shown else None))
-        for i, other in enumerate(self._others):
-            other.clicked.connect(lambda _checked=False, i=i: self._ask_other(i))
+        self.bar.asked.connect(self.asked)
         self._plan.currentIndexChanged.connect(self._choose_plan)
 
     def start(self, wizard: Wizard) -> None:
@@ -67,6 +65,7 @@ class WizardPanel(QWidget):
         self.wizard = wizard
         self._plan.setCurrentText(PLANS[wizard.plan])
         self.shown = None
+        self.bar.show_view(None)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show what the wizard says of a snapshot."""
@@ -79,7 +78,7 @@ class WizardPanel(QWidget):
 
     def press_main(self) -> None:
         """Do what the main button does."""
-        self._main.click()
+        self.bar.press_main()
 
     def changeEvent(self, event: QEvent) -> None:
         """Redraw icons when the colours change."""
@@ -108,11 +107,6 @@ class WizardPanel(QWidget):
         plan.addStretch()
         plan.addWidget(plan_label)
         plan.addWidget(self._plan)
-        others = QHBoxLayout()
-        for other in self._others:
-            others.addWidget(other)
-        others.addStretch()
-        others.addStrut(self._others[0].sizeHint().height())
         layout = QVBoxLayout(self)
         layout.setContentsMargins(*4 * (2 * SPACING_PX,))
         layout.setSpacing(SPACING_PX)
@@ -124,8 +118,6 @@ class WizardPanel(QWidget):
         for row in self._checks:
             layout.addWidget(row)
         layout.addWidget(self._note)
-        layout.addWidget(self._main)
-        layout.addLayout(others)
         layout.addStretch()
 
     def _refresh(self, view: View) -> None:
@@ -136,23 +128,11 @@ class WizardPanel(QWidget):
             row.show_check(view.checks[i] if i < len(view.checks) else None)
         self._note.setText(view.note)
         self._note.setStyleSheet(f"color: {colors().red}")
-        self._main.setText(view.main.label)
-        self._main.setEnabled(view.main.is_enabled)
-        self._main.setToolTip("Space bar")
-        for i, other in enumerate(self._others):
-            other.setVisible(i < len(view.others))
-            if i < len(view.others):
-                other.setText(view.others[i].label)
-                other.setEnabled(view.others[i].is_enabled)
-        self._plan.setEnabled(view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR))
-
-    def _ask(self, offer: Offer | None) -> None:
-        if offer is not None and offer.is_enabled:
-            self.asked.emit(offer.action)
-
-    def _ask_other(self, i: int) -> None:
-        if self.shown is not None and i < len(self.shown.others):
-            self._ask(self.shown.others[i])
+        self.bar.show_view(view)
+        can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
+        if not can_choose:
+            self._plan.clearFocus()  # which Qt would pass on
+        self._plan.setEnabled(can_choose)
 
     def _choose_plan(self, index: int) -> None:
         plan: EyePlan = list(PLANS)[index]

@@ -5,13 +5,15 @@ from collections.abc import Callable
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
+from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal_gui.pages.wizard.steps import Action, Step, Wizard
 from handcal_gui.pages.wizard.wizard import WizardPanel
+from tests.gui.views import all_views
 
 Maker = Callable[..., Snapshot]
 
@@ -22,11 +24,14 @@ def panel(qtbot: QtBot) -> WizardPanel:
     qtbot.addWidget(panel)
     panel.resize(460, 420)
     panel.show()
+    qtbot.addWidget(panel.bar)
+    panel.bar.resize(900, panel.bar.height())
+    panel.bar.show()
     return panel
 
 
-def child(panel: QWidget, name: str) -> QPushButton:
-    found = panel.findChild(QPushButton, name)
+def child(panel: WizardPanel, name: str) -> QPushButton:
+    found = panel.bar.findChild(QPushButton, name)
     assert isinstance(found, QPushButton)
     return found
 
@@ -67,7 +72,8 @@ def test_a_disabled_main_button_asks_for_nothing(
 def test_the_other_buttons_come_and_go(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
     panel.show_snapshot(snapshot(State.ALIGNED))
     other = child(panel, "wizardOther0")
-    assert (other.isVisible(), other.text()) == (True, "Discard and repeat")
+    assert (other.isVisible(), other.text()) == (True, "&Discard and repeat")
+    qtbot.waitUntil(other.isEnabled)
     with qtbot.waitSignal(panel.asked) as asked:
         QTest.mouseClick(other, Qt.MouseButton.LeftButton)
     assert asked.args == [Action.REDO]
@@ -77,18 +83,102 @@ def test_the_other_buttons_come_and_go(qtbot: QtBot, panel: WizardPanel, snapsho
 
 def test_nothing_jumps_when_the_texts_change(panel: WizardPanel, snapshot: Maker) -> None:
     places = set()
-    layout = panel.layout()
+    layout, main = panel.bar.layout(), child(panel, "wizardMain")
     assert layout is not None
     refused = {"refusal": "Your hand is turned by 14.0°, more than 9°. Turn it as the cursor is."}
     for made in (snapshot(), snapshot(procedure=refused), snapshot(State.ALIGNED)):
         panel.show_snapshot(made)
         layout.activate()
-        places.add(
-            child(panel, "wizardMain")
-            .mapTo(panel, child(panel, "wizardMain").rect().topLeft())
-            .toTuple()
-        )
+        places.add((main.geometry().getRect(), panel.bar.height()))
     assert len(places) == 1
+
+
+def test_every_label_fits_the_main_button(
+    panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    main = child(panel, "wizardMain")
+    for view in all_views(snapshot, record):
+        panel.bar.show_view(view)
+        assert main.text() == view.main.label
+        assert main.sizeHint().width() <= main.width()
+        assert main.sizeHint().height() <= main.height()
+
+
+def test_every_other_button_has_a_letter_and_none_that_discards_has_the_focus(
+    panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    menus_and_panels = set("FVH") | set("YCLWK")
+    for view in all_views(snapshot, record):
+        panel.bar.show_view(view)
+        letters = []
+        for i, offer in enumerate(view.others):
+            other = child(panel, f"wizardOther{i}")
+            discards = offer.action is Action.REDO
+            assert bool(offer.discards) == discards
+            policy = Qt.FocusPolicy.NoFocus if discards else Qt.FocusPolicy.TabFocus
+            assert other.focusPolicy() == policy
+            letters.append(other.shortcut().toString())
+            assert letters[-1] in other.toolTip()
+        assert all(letters)
+        assert len(set(letters)) == len(letters)
+        assert not {letter[-1] for letter in letters} & menus_and_panels
+
+
+def test_a_click_meant_for_the_button_before_does_not_discard(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.ALIGN))
+    other = child(panel, "wizardOther0")
+    qtbot.waitUntil(other.isEnabled)
+    panel.show_snapshot(snapshot(State.ALIGNED))  # the wearer has confirmed
+    with qtbot.assertNotEmitted(panel.asked):
+        QTest.mouseClick(other, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(other.isEnabled)
+    with qtbot.waitSignal(panel.asked) as asked:
+        QTest.mouseClick(other, Qt.MouseButton.LeftButton)
+    assert asked.args == [Action.REDO]
+
+
+def test_the_focus_does_not_stay_on_a_button_that_becomes_another(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    wizard = panel.wizard
+    wizard.view(snapshot(State.SOLVED))
+    panel.show_snapshot(snapshot(State.APPLIED))
+    other = child(panel, "wizardOther0")
+    panel.bar.activateWindow()
+    qtbot.waitActive(panel.bar)
+    other.setFocus()
+    assert other.hasFocus()
+    wizard.move(Action.ANOTHER, snapshot(State.APPLIED))
+    panel.show_snapshot(snapshot(State.APPLIED))
+    assert other.text() == "&Back"
+    assert panel.bar.focusWidget() is None
+
+
+def test_the_key_shown_is_the_one_that_works(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.ALIGNED))
+    key = panel.bar.findChild(QLabel, "wizardMainKey")
+    assert isinstance(key, QLabel)
+    field = QLineEdit(panel.bar)
+    field.show()
+    panel.bar.activateWindow()
+    qtbot.waitActive(panel.bar)
+    assert key.text() == "Space"
+    width = key.width()
+    field.setFocus()
+    assert key.text() == "Ctrl+Return"
+    assert key.width() == width >= key.sizeHint().width() - 2
+    QTest.keyClick(field, Qt.Key.Key_Space)
+    assert field.text() == " "
+    with qtbot.waitSignal(panel.asked) as asked:
+        QTest.keyClick(field, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert asked.args == [Action.SOLVE]
+    field.setReadOnly(True)
+    field.clearFocus()
+    assert key.text() == "Space"
 
 
 def test_the_plan_is_chosen_before_the_cursor_is_made(

@@ -1,0 +1,188 @@
+"""The action bar: the window's bottom strip, with the main button at the lower right."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QTextEdit,
+    QWidget,
+)
+
+from handcal_gui.pages.wizard.steps import Offer, View
+from handcal_gui.theme import SPACING_PX, colors, scale_font
+from handcal_gui.widgets.fields import main_button, named
+
+_KEY, _TEXT_KEY = "Space", "Ctrl+Return"
+_KEYS = (_KEY, _TEXT_KEY, "Ctrl+Enter")
+_LONGEST_LABEL = "Confirm for the wearer"
+_MOST_OTHERS = 3
+_ARMING_MS = 700
+"""Wait before a new button can discard anything: a click meant for its predecessor is lost."""
+
+
+class ActionBar(QWidget):
+    """Shows the buttons of a `View`; its height and the main button's place never change.
+
+    The space bar presses the main button from every focus but a text field, where Ctrl+Return
+    does. The main button never has the focus: a button that is disabled would pass it on.
+    Buttons that discard something have no focus either, only a letter with Alt.
+
+    Attributes
+    ----------
+    asked : Signal(Action)
+        A button was pressed.
+    """
+
+    asked = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("actionBar")
+        self._view: View | None = None
+        self._is_repeat = False
+        self._released = (0, 0)  # key, and time in ms
+        self._main = main_button("wizardMain")
+        self._main.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._main.setToolTip(f"{_native(_KEY)}, or {_native(_TEXT_KEY)} from a text field")
+        self._key = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._key.setObjectName("wizardMainKey")
+        self._others = [named(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
+        self._arming = QTimer(self, interval=_ARMING_MS, singleShot=True)
+        self._lay_out()
+        self._main.clicked.connect(lambda: self._ask(self._view.main if self._view else None))
+        for i, other in enumerate(self._others):
+            other.clicked.connect(lambda _checked=False, i=i: self._ask(self._offer(i)))
+        self._arming.timeout.connect(self._arm)
+        for keys in _KEYS:
+            # Always enabled: the key of a disabled shortcut would go to what has the focus.
+            shortcut = QShortcut(QKeySequence(keys), self, autoRepeat=False)
+            shortcut.activated.connect(self._take_key)
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        app.focusChanged.connect(self._show_key)
+
+    def show_view(self, view: View | None) -> None:
+        """Show the buttons of a view; none can be pressed without a view."""
+        before, self._view = self._view, view
+        self._main.setEnabled(view is not None and view.main.is_enabled)
+        if view is not None:
+            self._main.setText(view.main.label)
+        for i, button in enumerate(self._others):
+            was = before.others[i] if before and i < len(before.others) else None
+            offer = self._offer(i)
+            if offer != was:
+                button.clearFocus()  # which was given to what the button was before
+                self._show_offer(button, offer)
+
+    @property
+    def is_repeat(self) -> bool:
+        """Whether the newest key is only held down."""
+        return self._is_repeat
+
+    def notice_key(self, event: QKeyEvent) -> None:
+        """Look at a key that the window gets, before it has an effect.
+
+        An X server repeats a held key as a release and a press at the same instant, which Qt does
+        not always recognise.
+        """
+        key = (event.key(), event.timestamp())
+        if event.type() == QEvent.Type.KeyRelease:
+            self._released = key
+        elif event.type() == QEvent.Type.ShortcutOverride:
+            self._is_repeat = event.isAutoRepeat() or (key[1] > 0 and key == self._released)
+
+    def press_main(self) -> None:
+        """Do what the main button does."""
+        self._main.click()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Redraw the key when the colours change."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._draw_key()
+
+    def _lay_out(self) -> None:
+        label = self._main.text()
+        self._main.setText(_LONGEST_LABEL)
+        self._main.setFixedSize(self._main.sizeHint().width() + 4 * SPACING_PX, 5 * SPACING_PX)
+        self._main.setText(label)
+        self._draw_key()
+        scale_font(self._key, 0.9)
+        widest = max(self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in _KEYS)
+        self._key.setFixedSize(widest + 2 * SPACING_PX, 3 * SPACING_PX)
+        self._show_key(None, None)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(2 * SPACING_PX, SPACING_PX, 2 * SPACING_PX, SPACING_PX)
+        layout.setSpacing(SPACING_PX)
+        for button in self._others:
+            button.hide()
+            layout.addWidget(button)
+        layout.addStretch(1)
+        layout.addWidget(self._key, 0, Qt.AlignmentFlag.AlignVCenter)
+        layout.addWidget(self._main)
+        self.setFixedHeight(7 * SPACING_PX)
+
+    def _show_offer(self, button: QPushButton, offer: Offer | None) -> None:
+        button.setVisible(offer is not None)
+        if offer is None:
+            return
+        button.setText(offer.label)
+        letter = _native(f"Alt+{offer.label.partition('&')[2][:1].upper()}")
+        if offer.discards:
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.setToolTip(f"{offer.discards} ({letter})")
+            button.setEnabled(False)
+            self._arming.start()
+        else:
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            button.setToolTip(f"{letter}, or Return while this button has the focus")
+            button.setEnabled(offer.is_enabled)
+
+    def _take_key(self) -> None:
+        if not self._is_repeat:
+            self._main.click()
+
+    def _arm(self) -> None:
+        for i, button in enumerate(self._others):
+            offer = self._offer(i)
+            button.setEnabled(offer is not None and offer.is_enabled)
+
+    def _offer(self, i: int) -> Offer | None:
+        others = self._view.others if self._view is not None else ()
+        return others[i] if i < len(others) else None
+
+    def _ask(self, offer: Offer | None) -> None:
+        if offer is not None and offer.is_enabled:
+            self.asked.emit(offer.action)
+
+    def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
+        self._key.setText(_native(_TEXT_KEY if _takes_text(new) else _KEY))
+
+    def _draw_key(self) -> None:
+        shade = colors().muted
+        self._key.setStyleSheet(
+            f"color: {shade}; border: 1px solid {shade}; border-bottom-width: 3px;"
+            " border-radius: 4px; padding: 0;"
+        )
+
+
+def _takes_text(widget: QWidget | None) -> bool:
+    """Return whether a widget takes the space bar as a letter."""
+    if isinstance(widget, QComboBox):
+        return widget.isEditable()
+    if isinstance(widget, (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)):
+        return not widget.isReadOnly()
+    return False
+
+
+def _native(keys: str) -> str:
+    return QKeySequence(keys).toString(QKeySequence.SequenceFormat.NativeText)

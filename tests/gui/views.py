@@ -1,0 +1,39 @@
+"""Everything that the wizard can show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from handcal.session.session import SessionRecord
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal_gui.pages.wizard.steps import PLANS, Action, Step, View, Wizard
+
+
+def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[View]:
+    """Return a view of every step, with every main button and every other one."""
+    one = replace(record, alignments=record.alignments[:1])
+    one = replace(one, alignments=(replace(one.alignments[0], eyes=("left",)),))
+    views = []
+    for plan in PLANS:
+        wizard = Wizard(plan)
+        start = snapshot(State.SHOW_HAND, record=replace(record, alignments=()))
+        for _ in range(3):
+            views.append(wizard.view(start))
+            wizard.move(Action.NEXT, start)
+        states = (State.ALIGN, State.SHOW_HAND, State.ALIGNED, State.SOLVED, State.APPLYING)
+        views.extend(wizard.view(snapshot(state)) for state in states)
+        wizard.view(snapshot(State.SOLVED))
+        views.append(wizard.view(snapshot(State.APPLIED, procedure={"results": None})))
+        views.append(wizard.view(snapshot(State.APPLIED, record=one)))
+        applied = snapshot(State.APPLIED)
+        views.append(wizard.view(applied))
+        wizard.move(Action.NEXT, applied)
+        for is_finished in (False, True):
+            finished = replace(record, is_finished=is_finished)
+            views.append(wizard.view(snapshot(State.APPLIED, record=finished)))
+    assert {view.step for view in views} == set(Step)
+    offers = [offer for view in views for offer in (view.main, *view.others)]
+    assert {offer.action for offer in offers} == set(Action)
+    return list(dict.fromkeys(views))
