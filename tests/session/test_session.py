@@ -483,7 +483,7 @@ def test_the_wearer_comes_back(tmp_path: Path, wearer: str) -> None:
     "wearer", ["x" * 101, "two\nlines", "bell\x07", "\ud800", "two\u2028lines"]
 )
 def test_what_is_no_name_is_refused_and_leaves_nothing(tmp_path: Path, wearer: str) -> None:
-    with pytest.raises(ValueError, match="a wearer's name (may have|must not)"):
+    with pytest.raises(ValueError, match=r"a wearer's name (may have|must not)"):
         Session.create(tmp_path, example_rig(), {}, name="one", wearer=wearer)
     assert list(tmp_path.iterdir()) == []
 
