@@ -1,1 +1,1 @@
-"""Connects the window to the engine."""
+"""Controllers: connect the window to the engine."""

@@ -1,4 +1,4 @@
-"""Alignments solved with another method, beside the panel that shows both."""
+"""Solve the alignments with another method, for comparison in the results panel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from handcal_gui.panels.results.panel import ResultsPanel
 
 
 class Comparison(QObject):
-    """Solves with another method whenever a results panel asks for it.
+    """Solves with another method when the results panel requests it.
 
     Parameters
     ----------
@@ -30,20 +30,20 @@ class Comparison(QObject):
         self._settings = SolveSettings()
         self._job: Job | None = None
         panel.compare_requested.connect(self._start)
-        panel.compare_cancelled.connect(self._give_up)
+        panel.compare_cancelled.connect(self._request_cancel)
 
     def use(self, alignments: Mapping[int, Alignment], rig: Rig, settings: SolveSettings) -> None:
-        """Compare these from now on."""
+        """Set the alignments to compare with."""
         self._alignments, self._rig, self._settings = alignments, rig, settings
 
     def cancel(self) -> None:
-        """Stop, and wait for it; nothing is shown any more."""
+        """Cancel the comparison, and wait for its end; nothing is shown."""
         if self._job is not None:
             self._job.abandon()
             self._job = None
 
-    def _give_up(self) -> None:
-        """Stop without waiting: a method may take seconds for what it has begun."""
+    def _request_cancel(self) -> None:
+        """Cancel without waiting: a method may take seconds to react."""
         if self._job is not None:
             self._job.cancel()
             self._job.succeeded.disconnect()

@@ -1,4 +1,4 @@
-"""A running calibration: from the engine's newest snapshot to the panels, and back."""
+"""Controller of a running calibration: passes snapshots to the panels and commands back."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _PANELS_OF_STEPS = {
     Step.VERIFY: "results",
     Step.SAVE: "session",
 }
-"""What to look at when a step begins."""
+"""The panel to show when a step begins."""
 _RECORD = "record the trial"
 
 
 class CalibrationController(QObject):
-    """Connects a engine with the window while a wearer is calibrated; one after the other.
+    """Connects the engine with the window during calibrations, one at a time.
 
     Parameters
     ----------
@@ -45,11 +45,11 @@ class CalibrationController(QObject):
     Attributes
     ----------
     opened : Signal(Path)
-        A station runs; its session's folder.
+        A station is running; its session's folder.
     ended : Signal(str)
-        The engine ended, and why; empty if it was closed.
+        The engine ended; the reason, empty if it was closed.
     polled : Signal(Snapshot)
-        A new snapshot is shown.
+        The snapshot now shown.
     export_requested, next_wearer_requested : Signal()
     """
 
@@ -73,9 +73,10 @@ class CalibrationController(QObject):
         self._is_watching = False
         panels = window.panels
         self._turns: deque[Panel] = deque((panels.cloud, panels.rotation, panels.wearer_view))
-        self._seen: set[object] = set()  # panels
-        self._doing = self._shown = 0  # commands: the wizard's last, and those that can be seen
-        self._complained_of = ""
+        self._visible: set[object] = set()  # panels
+        # Numbers of commands: the wizard's last one, and those in the snapshot shown.
+        self._doing = self._shown = 0
+        self._failed_command = ""
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -83,11 +84,11 @@ class CalibrationController(QObject):
 
     @property
     def snapshot(self) -> Snapshot | None:
-        """The newest snapshot shown; None unless a calibration runs."""
+        """The snapshot shown; None while no calibration is running."""
         return self._snapshot
 
     def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
-        """Run a station, after ending the present one."""
+        """End the present calibration and open a station."""
         self.stop()
         self._is_watching = self._is_broken = False
         self._doing = self._shown = 0
@@ -100,7 +101,7 @@ class CalibrationController(QObject):
         self._engine.start()
 
     def cancel(self) -> None:
-        """Give up opening the station, without waiting; `ended` tells when it is closed again."""
+        """Cancel opening the station without waiting; `ended` follows once it is closed."""
         if self._engine is not None:
             self._engine.opened.disconnect(self._on_opened)
             self._engine.request_stop()
@@ -120,7 +121,7 @@ class CalibrationController(QObject):
         self._window.banner.show_condition("")
 
     def do(self, action: Action) -> None:
-        """Do what the wizard offers, unless something that it offered is still being done."""
+        """Perform an action of the wizard, unless the previous one is still in progress."""
         if action is Action.EXPORT:
             self.export_requested.emit()
         elif action is Action.NEXT_WEARER:
@@ -167,7 +168,7 @@ class CalibrationController(QObject):
         fine_tune.shift_settled.connect(
             lambda: self._calibrate("record φ", Calibration.record_shift)
         )
-        # What is shown for a comparison only is not the φ that a trial is about.
+        # A φ shown only for comparison is not the one that the trial is about.
         trials.trial_requested.connect(fine_tune.settle)
         trials.trial_requested.connect(
             lambda eye, depth_m: self._submit(_RECORD, lambda s: s.save_trial(eye, depth_m))
@@ -178,7 +179,7 @@ class CalibrationController(QObject):
             )
         )
         trials.hide_target_requested.connect(
-            lambda: self._submit("take the target away", Station.hide_target)
+            lambda: self._submit("hide the target", Station.hide_target)
         )
         trials.doubted.connect(partial(self._on_command_failed, _RECORD))
 
@@ -201,13 +202,13 @@ class CalibrationController(QObject):
         return self._engine.submit(name, command) if self._engine is not None else 0
 
     def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> int:
-        """Ask the procedure; what it cannot write, it keeps, and the station tells of that."""
+        """Submit a command to the procedure; it keeps data that it cannot write yet."""
 
-        def obey(station: Station) -> None:
+        def command_station(station: Station) -> None:
             with suppress(FileError):
                 command(station.calibration)
 
-        return self._submit(name, obey)
+        return self._submit(name, command_station)
 
     def _poll(self) -> None:
         snapshot, shown = self._engine.newest() if self._engine is not None else (None, 0)
@@ -220,32 +221,32 @@ class CalibrationController(QObject):
             )
         self._snapshot = snapshot
         panels = self._window.panels
-        # Out of sight, too: they may be used before another snapshot comes.
+        # Even while hidden: they may be used before the next snapshot.
         always = panels.fine_tune, panels.trials
-        # What takes long to paint takes turns, lest the window wait for all of it at once.
+        # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._turns.rotate()
         waiting = tuple(self._turns)[1:]
         for panel in panels.all():
-            if panel in always or (panel in self._seen and panel not in waiting):
+            if panel in always or (panel in self._visible and panel not in waiting):
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
             snapshot.problem or snapshot.camera.problem or snapshot.link_problem
         )
-        self._watch_views(panels.wearer_view in self._seen)
+        self._watch_views(panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
 
-    def _catch_up(self, panel: Panel, is_seen: bool) -> None:
-        """Let a panel that comes into sight show at once how things stand."""
-        if not is_seen:
-            self._seen.discard(panel)
+    def _catch_up(self, panel: Panel, is_visible: bool) -> None:
+        """Update a panel at once when it becomes visible."""
+        if not is_visible:
+            self._visible.discard(panel)
             return
-        self._seen.add(panel)
+        self._visible.add(panel)
         if self._snapshot is not None:
             panel.show_snapshot(self._snapshot)
 
     def _watch_views(self, wanted: bool) -> None:
-        """Have the wearer's views rendered only while they are seen."""
+        """Have the wearer's views rendered only while they are visible."""
         if wanted != self._is_watching:
             self._is_watching = wanted
             self._submit("watch", lambda station: setattr(station, "watch_views", wanted))
@@ -267,16 +268,16 @@ class CalibrationController(QObject):
         self.opened.emit(station.session.path)
 
     def _on_command_done(self, name: str, _answer: object) -> None:
-        # One thing that the wizard offers done makes up for another that could not be.
-        if name == self._complained_of or {name, self._complained_of} <= set(Action):
+        # A message about a failed action of the wizard is obsolete once another has succeeded.
+        if name == self._failed_command or {name, self._failed_command} <= set(Action):
             self._window.banner.clear()
 
     def _on_command_failed(self, name: str, why: str) -> None:
-        self._complained_of = name
+        self._failed_command = name
         self._window.banner.show_message(f"Could not {name}: {why}")
 
     def _save_notes(self, text: str) -> None:
-        """Have the engine save notes, or save them here once it has broken down."""
+        """Save notes in the engine's thread, or here if the engine has failed."""
         if self._is_broken and self._snapshot is not None:
             with suppress(FileError), Session(self._snapshot.session_path) as session:
                 session.save_notes(text)
@@ -286,11 +287,11 @@ class CalibrationController(QObject):
     def _on_ended(self, why: str) -> None:
         self._timer.stop()
         self._is_broken = bool(why)
-        self._window.panels.session.flush()  # what was typed in the last moment
+        self._window.panels.session.flush()  # text typed just before the end
         self.ended.emit(why)
 
 
 def _confirm(calibration: Calibration) -> None:
-    """Confirm for the wearer, who may have been quicker."""
+    """Confirm for the wearer, who may have done so already."""
     if calibration.state is State.ALIGN:
         calibration.confirm()

@@ -1,4 +1,4 @@
-"""A stored session: read, solved again, and shown in the panels."""
+"""Controller of the review of a stored session: read, solved again, shown in the panels."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class _Stored:
 
 
 class ReviewController(QObject):
-    """Opens one stored session after the other, read-only.
+    """Opens stored sessions read-only, one at a time.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ class ReviewController(QObject):
     ----------
     opened : Signal(Path)
     failed : Signal(str)
-        A session could not be opened, and why.
+        The reason why a session could not be opened.
     record : SessionRecord or None
-        What is shown.
+        The session shown.
     """
 
     opened = Signal(object)
@@ -75,7 +75,7 @@ class ReviewController(QObject):
         self._job.start()
 
     def close(self) -> None:
-        """Stop what goes on; safe to call twice."""
+        """Cancel opening and comparison, and close the session; safe to call twice."""
         self._comparison.cancel()
         if self._job is not None:
             self._job.abandon()
@@ -84,7 +84,7 @@ class ReviewController(QObject):
         self.record = None
 
     def _show_progress(self, job: Job) -> None:
-        """Say what takes so long, if it does, and let it be cancelled."""
+        """Show a dialog with the progress if opening takes long, with a Cancel button."""
         progress = QProgressDialog("Reading the session…", "Cancel", 0, 0, self._window)
         progress.setObjectName("opening")
         progress.setMinimumDuration(_PATIENCE_MS)
@@ -105,7 +105,7 @@ class ReviewController(QObject):
         self._end_progress()
         self.record = record = stored.record
         panels = self._window.panels
-        note = "" if stored.results else "It holds no alignment yet."
+        note = "" if stored.results else "It contains no alignments yet."
         self._page.show_session(record, stored.results, note)
         panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)

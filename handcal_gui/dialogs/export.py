@@ -1,4 +1,4 @@
-"""Exporting a session: choose, watch, have."""
+"""The export dialog: choose formats, follow the progress, see the files."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ Export = Callable[..., tuple[Path, ...]]
 
 
 class ExportDialog(QDialog):
-    """Exports a session in a job; closing it cancels.
+    """Exports a session in a job; closing the dialog cancels it.
 
     Parameters
     ----------
     record : SessionRecord
     settings : ExportSettings
-        Shown first.
+        Initial choice.
     folder : Path
-        In which the session's export gets a folder.
+        Parent of the export's folder.
     export : callable
         As `export_session`.
 
     Attributes
     ----------
     remembered : Signal(ExportSettings, Path)
-        What was chosen, to be proposed next time.
+        The settings and folder chosen, to be proposed next time.
     succeeded : Signal(object)
         The files.
     failed : Signal(str)
@@ -78,7 +78,7 @@ class ExportDialog(QDialog):
         self._refresh()
 
     def start(self) -> None:
-        """Export what is chosen."""
+        """Start the export."""
         settings, target = self._choices.settings, self._choices.target
         self.remembered.emit(settings, self._choices.folder)
         export, record = self._export_session, self._record
@@ -88,7 +88,7 @@ class ExportDialog(QDialog):
 
         self._progress.begin()
         self._pages.setCurrentWidget(self._progress)
-        # Without a parent: should the dialog be destroyed, the job's thread keeps the job alive.
+        # Without a parent: the job's thread keeps it alive if the dialog is destroyed.
         self._job = Job(work)
         self._job.progressed.connect(self._progress.show_progress)
         self._job.succeeded.connect(self._succeed)
@@ -98,14 +98,14 @@ class ExportDialog(QDialog):
         self._refresh()
 
     def stop(self) -> None:
-        """Give up what runs, and close; before the program ends."""
+        """Cancel a running export and close; called before the program ends."""
         if self._job is not None:
             self._job.abandon()
             self._job = None
         self.reject()
 
     def reject(self) -> None:
-        """Close; an export that runs is cancelled first."""
+        """Close; a running export is cancelled first."""
         if self._job is None:
             super().reject()
         else:
@@ -113,7 +113,7 @@ class ExportDialog(QDialog):
             self._cancel()
 
     def _cancel(self) -> None:
-        """Cancel what runs, or close."""
+        """Cancel a running export, or close."""
         if self._job is None:
             self.reject()
         else:

@@ -1,4 +1,4 @@
-"""What to export of a session, and where to."""
+"""Choice of the formats and the folder of an export."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from handcal_gui.widgets.fields import named, number
 from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
-    "report": "Verdict, eye shifts, figures and settings, to read and to file",
-    "html": "The same to read in a browser, and each figure with its numbers",
+    "report": "Verdict, eye shifts, figures and settings, to read and archive",
+    "html": "The report for a browser, and each figure with its data",
     "csv": "One row for each eye, alignment and trial, for statistics",
     "yaml": "Projection, K, H0 and φ of each eye, read by cv2.FileStorage",
-    "json": "The projections as each system wants them",
+    "json": "The projections in the convention of each system",
     "ply": "Cursor and hand of each alignment, with residuals",
-    "zip": "All that was recorded, to archive or to open elsewhere",
+    "zip": "All recorded data, to archive or to open elsewhere",
 }
 
 
@@ -32,9 +32,9 @@ class ExportChoices(QWidget):
     ----------
     settings : ExportSettings
     folder : Path
-        Proposed; the files go into a folder of the session's own in it.
+        Proposed parent of the export's folder.
     name : str
-        Of that folder.
+        Name of the export's folder.
 
     Attributes
     ----------
@@ -64,12 +64,12 @@ class ExportChoices(QWidget):
 
     @property
     def is_complete(self) -> bool:
-        """Whether there is anything to export, and a place for it."""
+        """True if at least one format and a folder are chosen."""
         return bool(self._formats()) and bool(self._folder.path)
 
     @property
     def settings(self) -> ExportSettings:
-        """The settings as shown; only if `is_complete`."""
+        """The settings chosen; valid only if `is_complete`."""
         return replace(
             self._settings,
             formats=self._formats(),
@@ -79,12 +79,12 @@ class ExportChoices(QWidget):
 
     @property
     def folder(self) -> Path:
-        """The folder as shown, in which the session's own will be."""
+        """The parent folder chosen."""
         return Path(self._folder.path).expanduser().absolute()
 
     @property
     def target(self) -> Path:
-        """Where the files go."""
+        """The export's folder."""
         return self.folder / self._name
 
     def _formats(self) -> tuple[Format, ...]:
@@ -109,7 +109,7 @@ class ExportChoices(QWidget):
         form.addRow("Near plane (OpenGL, Unity)", self._near)
         form.addRow("Far plane (OpenGL, Unity)", self._far)
         form.addRow("Into", self._folder)
-        form.addRow("", QLabel(f"A folder {self._name} is made there."))
+        form.addRow("", QLabel(f"A folder {self._name} is created there."))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(3 * SPACING_PX)

@@ -1,4 +1,4 @@
-"""How an export goes, and what became of it."""
+"""Progress and result of an export."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.numbers import counted
 
 _WHOLE = 1000
-_UNCHANGED = "the session and earlier exports are as they were"
+_UNCHANGED = "the session and earlier exports are unchanged"
 
 
 class ExportProgress(QWidget):
-    """A bar while files are being made, then the files, or why there are none."""
+    """A progress bar during the export, then the files or the reason for its failure."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -38,19 +38,19 @@ class ExportProgress(QWidget):
         layout.addStretch(0)
 
     def begin(self) -> None:
-        """Show an export that has just begun."""
+        """Show an export that has just started."""
         self._end.hide()
         self._files.clear()
         self._files.hide()
-        self.show_progress("Beginning", 0.0)
+        self.show_progress("Starting", 0.0)
 
     def show_progress(self, doing: str, share: float) -> None:
-        """Show what is being made, and which share of all is done, 0..1."""
+        """Show the present activity and the share done, 0..1."""
         self._doing.setText(f"{doing}…")
         self._bar.setValue(round(_WHOLE * share))
 
     def show_files(self, folder: Path, files: Sequence[Path]) -> None:
-        """Show what was made."""
+        """Show the files written."""
         self._doing.setText("Done.")
         self._bar.setValue(_WHOLE)
         self._files.addItems([str(path.relative_to(folder)) for path in files])
@@ -63,17 +63,17 @@ class ExportProgress(QWidget):
         self._end.show()
 
     def show_failure(self, why: str) -> None:
-        """Show why nothing was made."""
+        """Show the reason why nothing was exported."""
         self._doing.setText("Nothing was exported.")
         self._end.show_finding(Finding("", Health.BROKEN, why, _UNCHANGED))
         self._end.show()
 
     def show_cancelling(self) -> None:
-        """Show that the file being made is the last."""
+        """Show that the export is being cancelled."""
         self._doing.setText("Cancelling…")
 
     def show_cancelled(self) -> None:
-        """Show that nothing was made because it was cancelled."""
+        """Show that the export was cancelled."""
         self._doing.setText("Nothing was exported.")
         self._end.show_finding(Finding("", Health.LIMITED, "cancelled", _UNCHANGED))
         self._end.show()

@@ -1,1 +1,1 @@
-"""Threads: the engine that calibrates, and jobs that take longer than a frame."""
+"""Worker threads: the engine, and jobs that take longer than a frame."""

@@ -1,4 +1,4 @@
-"""The engine's thread: it owns the station, runs it frame after frame, and obeys in between."""
+"""The engine's thread: owns the station and runs it, with commands between frames."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Command = Callable[[Station], object]
 
 
 class EngineThread(Worker):
-    """Runs a station in a thread until closed.
+    """Runs a station in a thread until it is closed.
 
-    Snapshots wait in a place for one: whoever polls gets the newest and never an old one, however
-    slow the window is.
+    Only the newest snapshot is kept, so that polling returns the newest one however slow the window
+    is.
 
     Parameters
     ----------
@@ -33,13 +33,13 @@ class EngineThread(Worker):
     Attributes
     ----------
     opened : Signal(Station)
-        The station runs. Only its constants may be read in other threads.
+        The station is running. Other threads may only read its constants.
     command_done : Signal(str, object)
-        A command is done: its name and what it returned.
+        A command has finished: its name and its result.
     failed : Signal(str, str)
-        A command failed: its name and why, for a person to read.
+        A command failed: its name and the reason, as a message for the user.
     ended : Signal(str)
-        The station could not be opened or broke down, and why; empty if it was closed.
+        The reason why the station could not be opened or failed; empty if it was closed.
     """
 
     opened = Signal(object)
@@ -51,32 +51,32 @@ class EngineThread(Worker):
         super().__init__("handcal engine", parent)
         self._open_station = open_station
         self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
-        self._asked = self._done = 0
+        self._submitted = self._done = 0
         self._newest: tuple[Snapshot | None, int] = None, 0
         self._closing = threading.Event()
 
     def newest(self) -> tuple[Snapshot | None, int]:
-        """Return the newest snapshot, None before the first, and how many commands it shows."""
+        """Return the newest snapshot, None before the first, and the number of commands in it."""
         return self._newest
 
     def submit(self, name: str, command: Command) -> int:
-        """Have the engine's thread call `command` with the station, before its next frame.
+        """Have the engine's thread call `command` with the station before the next frame.
 
         Returns
         -------
         int
-            How many commands have been asked for, this one included.
+            Number of commands submitted, including this one.
         """
         self._commands.put((name, command))
-        self._asked += 1
-        return self._asked
+        self._submitted += 1
+        return self._submitted
 
     def request_stop(self) -> None:
-        """End the thread without waiting for it; `ended` tells when it has."""
+        """Ask the thread to end, without waiting; it then emits `ended`."""
         self._closing.set()
 
     def close(self) -> None:
-        """End the thread and close the station, and hear the last of it; safe to call twice."""
+        """End the thread, close the station and deliver pending signals; safe to call twice."""
         self.request_stop()
         self.wait()
         self._deliver_pending()
@@ -96,8 +96,8 @@ class EngineThread(Worker):
         except HandcalError as error:
             why = str(error)
         except Exception as error:
-            _LOG.exception("the engine broke down")
-            why = f"handcal broke down ({_describe(error)}); the session is kept"
+            _LOG.exception("the engine failed unexpectedly")
+            why = f"handcal hit an unexpected error ({_describe(error)}); the session is kept"
         self._emit_later(self.ended.emit, why)
 
     def _run_commands(self, station: Station) -> None:
@@ -108,7 +108,7 @@ class EngineThread(Worker):
             except (HandcalError, ValueError) as error:
                 self._emit_later(self.failed.emit, name, str(error))
             except Exception as error:
-                _LOG.exception("a command broke down: %s", name)
+                _LOG.exception("a command failed unexpectedly: %s", name)
                 self._emit_later(self.failed.emit, name, _describe(error))
             self._done += 1
 

@@ -1,4 +1,4 @@
-"""Work that takes longer than a frame: in a thread of its own, with progress and cancel."""
+"""Jobs: work that takes longer than a frame, in a thread, with progress and cancellation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Work = Callable[[Progress], object]
 
 
 class Job(Worker):
-    """Calls `work` once, in a thread.
+    """Calls a function once in a thread.
 
     Parameters
     ----------
@@ -32,9 +32,9 @@ class Job(Worker):
     ----------
     progressed : Signal(str, float)
     succeeded : Signal(object)
-        What `work` returned.
+        The value that `work` returned.
     failed : Signal(str)
-        Why, for a person to read.
+        The reason, as a message for the user.
     cancelled : Signal()
     """
 
@@ -44,39 +44,40 @@ class Job(Worker):
     cancelled = Signal()
 
     def __init__(self, work: Work) -> None:
-        # Without a parent: it lives as long as its thread or whoever waits for it, and no longer.
+        # Without a parent: it lives as long as its thread or its owner needs it.
         super().__init__("handcal job")
         self._work = work
         self._cancelled = threading.Event()
         self._reported = "", -1
 
     def cancel(self) -> None:
-        """Ask the work to stop; it says so by `cancelled`, unless it comes to its end first."""
+        """Ask the work to stop; `cancelled` is emitted unless it finishes first."""
         self._cancelled.set()
 
     def abandon(self) -> None:
-        """Have the work stop, and wait for it; nothing more is heard of it."""
+        """Cancel the work, wait for its end, and discard its signals."""
         self.cancel()
         self.wait()
         self._discard_pending()
 
     def _run(self) -> None:
         try:
-            done = self._work(Progress(self._report, self._cancelled.is_set))
+            result = self._work(Progress(self._report, self._cancelled.is_set))
         except CancelledError:
             self._emit_later(self.cancelled.emit)
         except HandcalError as error:
             self._emit_later(self.failed.emit, str(error))
         except Exception as error:
-            _LOG.exception("a job broke down")
+            _LOG.exception("a job failed unexpectedly")
             self._emit_later(
-                self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})"
+                self.failed.emit,
+                f"handcal hit an unexpected error ({type(error).__name__}: {error})",
             )
         else:
-            self._emit_later(self.succeeded.emit, done)
+            self._emit_later(self.succeeded.emit, result)
 
-    def _report(self, doing: str, share: float) -> None:
+    def _report(self, activity: str, share: float) -> None:
         """Emit the progress if it has changed visibly, as signals from a thread queue up."""
-        if self._reported != (doing, int(_STEPS * share)):
-            self._reported = doing, int(_STEPS * share)
-            self._emit_later(self.progressed.emit, doing, share)
+        if self._reported != (activity, int(_STEPS * share)):
+            self._reported = activity, int(_STEPS * share)
+            self._emit_later(self.progressed.emit, activity, share)

@@ -1,4 +1,4 @@
-"""Asking something that takes a while again and again, when only the newest answer matters."""
+"""Repeated slow requests of which only the newest answer matters."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from handcal_gui.engine.jobs import Job
 
 
 class LatestJob(QObject):
-    """Calls `work` in a job, one at a time, and answers only what nothing was asked after.
+    """Runs `work` in one job at a time, and answers only the newest request.
 
     Parameters
     ----------
     work : callable
-        Given the question.
+        Called with the question.
 
     Attributes
     ----------
     answered : Signal(object, object)
-        A question, and what `work` returned.
+        The question, and the value that `work` returned.
     failed : Signal(str)
-        Why there is no answer, for a person to read.
+        The reason why there is no answer, as a message for the user.
     """
 
     answered = Signal(object, object)
@@ -37,13 +37,13 @@ class LatestJob(QObject):
         self._next: list[object] = []
 
     def ask(self, question: object) -> None:
-        """Ask, at once or when the job that runs has ended."""
+        """Start a request, now or when the running job has ended."""
         self._next = [question]
         if self._job is None:
             self._start()
 
     def stop(self) -> None:
-        """Forget what is asked, and wait for the job's end."""
+        """Discard pending requests, and wait for the job's end."""
         self._next = []
         if self._job is not None:
             self._job.abandon()
@@ -66,7 +66,7 @@ class LatestJob(QObject):
             self.failed.emit(why)
 
     def _is_newest(self) -> bool:
-        """End the job; start the next, and return False, if more was asked meanwhile."""
+        """End the job; return False and start the next if there is a newer request."""
         assert self._job is not None
         self._job.wait()
         self._job = None

@@ -1,4 +1,4 @@
-"""What works in a thread of its own, and is heard in the window's."""
+"""Base class of objects that run in a thread and emit their signals in the window's thread."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, Signal
 
 
 class Worker(QObject):
-    """Base of objects that run once, in a thread, and say by their signals how it goes.
+    """Base class of objects that run once in a thread and report by signals.
 
-    What is said waits in the window's event loop, like every signal from another thread; but once
-    the thread has ended, it can be heard at once or forgotten, lest it come when nobody expects it.
+    Signals wait in the window's event loop, like all signals from other threads. Once the thread
+    has ended, pending signals can be delivered immediately or discarded, so that none arrives
+    unexpectedly.
 
     Parameters
     ----------
     name : str
-        Of the thread.
+        Name of the thread.
     parent : QObject, optional
     """
 
@@ -29,30 +30,30 @@ class Worker(QObject):
         self._thread = threading.Thread(target=self._run, name=name)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait for the thread's end."""
+        """Wait until the thread has ended."""
         if self._thread.is_alive():
             self._thread.join()
 
     def _run(self) -> None:
-        """Do the work, in the thread."""
+        """Do the work; called in the thread."""
         raise NotImplementedError
 
-    def _emit_later(self, emit: Callable[..., None], *what: object) -> None:
-        """Have a signal emitted in the window's thread."""
-        self._posted.emit((emit, what))
+    def _emit_later(self, emit: Callable[..., None], *args: object) -> None:
+        """Emit a signal later, in the window's thread."""
+        self._posted.emit((emit, args))
 
     def _deliver_pending(self) -> None:
-        """Emit at once what waits to be."""
+        """Emit pending signals now."""
         QCoreApplication.sendPostedEvents(self, QEvent.Type.MetaCall.value)
 
     def _discard_pending(self) -> None:
-        """Never emit what waits to be."""
+        """Discard pending signals."""
         QCoreApplication.removePostedEvents(self, QEvent.Type.MetaCall.value)
 
-    def _deliver(self, said: tuple[Callable[..., None], tuple[object, ...]]) -> None:
-        emit, what = said
-        emit(*what)
+    def _deliver(self, posted: tuple[Callable[..., None], tuple[object, ...]]) -> None:
+        emit, args = posted
+        emit(*args)

@@ -1,4 +1,4 @@
-"""A table of things with numbers, one of which can be chosen and deleted."""
+"""A table of numbered items, one of which can be selected and deleted."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MEASURED_ROWS = 20
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column; numbers stand on its right."""
+    """A column; numbers are right-aligned."""
 
     title: str
     tooltip: str
@@ -33,7 +33,7 @@ class Column:
 
 
 class RecordTable(QTableView):
-    """Shows one thing a row.
+    """Shows one item per row.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class RecordTable(QTableView):
         For screen readers and, in lower case with dashes, as object name.
     columns : sequence of Column
     empty_text : str
-        Shown while there is nothing: what will be here, and how it gets there.
+        Hint shown while the table is empty.
 
     Attributes
     ----------
     delete_requested : Signal(int)
-        Del was pressed, or chosen from the context menu: the number of the row's thing.
+        Del was pressed or chosen from the context menu: the number of the selected item.
     """
 
     delete_requested = Signal(int)
@@ -80,7 +80,7 @@ class RecordTable(QTableView):
         across.setResizeContentsPrecision(_MEASURED_ROWS)
         across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.delete_action = QAction("Delete", self)
-        self.delete_action.setToolTip("Delete the chosen row (Del); it can be undone")
+        self.delete_action.setToolTip("Delete the selected row (Del); it can be undone")
         self.delete_action.setShortcut(Qt.Key.Key_Delete)
         self.delete_action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
         self.delete_action.triggered.connect(self._delete)
@@ -90,7 +90,7 @@ class RecordTable(QTableView):
         self._refresh()
 
     def show_rows(self, rows: Mapping[int, tuple[str, ...]]) -> None:
-        """Show cells by number, in order; a new last one is brought into view."""
+        """Show cells by number, in order; a new last row is scrolled into view."""
         before, numbers = self._records.numbers, list(rows)
         chosen, row = self.chosen_number(), self.currentIndex().row()
         self._records.replace(rows)
@@ -102,17 +102,17 @@ class RecordTable(QTableView):
         self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
-        """Let nothing be deleted."""
+        """Allow or forbid deleting."""
         self._is_read_only = is_read_only
         self._refresh()
 
     def chosen_number(self) -> int | None:
-        """Return the number of the chosen row's thing; None if none is chosen."""
+        """Return the number of the selected item; None if none is selected."""
         rows = self.selectionModel().selectedRows()
         return self._records.numbers[rows[0].row()] if rows else None
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Say what will be here while there is nothing."""
+        """Paint the hint while the table is empty."""
         super().paintEvent(event)
         if not self._records.numbers:
             painter = QPainter(self.viewport())
@@ -133,7 +133,7 @@ class RecordTable(QTableView):
 
 
 class _Records(QAbstractTableModel):
-    """The rows as Qt asks for them; items of their own would take half a second for a thousand."""
+    """Model of the rows; an item for each cell would take half a second for a thousand rows."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
         super().__init__()

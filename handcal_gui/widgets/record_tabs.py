@@ -1,4 +1,4 @@
-"""Tabs with tables of things, and one button that deletes what is chosen in the visible one."""
+"""Tabs of tables, with a button that deletes the selected row of the visible one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from handcal_gui.widgets.record_table import RecordTable
 
 
 class RecordTabs(QTabWidget):
-    """Tabs whose corner holds the button while a `RecordTable` is shown."""
+    """Tabs with a Delete button in the corner while a `RecordTable` is visible."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

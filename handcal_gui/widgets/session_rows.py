@@ -1,4 +1,4 @@
-"""What a session holds as people read it: rows of text, and what can be taken back."""
+"""The contents of a session as table rows, and the deletions that can be undone."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ _PHI = (
 )
 ALIGNMENT_COLUMNS = (
     Column("No.", "Number of the alignment"),
-    Column("Eyes", "Open during the alignment", is_number=False),
+    Column("Eyes", "Eyes open during the alignment", is_number=False),
     Column("Turned °", "Angle between hand and cursor at the confirmation, in degrees"),
     Column("Left φ mm", _PHI.format("left eye")),
     Column("Right φ mm", _PHI.format("right eye")),
     Column("RMS mm", "Distance between hand and cursor after registration, in millimetres"),
-    Column("Inliers %", "Points of the hand that found a partner on the cursor, in percent"),
-    Column("Time", "When it was confirmed"),
+    Column("Inliers %", "Points of the hand with a partner on the cursor, in percent"),
+    Column("Time", "Time of the confirmation"),
 )
 TRIAL_COLUMNS = (
     Column("No.", "Number of the trial"),
-    Column("Eye", "That the target was looked at with", is_number=False),
-    Column("Distance m", "Of the target, in metres"),
+    Column("Eye", "Eye that looked at the target", is_number=False),
+    Column("Distance m", "Distance of the target, in metres"),
     Column("Error px", "Mean over the target's four corners, in pixels of the display"),
     Column("Error ′", "Mean over the target's four corners, in arcminutes"),
-    Column("Time", "When it was recorded"),
+    Column("Time", "Time of the recording"),
 )
 STATISTICS_COLUMNS = ("n", "Mean ± SD ′", "Median ′", "Max ′", "Mean ± SD px")
 
@@ -56,14 +56,14 @@ _RESTORED: dict[str, Kind] = {
 
 @dataclass(frozen=True, slots=True)
 class Deletion:
-    """Something deleted that can be restored."""
+    """A deleted item that can be restored."""
 
     kind: Kind
     number: int
 
 
 def deletions(record: SessionRecord) -> list[Deletion]:
-    """Return what is deleted, in the order in which that happened."""
+    """Return the deleted items, in the order of their deletion."""
     found: list[Deletion] = []
     for event in record.events:
         if event.name in _DELETED:
@@ -80,7 +80,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
     ----------
     record : SessionRecord
     results : Results or None
-        Those of all the record's alignments; left out if they are of others.
+        Results of all the record's alignments; ignored if they are those of others.
     """
     solved = results.alignments if results else {}
     if set(solved) != set(record.alignments):
@@ -107,7 +107,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
 
 
 def trials_id(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
-    """Return what tells trials from others: a number is never given twice."""
+    """Return an identity of a session's trials: a number is never given twice."""
     return record.path, tuple(record.trials)
 
 

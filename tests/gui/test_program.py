@@ -435,7 +435,7 @@ def test_notes_outlive_an_engine_that_breaks_down(
 
     monkeypatch.setattr(Station, "step", break_down)
     live.wait_for_page("start")
-    assert "broke down" in live.banner
+    assert "unexpected error" in live.banner
     assert Session.open(path).notes == "wears glasses"
 
 

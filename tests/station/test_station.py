@@ -137,6 +137,11 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         adjusted_m = solved_m + np.array([0.001, 0.0, 0.0])
         calibration.set_shift({"left": adjusted_m})
         station.save_trial("left", 0.5)
+        station.delete("trial", 1)
+        assert list(Session.open(station.session.path).deleted_trials) == [1]
+        station.restore("trial", 1)
+        with pytest.raises(ValueError, match="no deleted trial 1"):
+            station.restore("trial", 1)
         station.finish()
         last = station.step()
         expected = make_trial(station.rig.eyes["left"], "left", 0.5, solved_m, adjusted_m)

@@ -1,4 +1,4 @@
-"""The same alignments solved by another method, side by side."""
+"""Comparison with the results of another method for the same alignments."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _MEANINGS: Mapping[Method, str] = {
 
 
 class CompareTab(QWidget):
-    """Asks for another method's results and shows them beside the present ones.
+    """Requests the results of another method and shows them beside the present ones.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class CompareTab(QWidget):
     requested : Signal(str)
         The method to solve the same alignments with.
     cancelled : Signal()
-        The results asked for are not wanted any more.
+        The requested results are no longer needed.
     """
 
     requested = Signal(str)
@@ -51,7 +51,7 @@ class CompareTab(QWidget):
         self._results: Results | None = None
         self._rig: Rig | None = None
         self.table = NumberTable("Comparison of methods")
-        _keep_room(self.table)
+        _keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")
         self._methods.setAccessibleName("Compare with method")
@@ -61,11 +61,11 @@ class CompareTab(QWidget):
         self._compare.clicked.connect(self._ask)
         self._cancel = QPushButton("Cance&l")
         self._cancel.setObjectName("comparison-cancel")
-        self._cancel.clicked.connect(self._give_up)
+        self._cancel.clicked.connect(self._request_cancel)
         self._progress = QProgressBar()
         self._progress.setRange(0, 0)
         self._progress.setTextVisible(False)
-        _keep_room(self._progress)
+        _keep_space(self._progress)
         self._progress.setMaximumHeight(SPACING_PX)
         self._status = QLabel()
         self._status.setObjectName("comparison-status")
@@ -75,9 +75,9 @@ class CompareTab(QWidget):
         self._set_busy(False)
 
     def show_results(self, results: Results, rig: Rig) -> None:
-        """Take new results to compare with; a comparison with earlier ones is taken away."""
+        """Set the results to compare with; an earlier comparison is removed."""
         if self._cancel.isEnabled():
-            self._give_up()
+            self._request_cancel()
         self._results, self._rig = results, rig
         self._methods.clear()
         for method in METHODS:
@@ -96,11 +96,11 @@ class CompareTab(QWidget):
         self.table.show()
         self._status.setText(
             f"Difference: {other.method} less {self._results.method}. "
-            "Of σ and expected error only those of “consistent” are honest; others are too small."
+            "σ and expected error are realistic only for “consistent”; others are too small."
         )
 
     def show_failure(self, text: str) -> None:
-        """Say why there is no comparison."""
+        """Show the reason why there is no comparison."""
         self._set_busy(False)
         self._status.setText(text)
 
@@ -113,7 +113,7 @@ class CompareTab(QWidget):
         self._status.setText(f"Solving with {method} …")
         self.requested.emit(method)
 
-    def _give_up(self) -> None:
+    def _request_cancel(self) -> None:
         self._set_busy(False)
         self._status.setText("Cancelled.")
         self.cancelled.emit()
@@ -144,8 +144,8 @@ class CompareTab(QWidget):
         layout.addWidget(self.table, 1)
 
 
-def _keep_room(widget: QWidget) -> None:
-    """Keep a widget's room while it is hidden."""
+def _keep_space(widget: QWidget) -> None:
+    """Keep a widget's space while it is hidden."""
     policy = widget.sizePolicy()
     policy.setRetainSizeWhenHidden(True)
     widget.setSizePolicy(policy)

@@ -1,4 +1,4 @@
-"""How each alignment's registration came to rest."""
+"""Convergence of each alignment's registration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MAX_SYMBOLS = 60
 
 
 class ConvergencePlot(Plot):
-    """Distance between hand and cursor at each iteration, a line for each alignment and eye."""
+    """Shows the distance between hand and cursor by iteration, for each alignment and eye."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Convergence", "Iteration", "RMS distance (mm)", parent)
@@ -41,4 +41,4 @@ class ConvergencePlot(Plot):
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
                 self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))
         lengths = [len(s.history_m2) for eyes in results.alignments.values() for s in eyes.values()]
-        self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with room for the names
+        self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with space for the names

@@ -1,4 +1,4 @@
-"""The results panel: where each eye is, how far to trust it, and what one more would buy."""
+"""The results panel: eye shifts, their uncertainty, and the benefit of another alignment."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from handcal_gui.widgets.result_rows import (
 
 _EMPTY = (
     "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve: then each eye's "
-    "place, how sure it is, and the verdict appear here."
+    "position, its uncertainty and the verdict appear here."
 )
 
 
@@ -38,10 +38,10 @@ class ResultsPanel(QWidget):
     Attributes
     ----------
     compare_requested : Signal(str)
-        The method to solve the same alignments with; `show_comparison` or `comparison_failed` is
-        the answer.
+        The method to solve the same alignments with; answered by `show_comparison` or
+        `comparison_failed`.
     compare_cancelled : Signal()
-        No answer is wanted any more.
+        The answer is no longer needed.
     """
 
     compare_requested = Signal(str)
@@ -66,7 +66,7 @@ class ResultsPanel(QWidget):
         self._add_copy()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show the results of a snapshot, if they are others than those shown."""
+        """Show the results of a snapshot if they have changed."""
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
             self.show_results(procedure.results, record.alignments, record.rig)
@@ -74,7 +74,7 @@ class ResultsPanel(QWidget):
     def show_results(
         self, results: Results | None, alignments: Mapping[int, Alignment], rig: Rig
     ) -> None:
-        """Show results, or that there are none.
+        """Show results, or a hint if there are none.
 
         Parameters
         ----------
@@ -99,15 +99,15 @@ class ResultsPanel(QWidget):
         self._compare.show_results(results, rig)
 
     def show_comparison(self, other: Results) -> None:
-        """Show what another method makes of the same alignments."""
+        """Show the results of another method for the same alignments."""
         self._compare.show_comparison(other)
 
     def comparison_failed(self, text: str) -> None:
-        """Say why there is no comparison."""
+        """Show the reason why there is no comparison."""
         self._compare.show_failure(text)
 
     def as_text(self) -> str:
-        """Return everything shown in numbers, as tab-separated text."""
+        """Return all numbers shown as tab-separated text."""
         if self._results is None:
             return ""
         verdicts = rows_as_text(("Verdict", "Reason"), verdict_rows(self._results))

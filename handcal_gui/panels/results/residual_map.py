@@ -1,4 +1,4 @@
-"""The hand seen from the front, each point coloured by how far it lies from its partner."""
+"""The hand seen from the eye, each point coloured by its residual."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SHADES = 32
 
 
 class ResidualMap(Plot):
-    """Residuals in colour; points without a partner are grey crosses.
+    """Shows residuals in colour; points without a partner are grey crosses.
 
     Attributes
     ----------
@@ -48,15 +48,15 @@ class ResidualMap(Plot):
         Parameters
         ----------
         places_m : (N, 2) float64
-            To the right and down, as the eye sees them.
+            Right and down, as seen from the eye.
         residuals_m : (N,) float64
-            NaN where a point has no partner.
+            NaN for points without a partner.
         """
         self._shown = places_m, residuals_m
         self._redraw()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow a change between light and dark."""
+        """Redraw in the colours of a new theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._redraw()

@@ -1,4 +1,4 @@
-"""The residuals tab: which alignment's map to see, and the map."""
+"""The residuals tab: the residual map of a chosen alignment."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 
 class ResidualsTab(QWidget):
-    """Shows the residual map of one alignment and eye at a time, drawn only while it is seen."""
+    """Shows the residual map of one alignment and eye; drawn only while it is visible."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -28,7 +28,7 @@ class ResidualsTab(QWidget):
         self._choice.setAccessibleName("Alignment and eye")
         self._choice.currentIndexChanged.connect(self._show_chosen)
         self._map = ResidualMap()
-        note = QLabel("The hand as the eye sees it; × marks points without a partner (outliers).")
+        note = QLabel("The hand as seen from the eye; × marks points without a partner (outliers).")
         note.setWordWrap(True)
         layout = QVBoxLayout(self)
         layout.setSpacing(SPACING_PX)
@@ -37,7 +37,7 @@ class ResidualsTab(QWidget):
         layout.addWidget(note)
 
     def show_results(self, results: Results, alignments: Mapping[int, Alignment]) -> None:
-        """Show the first alignment's map and offer the others, as far as their clouds are known."""
+        """Show the first alignment's map, and offer all whose clouds are available."""
         self._solved = {
             number: (alignments[number], shifts)
             for number, shifts in results.alignments.items()
@@ -50,7 +50,7 @@ class ResidualsTab(QWidget):
                 self._choice.addItem(name, (number, eye))
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Draw what was chosen while nobody looked."""
+        """Draw the map chosen while the tab was hidden."""
         super().showEvent(event)
         self._show_chosen()
 

@@ -1,4 +1,4 @@
-"""One eye's verdict: a sign, a word and the reason."""
+"""The verdict on one eye: symbol, word and reason."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _REASON_LINES = 4
 
 
 class VerdictCard(QFrame):
-    """Shows the verdict on one eye, at a height that does not depend on it."""
+    """Shows the verdict on one eye, at a fixed height."""
 
     def __init__(self, eye: Eye, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -39,11 +39,11 @@ class VerdictCard(QFrame):
         self.show_verdict(None)
 
     def show_verdict(self, verdict: Verdict | None) -> None:
-        """Show a verdict, or that the eye has taken no part in any alignment."""
+        """Show a verdict, or that the eye is in no alignment."""
         self._verdict = verdict
         if verdict is None:
             self._word.setText(f"{NOTHING} Not solved")
-            self._reason.setText("Took no part in any alignment")
+            self._reason.setText("Not in any alignment")
         else:
             self._word.setText(VERDICT_WORDS[verdict.name])
             self._reason.setText(sentence(verdict.reason))
@@ -51,7 +51,7 @@ class VerdictCard(QFrame):
         self._recolor()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow a change between light and dark."""
+        """Redraw in the colours of a new theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._recolor()

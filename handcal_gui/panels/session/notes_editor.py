@@ -1,4 +1,4 @@
-"""Notes that save themselves."""
+"""An editor of notes that saves automatically."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ SAVE_MS = 800
 
 
 class NotesEditor(QWidget):
-    """Notes on a session, and whether they are saved.
+    """Edits the notes on a session, and shows if they are saved.
 
     Attributes
     ----------
     changed : Signal(str)
-        All notes, to be saved, 0.8 s after the last key.
+        The complete notes to save, 0.8 s after the last key.
     """
 
     changed = Signal(str)
@@ -30,7 +30,7 @@ class NotesEditor(QWidget):
         self._saved = ""
         self._edit = QPlainTextEdit()
         self._edit.setAccessibleName("Notes on the session")
-        self._edit.setPlaceholderText("Notes on this session; they are saved by themselves")
+        self._edit.setPlaceholderText("Notes on this session; saved automatically")
         self._edit.setTabChangesFocus(True)
         self._edit.setEnabled(False)
         self._edit.textChanged.connect(self._begin)
@@ -47,7 +47,7 @@ class NotesEditor(QWidget):
         layout.addWidget(self._state)
 
     def show_saved(self, session: Path, notes: str) -> None:
-        """Take note of what is saved; replace what is being written only in another session."""
+        """Set the saved notes; the text being edited is replaced only if the session is another."""
         self._saved = notes
         if session != self._session:
             self._session = session
@@ -58,12 +58,12 @@ class NotesEditor(QWidget):
         self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
-        """Let the notes only be read."""
+        """Set the editor read-only or editable."""
         self._edit.setReadOnly(is_read_only)
         self._refresh()
 
     def flush(self) -> None:
-        """Do now what is waiting: ask for the notes to be saved."""
+        """Request pending saving now."""
         if self._timer.isActive():
             self._timer.stop()
             self._save()

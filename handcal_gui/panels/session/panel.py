@@ -1,4 +1,4 @@
-"""The session panel: what is in the session's folder, with notes, and deletions to take back."""
+"""The session panel: alignments, trials and notes of a session, with undo of deletions."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from handcal_gui.widgets.undo_strip import UndoStrip
 
 
 class SessionPanel(QWidget):
-    """Shows a session, and asks for changes to it.
+    """Shows a session, and requests changes to it.
 
     Attributes
     ----------
     delete_requested, restore_requested : Signal(str, int)
         Kind and number of the alignment or trial.
     notes_changed : Signal(str)
-        All notes, 0.8 s after the last key.
+        The complete notes, 0.8 s after the last key.
     export_requested : Signal()
     """
 
@@ -93,7 +93,7 @@ class SessionPanel(QWidget):
         ----------
         record : SessionRecord
         results : Results or None
-            Those of all its alignments, if they are known.
+            Results of all its alignments, if known.
         """
         before, self._record, self._results = self._record, record, results
         self._alignments.show_rows(alignment_rows(record, results))
@@ -103,14 +103,14 @@ class SessionPanel(QWidget):
         self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
-        """Let a session only be looked at and exported."""
+        """Set the panel read-only: the session can still be exported."""
         self._is_read_only = is_read_only
         for part in (self._alignments, self._trials, self._notes):
             part.set_read_only(is_read_only)
         self._refresh()
 
     def flush(self) -> None:
-        """Ask now for notes to be saved that wait for that."""
+        """Request pending saving of the notes now."""
         self._notes.flush()
 
     def _refresh(self) -> None:

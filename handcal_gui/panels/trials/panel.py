@@ -1,4 +1,4 @@
-"""The trials panel: the user test, trial by trial, with running statistics."""
+"""The trials panel: trials of the user test and their statistics."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ from handcal_gui.widgets.session_rows import (
 from handcal_gui.widgets.undo_strip import UndoStrip
 
 _HOW = (
-    "Fine-tune φ until the drawn target covers the real one, then record: a trial is by how much "
-    "the solved φ misses that."
+    "Fine-tune φ until the drawn target covers the real one, then record: a trial is the error of "
+    "the solved φ against that."
 )
 
-_ZERO = "φ of the {} is as solved, so it would say 0 px. Press T again if the wearer sees no error."
+_ZERO = "φ of the {} is as solved: the error would be 0 px. Press T again if the wearer sees none."
 
 
 class TrialsPanel(QWidget):
@@ -57,10 +57,10 @@ class TrialsPanel(QWidget):
     trial_requested : Signal(str, float)
         Eye, and the target's distance in metres.
     show_target_requested : Signal(str, float)
-        In the headset, likewise; in place of the one shown before.
+        Eye and distance of the target to show in the headset instead of the present one.
     hide_target_requested : Signal()
     doubted : Signal(str)
-        Why a trial is asked for only if the user asks again.
+        Reason why the user must confirm the trial by requesting it again.
     delete_requested, restore_requested : Signal(str, int)
         "trial", and its number.
     """
@@ -102,7 +102,7 @@ class TrialsPanel(QWidget):
         self._refresh()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show the session's trials, and whether another can be recorded."""
+        """Show the session's trials, and enable recording if it is possible."""
         self._snapshot = snapshot
         if snapshot.record is not self._record:
             self.show_record(snapshot.record)
@@ -120,7 +120,7 @@ class TrialsPanel(QWidget):
         self._show_deletions()
 
     def set_read_only(self, is_read_only: bool) -> None:
-        """Let another session only be looked at, or run."""
+        """Prepare for another session, which is read-only or running."""
         self._is_read_only = is_read_only
         self._snapshot = None
         self._table.set_read_only(is_read_only)
@@ -135,9 +135,9 @@ class TrialsPanel(QWidget):
         return "right" if trials and trials[-1].eye == "left" else "left"
 
     def _why_not(self) -> str:
-        """Return why no trial can be recorded now; empty if one can."""
+        """Return the reason why no trial can be recorded now; empty if one can."""
         if self._is_read_only:
-            return "This session is only looked at."
+            return "This session is open read-only."
         if self._snapshot is None:
             return "Trials are recorded while a session runs."
         procedure, eye = self._snapshot.procedure, self._next_eye()
@@ -148,7 +148,7 @@ class TrialsPanel(QWidget):
         return ""
 
     def _is_zero(self) -> bool:
-        """Tell whether the next trial would say that the solved φ misses nothing."""
+        """Return whether the next trial would have an error of zero."""
         procedure = self._snapshot.procedure if self._snapshot else None
         if self._why_not() or procedure is None or procedure.results is None:
             return False
@@ -165,10 +165,10 @@ class TrialsPanel(QWidget):
         self._shows_target.setEnabled(can_show)
         if not can_show:
             self._shows_target.setChecked(False)
-        self._ask_for_target()
+        self._request_target()
 
-    def _ask_for_target(self) -> None:
-        """Ask for what the headset shall show, once it is something else."""
+    def _request_target(self) -> None:
+        """Request another target in the headset if the choice has changed."""
         is_shown = self._shows_target.isChecked()
         target = (self._next_eye(), self._depth.currentData()) if is_shown else None
         if target == self._target:
@@ -185,7 +185,7 @@ class TrialsPanel(QWidget):
         self._strip.show_deletions([deletion for deletion in found if deletion.kind == "trial"])
 
     def _ask(self) -> None:
-        """Ask for a trial; for one of 0 px, which may be a mistake, only if asked again."""
+        """Request a trial; one of 0 px, which may be a mistake, only at the second time."""
         self._is_doubtful = self._is_zero() and not self._is_doubtful
         if self._is_doubtful:
             self.doubted.emit(_ZERO.format(EYE_NAMES[self._next_eye()].lower()))
@@ -208,18 +208,20 @@ class TrialsPanel(QWidget):
         self._depth.setToolTip("Distance of the target from the eye, in metres")
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
-        self._depth.currentIndexChanged.connect(self._ask_for_target)
+        self._depth.currentIndexChanged.connect(self._request_target)
         self._shows_target.setToolTip(
             "Draw the target for this eye, at this distance straight ahead, until a cursor is made "
             "or the session finished"
         )
-        self._shows_target.toggled.connect(self._ask_for_target)
+        self._shows_target.toggled.connect(self._request_target)
 
     def _make_record_action(self) -> None:
         self.record_action = QAction("Record trial", self)
-        self.record_action.setToolTip("Record by how much the solved φ misses the one set (T)")
+        self.record_action.setToolTip(
+            "Record the error of the solved φ against the φ set by hand (T)"
+        )
         self.record_action.setShortcut(Qt.Key.Key_T)
-        # Also from the fine-tune panel, where the study leader's hands are.
+        # Also available from the fine-tune panel, where the study leader works.
         self.record_action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
         self.record_action.triggered.connect(self._ask)
         self.addAction(self.record_action)

@@ -14,7 +14,7 @@ from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _SIGNS: dict[Eye, tuple[str, float]] = {"left": ("o", -0.012), "right": ("t1", 0.012)}
-"""Symbol, and metres beside the distance so that the eyes do not hide each other."""
+"""Symbol, and an offset in metres so that the eyes do not hide each other."""
 _MEDIAN_HALF_WIDTH_M = 0.025
 _MARGIN_M = 0.05
 _LEGEND_M = 0.08
@@ -37,7 +37,7 @@ class TrialPlot(Plot):
         }
 
     def show_trials(self, trials: Collection[Trial], statistics: TrialStatistics) -> None:
-        """Show other trials with their statistics."""
+        """Show trials with their statistics."""
         for eye, line in self._errors.items():
             seen = [trial for trial in trials if trial.eye == eye]
             at_m = [np.full(4, trial.target_depth_m + _SIGNS[eye][1]) for trial in seen]
@@ -51,6 +51,6 @@ class TrialPlot(Plot):
 
 
 def _unjoined(x: Float64, y: Float64, length: int) -> tuple[Float64, Float64]:
-    """Put NaN after every so many points, where pyqtgraph then breaks the line."""
+    """Insert NaN after every `length` points, where pyqtgraph interrupts the line."""
     after = np.arange(length, len(x) + 1, length)
     return np.insert(x, after, np.nan), np.insert(y, after, np.nan)

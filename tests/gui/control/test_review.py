@@ -129,7 +129,7 @@ def test_a_damaged_session_is_refused_in_words_and_the_program_goes_on(
     program.open_session(record.path)
     qtbot.waitUntil(lambda: program.window.banner.text != "", timeout=PATIENCE_MS)
     assert str(record.path) in program.window.banner.text
-    assert "broke down" not in program.window.banner.text
+    assert "unexpected error" not in program.window.banner.text
     assert program.window.page == "start"
     program.open_session(tmp_path / "nowhere")
     qtbot.waitUntil(lambda: "nowhere" in program.window.banner.text, timeout=PATIENCE_MS)

@@ -133,5 +133,7 @@ def test_an_engine_that_breaks_down_closes_the_station_and_says_so(qtbot: QtBot)
     with qtbot.waitSignal(engine.ended, timeout=5000) as ended:
         engine.start()
     engine.close()
-    assert ended.args == ["handcal broke down (ZeroDivisionError: oh); the session is kept"]
+    assert ended.args == [
+        "handcal hit an unexpected error (ZeroDivisionError: oh); the session is kept"
+    ]
     assert station.is_closed

@@ -46,7 +46,7 @@ def test_cancel_stops_the_work(qtbot: QtBot) -> None:
     ("error", "text"),
     [
         (FileError("the disk is full; free some space"), "the disk is full; free some space"),
-        (KeyError("x"), "handcal broke down (KeyError: 'x')"),
+        (KeyError("x"), "handcal hit an unexpected error (KeyError: 'x')"),
     ],
 )
 def test_failure_is_told_in_words(qtbot: QtBot, error: Exception, text: str) -> None:

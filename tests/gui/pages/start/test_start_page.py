@@ -363,7 +363,7 @@ def test_a_check_that_breaks_down_is_told_and_starts_nothing(
     page = open_page()
     monkeypatch.setattr(inspector, "healths", None)
     button(page, "start").click()
-    qtbot.waitUntil(lambda: "broke down" in text(page, "startProblem"))
+    qtbot.waitUntil(lambda: "unexpected error" in text(page, "startProblem"))
     monkeypatch.undo()
     with qtbot.assertNotEmitted(page.start_requested, wait=50):
         page.new.check()
