@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handcal.errors import HandcalError
 from handcal.rig.board import Board, BoardView, charuco
 from handcal.rig.board_finder import find_board
 from handcal.rig.check import MAX_SIDE_PX
@@ -80,6 +81,14 @@ class GridView:
     def __post_init__(self) -> None:
         freeze(self, "display_px", np.float64, None, 2)
         freeze(self, "pixels", np.float64, len(self.display_px), 2)
+
+
+def grid_on(width_px: int, height_px: int, square_px: int) -> Grid:
+    """Return the grid for a display of a size; HandcalError if the display has no room for it."""
+    try:
+        return Grid(width_px, height_px, square_px)
+    except ValueError as error:
+        raise HandcalError(str(error)) from error
 
 
 def draw_grid(grid: Grid) -> UInt8:

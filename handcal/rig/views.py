@@ -192,6 +192,8 @@ def coverage(found: Iterable[BoardView]) -> Coverage:
 def pair_views(first: Sequence[View], second: Sequence[View]) -> tuple[tuple[View, View], ...]:
     """Pair the views of two cameras by the last number in their names, as left07 and right07.
 
+    If one view of a pair is left out, so is the other.
+
     Raises
     ------
     ViewsError
@@ -204,7 +206,12 @@ def pair_views(first: Sequence[View], second: Sequence[View]) -> tuple[tuple[Vie
             "no two images belong together: the two of a pair must end in the same number, as "
             "depth07.png and headset07.png"
         )
-    return tuple((numbered[0][number], numbered[1][number]) for number in shared)
+    return tuple(_as_pair(numbered[0][number], numbered[1][number]) for number in shared)
+
+
+def _as_pair(first: View, second: View) -> tuple[View, View]:
+    dropped = first.dropped or second.dropped
+    return replace(first, dropped=dropped), replace(second, dropped=dropped)
 
 
 def _by_number(views: Iterable[View]) -> dict[int, View]:

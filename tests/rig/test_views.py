@@ -101,3 +101,9 @@ def test_pairs_end_in_the_same_number() -> None:
         pair_views(left[:1], right)
     with pytest.raises(ViewsError, match="end in the same number"):
         pair_views([View("a1", None), View("b1", None)], right)
+
+
+def test_a_pair_is_left_out_if_one_of_its_views_is() -> None:
+    left = drop([View(f"left{number}.png", None) for number in (1, 2)], ["left1.png"])
+    pairs = pair_views(left, [View(f"right{number}.png", None) for number in (1, 2)])
+    assert [(a.dropped, b.dropped) for a, b in pairs] == [(True, True), (False, False)]

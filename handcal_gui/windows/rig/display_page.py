@@ -12,7 +12,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.choose import ALIKE
-from handcal.rig.grid import Grid, draw_grid
+from handcal.rig.grid import Grid, draw_grid, grid_on
 from handcal.station.doctor import Finding, Health
 from handcal.types import Eye
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -20,7 +20,7 @@ from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
-from handcal_gui.windows.rig.solve import Solved, grid_of, solve_display
+from handcal_gui.windows.rig.solve import Solved, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.work import DisplayEntries, Distance
 
@@ -144,7 +144,7 @@ class DisplayPage(StepPage):
             self._board.shots,
             self._entries,
             self._eye,
-            screen_of(self.draft.rig, self._eye),
+            self.draft.rig,
             self.draft.camera_file,
         )
         self.box.run(work, self._show_solved)
@@ -163,7 +163,7 @@ class DisplayPage(StepPage):
         """Return the grid that the display shows; None, and why, if it has no room for it."""
         screen = screen_of(self.draft.rig, self._eye)
         try:
-            return grid_of(self._entries, screen.width_px, screen.height_px)
+            return grid_on(screen.width_px, screen.height_px, self._entries.square_px)
         except HandcalError as error:
             self._grid.look(("",), self.draft.work.board, ())
             self._grid.show_trouble(str(error))

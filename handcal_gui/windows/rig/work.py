@@ -15,6 +15,7 @@ from handcal.rig.board import Board
 from handcal.rig.camera import LensModel
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig.steps import DisplayInputs
 from handcal.types import Rig
 
 Distance: TypeAlias = Literal["measured", "solved"]
@@ -74,6 +75,17 @@ class DisplayEntries:
     """As measured; what a square subtends from the nominal distance."""
     dropped_grid: tuple[str, ...] = ()
     dropped_board: tuple[str, ...] = ()
+
+    @property
+    def inputs(self) -> DisplayInputs:
+        """The same as the calibration takes it."""
+        return DisplayInputs(
+            square_px=self.square_px,
+            distance_m=self.distance_m if self.distance == "measured" else None,
+            square_arcmin=self.square_arcmin,
+            nominal_m=self.nominal_m,
+            pose_V_H=entered_path(self.view),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +163,11 @@ class WorkFolder:
             If it cannot be written.
         """
         write_rig(self._rig, rig)
+
+
+def entered_path(text: str) -> Path | None:
+    """Return the path that was entered; None if the field is empty."""
+    return Path(text).expanduser() if text else None
 
 
 def _set_aside(path: Path) -> str:
