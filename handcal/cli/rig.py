@@ -310,10 +310,11 @@ def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Gri
 
 def views_of(paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()) -> tuple[View, ...]:
     """Look for a board in images, with progress; leave those out that are dropped."""
+    from handcal.progress import Progress
     from handcal.rig.views import drop, image_files, read_views
 
     with progress() as report:
-        views = read_views(image_files(paths), board, report)
+        views = read_views(image_files(paths), board, Progress(report))
     return drop(views, dropped)
 
 

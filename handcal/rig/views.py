@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import IMAGE_SUFFIXES, read_image
+from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
 from handcal.types import Intrinsics, UInt8
@@ -85,7 +86,7 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
 def read_views(
     files: Sequence[Path],
     board: Board,
-    report: Callable[[str, float], None] = lambda _what, _share: None,
+    progress: Progress = Progress(),
 ) -> tuple[View, ...]:
     """Look for the board in image files; one that cannot be read is a view with a problem.
 
@@ -93,12 +94,12 @@ def read_views(
     ----------
     files : sequence of Path
     board : Board
-    report : callable
-        Told each file's name, and the share done; may raise to give up.
+    progress : Progress
+        Reports each file's name.
     """
     views = []
     for number, file in enumerate(files):
-        report(file.name, number / len(files))
+        progress.at(number / len(files), file.name)
         try:
             image = read_image(file, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
             views.append(view(file.name, image, board))

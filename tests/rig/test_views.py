@@ -6,6 +6,7 @@ import pytest
 
 from handcal.errors import FileError
 from handcal.geometry import rigid
+from handcal.progress import Progress
 from handcal.rig.board import Board, BoardView
 from handcal.rig.board_print import draw_board
 from handcal.rig.views import (
@@ -39,7 +40,7 @@ def test_images_are_read_and_what_is_wrong_is_kept(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("not looked at")
     told: list[str] = []
     files = image_files([tmp_path])
-    views = read_views(files, BOARD, lambda what, _share: told.append(what))
+    views = read_views(files, BOARD, Progress(lambda what, _share: told.append(what)))
     assert told == [view.name for view in views] == ["a1.png", "a2.png", "a3.jpg", "a4.png"]
     assert [view.found is not None for view in views] == [False, True, False, False]
     problems = [view.problem for view in views]

@@ -11,6 +11,7 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from handcal.errors import HandcalError
+from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
@@ -95,7 +96,7 @@ class EvaluationPage(QWidget):
         self._results.show_outcome(None)
         self._bar.run(
             "Beginning",
-            lambda tell, is_cancelled: self._evaluation.run(entries, tell, is_cancelled),
+            lambda *told: self._evaluation.run(entries, Progress(*told)),
             self._show_outcome,
         )
 

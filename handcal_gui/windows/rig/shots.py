@@ -11,6 +11,7 @@ import numpy as np
 
 from handcal.errors import CancelledError, FileError
 from handcal.io.images import read_image
+from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.views import View, image_files, pair_views, read_views
 from handcal.types import UInt8
@@ -62,7 +63,7 @@ def look(
             report(f"Looking for the board in {name}", (number + share) / len(folders))
 
         paths = image_files([folder])
-        views = read_views(paths, board, told)
+        views = read_views(paths, board, Progress(told))
         files |= {(number, path.name): path for path in paths}
         of_camera.append(views)
     together = pair_views(*of_camera) if len(of_camera) == 2 else [(one,) for one in of_camera[0]]

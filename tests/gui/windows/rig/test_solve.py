@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, tzinfo
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -169,8 +169,8 @@ def test_command_and_wizard_write_the_same_bytes(
 ) -> None:
     class AtNoon(datetime):
         @classmethod
-        def now(cls, tz: Any = None) -> datetime:
-            return datetime(2026, 1, 1, 12, tzinfo=tz)
+        def now(cls, tz: tzinfo | None = None) -> Self:
+            return cls(2026, 1, 1, 12, tzinfo=tz)
 
     monkeypatch.setattr("handcal.rig.assemble.datetime", AtNoon)
     rig = tmp_path / "rig.yaml"
