@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, charuco, corners_m
-from handcal.rig.board_trouble import why_not_found, why_not_plain
+from handcal.rig.board_diagnosis import why_not_found, why_not_plain
 from handcal.types import Float32, Float64, UInt8
 
 # Corners found further from where the others put them belong to something else, in squares.
