@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from handcal.rig.board import Board
     from handcal.rig.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
-    from handcal.rig.views import View
-    from handcal.rig.worst import WorstView
+    from handcal.rig.views import View, WorstView
 
 
 def board(arguments: argparse.Namespace) -> None:

@@ -16,10 +16,18 @@ from numpy.typing import ArrayLike
 
 from handcal.geometry import camera_matrix, rigid
 from handcal.rig.board import BoardView
-from handcal.rig.least_squares import marginal_covariance
+from handcal.rig.fit import marginal_covariance, rms
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import Coverage, View, ViewsError, coverage, one_size, used
-from handcal.rig.worst import WorstView, rms, worst_view
+from handcal.rig.views import (
+    Coverage,
+    View,
+    ViewsError,
+    WorstView,
+    coverage,
+    one_size,
+    used,
+    worst_view,
+)
 from handcal.types import Float64, Intrinsics, freeze
 
 LensModel: TypeAlias = Literal["none", "radial", "full", "rational"]

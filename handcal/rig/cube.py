@@ -13,8 +13,8 @@ from handcal.errors import HandcalError
 from handcal.geometry import camera_matrix, image_points, rigid, transform
 from handcal.rig.board import DICTIONARIES
 from handcal.rig.board_diagnosis import light_trouble
+from handcal.rig.fit import rms
 from handcal.rig.marker_corners import refine_corners
-from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, UInt8
 
 FACES = ("front", "right", "back", "left", "top", "bottom")

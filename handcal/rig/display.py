@@ -17,12 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from handcal.geometry import camera_matrix, invert
 from handcal.rig.check import MAX_SIDE_PX
-from handcal.rig.covariance import clustered_covariance
+from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.grid import GridView
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose, plane_pose
 from handcal.rig.views import ViewsError, require_size
-from handcal.rig.worst import rms
 from handcal.types import EyeDisplay, Float64, Intrinsics, freeze
 
 DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")

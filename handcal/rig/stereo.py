@@ -25,10 +25,9 @@ from handcal.rig.camera import (
     solved_columns,
     tilt,
 )
-from handcal.rig.least_squares import marginal_covariance
+from handcal.rig.fit import marginal_covariance, rms
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import View, ViewsError, one_size
-from handcal.rig.worst import WorstView, rms, worst_view
+from handcal.rig.views import View, ViewsError, WorstView, one_size, worst_view
 from handcal.types import Float64, Intrinsics, freeze
 
 _Both: TypeAlias = tuple[Float64, Float64]  # of the depth camera's and the headset's image

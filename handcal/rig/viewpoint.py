@@ -12,11 +12,10 @@ from scipy.optimize import least_squares
 
 from handcal.geometry import camera_matrix, image_points, invert, rigid, transform
 from handcal.rig.board import BoardView
-from handcal.rig.covariance import clustered_covariance
+from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import View, ViewsError, require_size, used
-from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, freeze
 
 MIN_VIEWS = 3

@@ -21,8 +21,7 @@ from handcal.rig.steps import (
 )
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import board_pose
-from handcal.rig.views import View
-from handcal.rig.worst import WorstView
+from handcal.rig.views import View, WorstView
 from handcal.types import Eye, Intrinsics, Rig
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.rows import camera_rows, display_rows, stereo_rows

@@ -27,8 +27,7 @@ from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.tracked_file import read_tracked, write_tracked
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import ViewsError
-from handcal.rig.worst import WorstView
+from handcal.rig.views import ViewsError, WorstView
 from handcal.sim.photographs import BOARD
 from handcal_gui.windows.rig.shots import Shot, look
 from handcal_gui.windows.rig.solve import (
