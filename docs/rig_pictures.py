@@ -18,14 +18,14 @@ from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, write_photographs
 from handcal_gui.theme import use_theme
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.windows.rig.wizard import RigWizard
-from handcal_gui.windows.rig.work import (
+from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
     RigWork,
     StereoEntries,
     ViewpointEntries,
     WorkFolder,
 )
+from handcal_gui.windows.rig.wizard import RigWizard
 
 PICTURES = Path(__file__).parent / "pictures"
 STEPS = ("", "stereo", "", "left", "", "result")

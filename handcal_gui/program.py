@@ -39,10 +39,10 @@ from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
-from handcal_gui.windows.evaluation.offers import make_offers
+from handcal_gui.windows.evaluation.specs import make_offers
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from handcal_gui.windows.rig.project_folder import WorkFolder
 from handcal_gui.windows.rig.wizard import RigWizard
-from handcal_gui.windows.rig.work import WorkFolder
 
 _KEYS = (
     ("Space", "What the wizard's large button says"),

@@ -38,7 +38,7 @@ from handcal_gui.widgets.fields import (
 )
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.project import Draft
 
 _KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": "Checkerboard"}
 _PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square

@@ -18,11 +18,11 @@ from handcal.types import Eye
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.project import Draft
+from handcal_gui.windows.rig.project_folder import DisplayEntries, Distance
 from handcal_gui.windows.rig.solve import Solved, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
-from handcal_gui.windows.rig.work import DisplayEntries, Distance
 
 _DISTANCES: dict[Distance, str] = {
     "measured": "as measured",

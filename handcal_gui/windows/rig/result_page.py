@@ -28,8 +28,8 @@ from handcal_gui.widgets.fields import button, main_button, named
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.finding_list import FindingList
+from handcal_gui.windows.rig.project import Draft
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
 
 _RIG_FILES = "Rig files (*.yaml *.yml)"

@@ -24,14 +24,14 @@ from handcal.rig.viewpoint import board_pose
 from handcal.rig.views import View, WorstView
 from handcal.types import Eye, Intrinsics, Rig
 from handcal_gui.widgets.number_table import Row
-from handcal_gui.windows.rig.rows import camera_rows, display_rows, stereo_rows
-from handcal_gui.windows.rig.shots import Shot, without
-from handcal_gui.windows.rig.work import (
+from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
     StereoEntries,
     ViewpointEntries,
     entered_path,
 )
+from handcal_gui.windows.rig.rows import camera_rows, display_rows, stereo_rows
+from handcal_gui.windows.rig.shots import Shot, without
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.project import Draft
 from handcal_gui.windows.rig.solve_box import SolveBox
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import intrinsics_field, lens_field
+from handcal_gui.windows.rig.project import Draft
 from handcal_gui.windows.rig.solve import Solved, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage
 

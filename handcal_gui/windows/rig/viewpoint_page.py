@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 from handcal.station.doctor import Finding, Health
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import lens_field
+from handcal_gui.windows.rig.project import Draft
 from handcal_gui.windows.rig.solve import Solved, solve_viewpoint
 from handcal_gui.windows.rig.step_page import StepPage
 

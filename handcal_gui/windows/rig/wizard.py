@@ -24,11 +24,11 @@ from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, named
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
-from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.project import Draft
+from handcal_gui.windows.rig.project_folder import WorkFolder
 from handcal_gui.windows.rig.result_page import ResultPage
 from handcal_gui.windows.rig.stereo_page import StereoPage
 from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
-from handcal_gui.windows.rig.work import WorkFolder
 
 _FIRST_SIZE = QSize(1240, 760)
 _RAIL_PX = 29 * SPACING_PX

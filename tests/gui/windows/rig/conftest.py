@@ -14,8 +14,13 @@ from PySide6.QtWidgets import QFileDialog
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
 from handcal.types import Intrinsics, UInt8
+from handcal_gui.windows.rig.project_folder import (
+    DisplayEntries,
+    RigWork,
+    StereoEntries,
+    ViewpointEntries,
+)
 from handcal_gui.windows.rig.shots import read_color
-from handcal_gui.windows.rig.work import DisplayEntries, RigWork, StereoEntries, ViewpointEntries
 
 
 @dataclass(frozen=True)

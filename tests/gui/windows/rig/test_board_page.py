@@ -16,8 +16,8 @@ from handcal.rig.rig_file import write_rig
 from handcal.types import Origin
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.board_page import BoardPage
-from handcal_gui.windows.rig.draft import Draft
-from handcal_gui.windows.rig.work import WorkFolder
+from handcal_gui.windows.rig.project import Draft
+from handcal_gui.windows.rig.project_folder import WorkFolder
 
 ORIGIN = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
 

@@ -17,10 +17,10 @@ from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.windows.rig.project_folder import WorkFolder
 from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from handcal_gui.windows.rig.wizard import RigWizard
-from handcal_gui.windows.rig.work import WorkFolder
 
 BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 

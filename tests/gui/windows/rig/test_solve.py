@@ -29,6 +29,7 @@ from handcal.rig.tracked_file import read_tracked, write_tracked
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import ViewsError, WorstView
 from handcal.sim.photographs import BOARD
+from handcal_gui.windows.rig.project_folder import DisplayEntries
 from handcal_gui.windows.rig.shots import Shot, look
 from handcal_gui.windows.rig.solve import (
     Solved,
@@ -36,7 +37,6 @@ from handcal_gui.windows.rig.solve import (
     solve_stereo,
     solve_viewpoint,
 )
-from handcal_gui.windows.rig.work import DisplayEntries
 
 RIG = example_rig()
 

@@ -16,7 +16,7 @@ from handcal.lab.study.noise import QUICK_NOISE
 from handcal.lab.study.studies import run_method_comparison, run_noise_study
 from handcal.progress import Progress
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
-from handcal_gui.windows.evaluation.offers import make_offers
+from handcal_gui.windows.evaluation.specs import make_offers
 from handcal_gui.windows.evaluation.work import SimulatedStudy
 
 

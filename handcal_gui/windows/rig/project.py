@@ -14,8 +14,8 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
+from handcal_gui.windows.rig.project_folder import WorkFolder
 from handcal_gui.windows.rig.solve import Solved
-from handcal_gui.windows.rig.work import WorkFolder
 
 _SETTLE_MS = 500
 

@@ -7,7 +7,12 @@ import pytest
 from handcal.errors import FileError
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
-from handcal_gui.windows.rig.work import DisplayEntries, RigWork, StereoEntries, WorkFolder
+from handcal_gui.windows.rig.project_folder import (
+    DisplayEntries,
+    RigWork,
+    StereoEntries,
+    WorkFolder,
+)
 
 
 def test_what_was_entered_is_there_again(tmp_path: Path) -> None:
