@@ -20,10 +20,10 @@ from handcal_gui.theme import use_theme
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
-    RigWork,
+    ProjectFolder,
+    RigInputs,
     StereoEntries,
     ViewpointEntries,
-    WorkFolder,
 )
 from handcal_gui.windows.rig.wizard import RigWizard
 
@@ -39,7 +39,7 @@ def main() -> None:
     app.setStyle("fusion")
     use_theme("light")
     with tempfile.TemporaryDirectory() as scratch:
-        photographs, work = Path(scratch, "photographs"), WorkFolder(Path(scratch, "rig"))
+        photographs, work = Path(scratch, "photographs"), ProjectFolder(Path(scratch, "rig"))
         write_photographs(photographs, example_rig(), 12, np.random.default_rng(0), samples=2)
         os.chdir(scratch)  # so that the paths shown are short
         work.save(entries())
@@ -59,7 +59,7 @@ def main() -> None:
         wizard.accept()
 
 
-def entries() -> RigWork:
+def entries() -> RigInputs:
     """Return what a technician would enter."""
 
     def display(eye: str) -> DisplayEntries:
@@ -69,7 +69,7 @@ def entries() -> RigWork:
             tracked=f"photographs/tracked-{eye}.json",
         )
 
-    return RigWork(
+    return RigInputs(
         board=BOARD,
         stereo=StereoEntries("photographs/depth", "photographs/headset"),
         viewpoint=ViewpointEntries("photographs/viewpoint"),

@@ -63,7 +63,7 @@ def board(arguments: argparse.Namespace) -> None:
 def take(arguments: argparse.Namespace) -> None:
     """Take images of a board, or of a display's grid, from a camera, a recording or a video."""
     from handcal.camera.playback import PlaybackSettings
-    from handcal.camera.take_board import TakeSettings, keep_imager, take_views
+    from handcal.camera.take_board import TakeSettings, capture_views, keep_imager
     from handcal.camera.view_source import open_view_source
     from handcal.rig.choose import ALIKE, ChooseSettings
 
@@ -90,7 +90,7 @@ def take(arguments: argparse.Namespace) -> None:
         is_stopped = stack.enter_context(until_interrupted())
         report = stack.enter_context(progress())
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
-        taken = take_views(cameras, folders, board, settings, report, is_stopped)
+        taken = capture_views(cameras, folders, board, settings, report, is_stopped)
     for why, count in taken.passed_over.items():
         console.print(f"{count} of {taken.looked_at} moments passed over: {why}")
     if not taken.kept:

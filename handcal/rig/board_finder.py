@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, charuco, corners_m
-from handcal.rig.board_diagnosis import why_not_found, why_not_plain
+from handcal.rig.board_diagnosis import explain_missing, why_not_plain
 from handcal.types import Float32, Float64, UInt8
 
 # Corners found further from where the others put them belong to something else, in squares.
@@ -40,7 +40,7 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     ids, pixels = find_corners(gray, board)
     points_m = corners_m(board)[ids]
     if len(ids) < MIN_CORNERS or np.linalg.matrix_rank(points_m[:, :2] - points_m[0, :2]) < 2:
-        why = why_not_found(gray, board, find_corners) if explain else "no board is seen"
+        why = explain_missing(gray, board, find_corners) if explain else "no board is seen"
         raise BoardError(why)
     fits = _fits(points_m, pixels)
     if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS:

@@ -29,7 +29,7 @@ ALIKE = ChooseSettings(most=5, apart_share=0.0)
 """A few views by a camera that stands still, as of a display's grid."""
 
 
-class ViewChooser:
+class ViewSelector:
     """Looks at one moment after the other, seen by one camera or by the two of a pair."""
 
     def __init__(self, settings: ChooseSettings | None = None) -> None:
@@ -42,7 +42,7 @@ class ViewChooser:
         """Whether there are enough."""
         return len(self._kept) >= self._settings.most
 
-    def look(self, seen: Sequence[BoardView | None]) -> str:
+    def consider(self, seen: Sequence[BoardView | None]) -> str:
         """Return why a moment is not kept; empty if it is.
 
         Parameters

@@ -120,7 +120,7 @@ def find_cube(image: UInt8, cube: Cube) -> Mapping[int, Float64]:
     ids = [] if numbers is None else [int(number) for number in numbers.ravel()]
     seen = sorted(set(ids) & set(cube.ids))
     if len(seen) < MIN_FACES:
-        raise CubeError(_why_not_found(image, cube, ids))
+        raise CubeError(_explain_missing(image, cube, ids))
     twice = [marker for marker in seen if ids.count(marker) > 1]
     if twice:
         raise CubeError(f"marker {twice[0]} is seen twice: take other cubes and prints away")
@@ -158,7 +158,7 @@ def cube_pose(corners_px: Mapping[int, Float64], cube: Cube, camera: Intrinsics)
     return T
 
 
-def _why_not_found(image: UInt8, cube: Cube, ids: list[int]) -> str:
+def _explain_missing(image: UInt8, cube: Cube, ids: list[int]) -> str:
     light = light_trouble(image)
     if light:
         return light

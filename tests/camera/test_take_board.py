@@ -14,9 +14,9 @@ from handcal.camera.take_board import (
     DEPTH_TO_COLOR,
     IMAGER,
     TakeSettings,
+    capture_views,
     keep_imager,
     keep_images,
-    take_views,
 )
 from handcal.camera.viewpoint import open_viewpoint
 from handcal.cli.main import main
@@ -63,7 +63,7 @@ def test_each_rest_is_kept_once_and_in_pairs(videos: tuple[Path, Path], tmp_path
     folders = tmp_path / "depth", tmp_path / "headset"
     told: list[float] = []
     with open_viewpoint(videos[0]) as depth, open_viewpoint(videos[1]) as headset:
-        taken = take_views(
+        taken = capture_views(
             (depth, headset), folders, BOARD, TakeSettings(), lambda _, share: told.append(share)
         )
     assert taken.kept == RESTS
@@ -81,7 +81,7 @@ def test_no_more_are_taken_than_asked_for(videos: tuple[Path, Path], tmp_path: P
     settings = TakeSettings(choose=ChooseSettings(most=2, apart_share=0.0))
     for _ in range(2):  # what is there stays
         with open_viewpoint(videos[0]) as camera:
-            taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
+            taken = capture_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
         assert taken.kept == 2
     names = [path.name for path in sorted((tmp_path / "a").iterdir())]
     assert names == [f"a-00{number}.png" for number in (1, 2, 3, 4)]
@@ -90,10 +90,10 @@ def test_no_more_are_taken_than_asked_for(videos: tuple[Path, Path], tmp_path: P
 def test_it_ends_when_time_is_up_or_when_stopped(videos: tuple[Path, Path], tmp_path: Path) -> None:
     with open_viewpoint(videos[0]) as camera:
         settings = TakeSettings(seconds=0.35)
-        taken = take_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
+        taken = capture_views((camera,), (tmp_path / "a",), BOARD, settings, lambda *_: None)
     assert (taken.kept, taken.looked_at) == (1, 4)
     with open_viewpoint(videos[0]) as camera:
-        taken = take_views(
+        taken = capture_views(
             *((camera,), (tmp_path / "b",), BOARD, TakeSettings(), lambda *_: None, lambda: True)
         )
     assert taken.looked_at == 0
@@ -132,7 +132,7 @@ class LateCamera(Closable):
 def test_a_camera_that_falls_silent_is_told(tmp_path: Path) -> None:
     camera = LateCamera(2)
     with pytest.raises(CameraTimeoutError, match="no frame for 1 s"):
-        take_views((camera,), (tmp_path / "a",), BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
+        capture_views((camera,), (tmp_path / "a",), BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
     assert camera.left < 1000  # after its first image
 
 
@@ -169,7 +169,7 @@ def test_cameras_of_different_paces_stay_together(
     monkeypatch.setattr("handcal.camera.take_board.see_board", look)
     cameras = [PacedCamera(pace_ms) for pace_ms in paces_ms]
     folders = tmp_path / "depth", tmp_path / "headset"
-    take_views(cameras, folders, BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
+    capture_views(cameras, folders, BOARD, TakeSettings(), lambda *_: None)  # type: ignore[arg-type]
     assert len(apart_ms) == 11
     assert max(apart_ms) <= 20
 

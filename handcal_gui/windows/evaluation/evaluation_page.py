@@ -21,11 +21,11 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.windows.evaluation.results_view import ResultsView
-from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Standing
+from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Readiness
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Offer:
+class EvaluationSpec:
     """What can be evaluated."""
 
     title: str
@@ -43,7 +43,7 @@ class EvaluationPage(QWidget):
 
     Parameters
     ----------
-    offer : Offer
+    spec : EvaluationSpec
     entries : object
         Dataclass, shown first.
 
@@ -55,28 +55,28 @@ class EvaluationPage(QWidget):
 
     busy_changed = Signal(bool)
 
-    def __init__(self, offer: Offer, entries: Any, parent: QWidget | None = None) -> None:
+    def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._evaluation = offer.evaluation
+        self._evaluation = spec.evaluation
         self._entries = entries
-        self._standing: Standing | None = None
+        self._readiness: Readiness | None = None
         self._failure = self._waits_for = ""
-        self.form = offer.form()
+        self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", "Run")
-        self._prepare = PreparationButton(offer.preparation) if offer.preparation else None
+        self._prepare = PreparationButton(spec.preparation) if spec.preparation else None
         self._bar = JobBar()
-        self._found = FindingLine("standing")
+        self._found = FindingLine("readiness")
         self._results = ResultsView()
         self._look = LatestJob(self._stand, self)
-        self._lay_out(offer.question)
+        self._lay_out(spec.question)
         self.form.changed.connect(self._take_entries)
         self._button.clicked.connect(self.run)
         if self._prepare is not None:
             self._prepare.closed.connect(self._look_anew)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
-        self._look.answered.connect(self._take_standing)
+        self._look.answered.connect(self._take_readiness)
         self._look.failed.connect(self._show_failure)
 
     @property
@@ -132,20 +132,20 @@ class EvaluationPage(QWidget):
 
     def _ask(self) -> None:
         """Look how it stands; until that is known, nothing can be run."""
-        self._standing = None
+        self._readiness = None
         if not self.is_busy and self.isVisible():
             self._look.ask(self._entries)
         self._refresh()
 
-    def _stand(self, entries: Any) -> Standing:
+    def _stand(self, entries: Any) -> Readiness:
         try:
-            return self._evaluation.standing(entries)
+            return self._evaluation.readiness(entries)
         except HandcalError as error:
-            return Standing(Finding("", Health.BROKEN, str(error)))
+            return Readiness(Finding("", Health.BROKEN, str(error)))
 
-    def _take_standing(self, entries: Any, standing: Standing) -> None:
+    def _take_readiness(self, entries: Any, readiness: Readiness) -> None:
         if entries == self._entries and not self.is_busy:
-            self._standing = standing
+            self._readiness = readiness
             self._refresh()
 
     def _show_outcome(self, outcome: Outcome) -> None:
@@ -162,13 +162,13 @@ class EvaluationPage(QWidget):
         self.busy_changed.emit(is_busy)
 
     def _refresh(self) -> None:
-        standing = self._standing
+        readiness = self._readiness
         if self._prepare is not None:
             self._prepare.follow(None if self.is_busy else self._entries)
-        can_run = standing is not None and standing.can_run and not self._waits_for
+        can_run = readiness is not None and readiness.can_run and not self._waits_for
         self._button.setEnabled(can_run)
-        if standing is not None:
-            self._button.setText(standing.button)
+        if readiness is not None:
+            self._button.setText(readiness.button)
         if finding := self._finding():
             self._found.show_finding(finding)
 
@@ -183,7 +183,7 @@ class EvaluationPage(QWidget):
             return Finding("", Health.LIMITED, found, "one runs at a time")
         if not self._results.is_empty:
             return Finding("", Health.GOOD, "Done")
-        return self._standing.finding if self._standing else None
+        return self._readiness.finding if self._readiness else None
 
     def _lay_out(self, question: str) -> None:
         row = QHBoxLayout()

@@ -26,7 +26,7 @@ class PreparationDialog(QDialog):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
-    """How an evaluation offers such a dialog."""
+    """Button and dialog with which an evaluation is prepared."""
 
     button: str
     help_text: str

@@ -1,4 +1,4 @@
-"""The four evaluations that the window offers."""
+"""Specifications of the four evaluations in the window."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import choice, named, whole_number
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.evaluation.capture_dialog import MOST_POSES, CaptureDialog
-from handcal_gui.windows.evaluation.evaluation_page import Offer
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.preparation import Preparation
 from handcal_gui.windows.evaluation.work import GivenData, SimulatedStudy
 
@@ -29,24 +29,24 @@ _MOST_WEARERS, _MOST_SEED, _MOST_PROCESSES = 10_000, 2**31 - 1, 1024
 _MOST_ALIGNMENTS = 20
 
 
-def make_offers() -> Mapping[str, Offer]:
+def make_specs() -> Mapping[str, EvaluationSpec]:
     """Return them by the fields of `EvaluationEntries`."""
     return {
-        "noise": Offer(
+        "noise": EvaluationSpec(
             "Noise study",
             "How much rotation and noise do the solvers bear, and when do they leave the paper's "
             "4 mm? About ten minutes on two cores; a quick look, half a minute.",
             SimulatedStudy(noise_cases, run_noise_study),
             _noise_form,
         ),
-        "methods": Offer(
+        "methods": EvaluationSpec(
             "Method comparison",
             "Which calibration method errs least on the same wearers, and what does it cost them? "
             "100 wearers take about eleven minutes on two cores.",
             SimulatedStudy(method_cases, run_method_comparison),
             _methods_form,
         ),
-        "cube": Offer(
+        "cube": EvaluationSpec(
             "Cube test",
             "How far is a drawn cube from the real one, as a camera in the eye's place sees it? "
             "About a minute with rendered captures.",
@@ -59,7 +59,7 @@ def make_offers() -> Mapping[str, Offer]:
                 CaptureDialog,
             ),
         ),
-        "users": Offer(
+        "users": EvaluationSpec(
             "User test",
             "How far do calibrations miss what their wearers see, over all trials of their "
             "sessions? A few seconds.",

@@ -23,7 +23,7 @@ from handcal_gui.windows.evaluation.time_left import TimeLeft
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class Readiness:
     """State of an evaluation with what was entered, and the text of its button."""
 
     finding: Finding
@@ -57,7 +57,7 @@ class Reported(Protocol):
 class Evaluation(Protocol):
     """An evaluation as a page needs it; entries are a dataclass with an `output` folder."""
 
-    def standing(self, entries: Any) -> Standing:
+    def readiness(self, entries: Any) -> Readiness:
         """Check what was entered; HandcalError says what is wrong with it."""
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
@@ -73,18 +73,18 @@ class SimulatedStudy:
     order: Callable[[Any, Progress], Reported]
     """Runs or resumes the study, and writes its report."""
 
-    def standing(self, entries: Any) -> Standing:
+    def readiness(self, entries: Any) -> Readiness:
         """Return how much of the study the folder holds."""
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
-            return Standing(_note(f"{folder} holds all of this study"), "Show results")
+            return Readiness(_note(f"{folder} holds all of this study"), "Show results")
         if share:
             advice = "completed trials are kept"
-            return Standing(
+            return Readiness(
                 _note(f"{folder} holds {100 * share:.0f} % of this study", advice), "Resume"
             )
-        return Standing(_ready())
+        return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Run or resume the study, with the time left beside its progress."""
@@ -111,14 +111,14 @@ class GivenData:
     order: Callable[[Any, Progress], Reported]
     """Evaluates the files, and writes the report."""
 
-    def standing(self, entries: Any) -> Standing:
+    def readiness(self, entries: Any) -> Readiness:
         """Return what is missing, or that an earlier report will be replaced."""
         if missing := self.missing(entries):
-            return Standing(Finding("", Health.BROKEN, missing))
+            return Readiness(Finding("", Health.BROKEN, missing))
         folder = free_of_studies(output_folder(entries.output))
         if (folder / "report.pdf").exists():
-            return Standing(_note(f"The report in {folder} will be replaced"))
-        return Standing(_ready())
+            return Readiness(_note(f"The report in {folder} will be replaced"))
+        return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Evaluate, and write the report."""

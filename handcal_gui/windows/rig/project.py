@@ -14,26 +14,26 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
-from handcal_gui.windows.rig.project_folder import WorkFolder
+from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve import Solved
 
 _SETTLE_MS = 500
 
 
-class Draft(QObject):
+class RigProject(QObject):
     """Entries and rig, which the pages change.
 
     Parameters
     ----------
-    folder : WorkFolder
+    folder : ProjectFolder
     realsense : RealSenseSettings
 
     Attributes
     ----------
-    folder : WorkFolder
+    folder : ProjectFolder
     realsense : RealSenseSettings
         How one is run that images are taken with.
-    work : RigWork
+    inputs : RigInputs
     rig : Rig
         As far as it is calibrated.
     complaint : str
@@ -48,12 +48,12 @@ class Draft(QObject):
     failed = Signal(str)
 
     def __init__(
-        self, folder: WorkFolder, realsense: RealSenseSettings, parent: QObject | None = None
+        self, folder: ProjectFolder, realsense: RealSenseSettings, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
         self.folder = folder
         self.realsense = realsense
-        self.work, of_entries = folder.load()
+        self.inputs, of_entries = folder.load()
         self.rig, of_rig = folder.load_rig()
         self.complaint = " ".join(filter(None, (of_entries, of_rig)))
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
@@ -62,7 +62,7 @@ class Draft(QObject):
     @property
     def camera_file(self) -> Path:
         """Where the viewpoint camera's intrinsics are, once they are known."""
-        given = self.work.viewpoint.intrinsics
+        given = self.inputs.viewpoint.intrinsics
         return Path(given).expanduser() if given else self.folder.viewpoint
 
     @property
@@ -80,10 +80,10 @@ class Draft(QObject):
         return "good"  # OpenCV's or ROS's
 
     def enter(self, **changes: Any) -> None:
-        """Take fields of `RigWork`."""
-        work = replace(self.work, **changes)
-        if work != self.work:
-            self.work = work
+        """Take fields of `RigInputs`."""
+        inputs = replace(self.inputs, **changes)
+        if inputs != self.inputs:
+            self.inputs = inputs
             self._settle.start()
 
     def begin_from(self, path: Path) -> None:
@@ -117,6 +117,6 @@ class Draft(QObject):
         """Keep the entries."""
         self._settle.stop()
         try:
-            self.folder.save(self.work)
+            self.folder.save(self.inputs)
         except FileError as error:
             self.failed.emit(f"What was entered cannot be kept: {error}")

@@ -89,7 +89,7 @@ class DisplayEntries:
 
 
 @dataclass(frozen=True, slots=True)
-class RigWork:
+class RigInputs:
     """Everything entered in the rig wizard."""
 
     board: Board = field(default_factory=Board)
@@ -100,7 +100,7 @@ class RigWork:
     right: DisplayEntries = field(default_factory=DisplayEntries)
 
 
-class WorkFolder:
+class ProjectFolder:
     """Keeps entries, images taken, and the rig as far as it is calibrated.
 
     Parameters
@@ -126,21 +126,21 @@ class WorkFolder:
         self._entries = path / "work.json"
         self._rig = path / "rig.yaml"
 
-    def load(self) -> tuple[RigWork, str]:
+    def load(self) -> tuple[RigInputs, str]:
         """Return the entries, and what went wrong for a person to read; empty if nothing did.
 
         A file that cannot be used is kept beside, ending in ``.bad``.
         """
         if not self._entries.exists():
-            return RigWork(), ""
+            return RigInputs(), ""
         try:
-            return read_settings(RigWork, read_json(self._entries), "work"), ""
+            return read_settings(RigInputs, read_json(self._entries), "work"), ""
         except FileError as error:
-            return RigWork(), f"The entries start anew: {error}; {_set_aside(self._entries)}"
+            return RigInputs(), f"The entries start anew: {error}; {_set_aside(self._entries)}"
 
-    def save(self, work: RigWork) -> None:
+    def save(self, inputs: RigInputs) -> None:
         """Write the entries, or raise FileError."""
-        write_json(self._entries, settings_json(work))
+        write_json(self._entries, settings_json(inputs))
 
     def load_rig(self) -> tuple[Rig, str]:
         """Return the rig as far as it is calibrated, the example at first, and what went wrong."""

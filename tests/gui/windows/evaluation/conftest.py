@@ -22,7 +22,7 @@ from handcal.report.document import Column, Figure, Report, Section, Table
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import whole_number
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.evaluation.evaluation_page import Offer
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.work import SimulatedStudy
 
 CASES = 10
@@ -47,8 +47,8 @@ class Numbers:
         return SimulatedStudy(self.study, self._order)
 
     @property
-    def offer(self) -> Offer:
-        return Offer("Numbers", "What are their squares?", self.work, make_form)
+    def spec(self) -> EvaluationSpec:
+        return EvaluationSpec("Numbers", "What are their squares?", self.work, make_form)
 
     def study(self, entries: NoiseStudySettings) -> Study:
         cases: list[Case] = [{"number": number} for number in range(CASES)]

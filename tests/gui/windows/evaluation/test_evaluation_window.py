@@ -43,7 +43,7 @@ class Student:
 
     @property
     def found(self) -> str:
-        return self.child(QLabel, "standingFound").text()
+        return self.child(QLabel, "readinessFound").text()
 
     @property
     def button(self) -> QPushButton:
@@ -70,8 +70,8 @@ class Student:
 def student(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[Student]:
     """Show two evaluations of the same study."""
     others = MethodComparisonSettings(processes=1, output=f"{entries.output}-others")
-    offers = {"noise": numbers.offer, "methods": replace(numbers.offer, title="Others")}
-    window = EvaluationWindow(offers, EvaluationEntries(noise=entries, methods=others))
+    specs = {"noise": numbers.spec, "methods": replace(numbers.spec, title="Others")}
+    window = EvaluationWindow(specs, EvaluationEntries(noise=entries, methods=others))
     qtbot.addWidget(window)
     window.show()
     yield Student(qtbot, window)

@@ -27,8 +27,8 @@ class ScenarioDialog(PreparationDialog):
 def window(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[EvaluationWindow]:
     """Show an evaluation that can be prepared with a seed other than 0."""
     preparation = Preparation("Prepare…", "Do.", lambda one: one.seed != 0, ScenarioDialog)
-    offers = {"noise": replace(numbers.offer, preparation=preparation)}
-    window = EvaluationWindow(offers, EvaluationEntries(noise=entries))
+    specs = {"noise": replace(numbers.spec, preparation=preparation)}
+    window = EvaluationWindow(specs, EvaluationEntries(noise=entries))
     qtbot.addWidget(window)
     window.show()
     yield window

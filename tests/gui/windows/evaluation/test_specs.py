@@ -16,7 +16,7 @@ from handcal.lab.study.noise import QUICK_NOISE
 from handcal.lab.study.studies import run_method_comparison, run_noise_study
 from handcal.progress import Progress
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
-from handcal_gui.windows.evaluation.specs import make_offers
+from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.work import SimulatedStudy
 
 
@@ -31,16 +31,16 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
         ),
         UserEntries("/sessions", "/u"),
     )
-    for name, offer in make_offers().items():
-        form = offer.form()
+    for name, spec in make_specs().items():
+        form = spec.form()
         qtbot.addWidget(form)
         form.show_entries(getattr(entries, name))
         assert form.take(getattr(EvaluationEntries(), name)) == getattr(entries, name)
 
 
 def test_studies_are_those_of_the_commands() -> None:
-    offers = make_offers()
-    noise, methods = offers["noise"].evaluation, offers["methods"].evaluation
+    specs = make_specs()
+    noise, methods = specs["noise"].evaluation, specs["methods"].evaluation
     assert isinstance(noise, SimulatedStudy)
     assert noise.study(NoiseStudySettings("quick", seed=3)).settings == replace(QUICK_NOISE, seed=3)
     assert isinstance(methods, SimulatedStudy)
@@ -53,37 +53,37 @@ def test_studies_are_those_of_the_commands() -> None:
 
 def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
     entries = UserEntries(str(tmp_path / "none"), str(tmp_path / "results"))
-    evaluation = make_offers()["users"].evaluation
-    assert evaluation.standing(entries).can_run
+    evaluation = make_specs()["users"].evaluation
+    assert evaluation.readiness(entries).can_run
     with pytest.raises(FileError, match=r"no trial .*none"):
         evaluation.run(entries, Progress())
 
 
 def test_without_sessions_there_is_no_user_test(tmp_path: Path) -> None:
-    evaluation = make_offers()["users"].evaluation
-    standing = evaluation.standing(UserEntries("", str(tmp_path)))
-    assert not standing.can_run
-    assert "folder of sessions" in standing.finding.found
+    evaluation = make_specs()["users"].evaluation
+    readiness = evaluation.readiness(UserEntries("", str(tmp_path)))
+    assert not readiness.can_run
+    assert "folder of sessions" in readiness.finding.found
 
 
 def test_a_cube_test_is_run_once_there_are_captures_to_look_at(tmp_path: Path) -> None:
-    offer = make_offers()["cube"]
-    assert offer.preparation is not None
+    spec = make_specs()["cube"]
+    assert spec.preparation is not None
     entries = CubeEntries(output=str(tmp_path / "results"))
-    assert offer.evaluation.standing(entries).can_run
-    assert not offer.preparation.is_possible(entries)
+    assert spec.evaluation.readiness(entries).can_run
+    assert not spec.preparation.is_possible(entries)
     entries = replace(entries, captures=str(tmp_path / "captures"))
-    assert offer.preparation.is_possible(entries)
-    standing = offer.evaluation.standing(entries)
-    assert "no folder" in standing.finding.found
-    assert not standing.can_run
+    assert spec.preparation.is_possible(entries)
+    readiness = spec.evaluation.readiness(entries)
+    assert "no folder" in readiness.finding.found
+    assert not readiness.can_run
     pose = tmp_path / "captures" / "centre" / "pose-1"
     pose.mkdir(parents=True)
     with pytest.raises(FileError, match="no captures"):
-        offer.evaluation.standing(entries)
+        spec.evaluation.readiness(entries)
     for name in ("real.png", "virtual.png"):
         (pose / name).touch()
-    assert offer.evaluation.standing(entries).can_run
+    assert spec.evaluation.readiness(entries).can_run
 
 
 def test_names_of_a_plan_are_separated_by_commas() -> None:

@@ -22,7 +22,7 @@ from handcal_gui.windows.evaluation.work import GivenData
 
 def test_a_study_is_done_and_told(numbers: Any, entries: NoiseStudySettings) -> None:
     told: list[tuple[str, float]] = []
-    assert numbers.work.standing(entries).button == "Run"
+    assert numbers.work.readiness(entries).button == "Run"
     assert not Path(entries.output).exists()
     outcome = numbers.work.run(entries, Progress(lambda *one: told.append(one)))
     assert outcome.report.lead == "Squares grow."
@@ -34,7 +34,7 @@ def test_a_study_is_done_and_told(numbers: Any, entries: NoiseStudySettings) -> 
     assert told[0] == ("0 of 10 cases", 0.0)
     assert told[10][0] == "10 of 10 cases, less than a minute left"
     assert told[-1] == ("Writing the report", 1.0)
-    assert numbers.work.standing(entries).button == "Show results"
+    assert numbers.work.readiness(entries).button == "Show results"
 
 
 def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseStudySettings) -> None:
@@ -44,13 +44,13 @@ def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseStudySet
             entries,
             Progress(lambda _doing, share: shares.append(share), lambda: len(shares) > 4),
         )
-    standing = numbers.work.standing(entries)
-    assert standing.button == "Resume"
-    assert standing.finding.found.endswith("holds 40 % of this study")
+    readiness = numbers.work.readiness(entries)
+    assert readiness.button == "Resume"
+    assert readiness.finding.found.endswith("holds 40 % of this study")
     with pytest.raises(FileError, match="holds another study"):
-        numbers.work.standing(replace(entries, seed=2))
+        numbers.work.readiness(replace(entries, seed=2))
     with pytest.raises(FileError, match="choose a folder"):
-        numbers.work.standing(replace(entries, output=""))
+        numbers.work.readiness(replace(entries, output=""))
 
 
 def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySettings) -> None:
@@ -62,15 +62,15 @@ def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySet
 
     data = GivenData(lambda given: "" if given.sessions else "no sessions", order)
     given = UserEntries(sessions="here", output=f"{entries.output}-data")
-    assert data.standing(replace(given, sessions="")).finding.health is Health.BROKEN
-    assert data.standing(given).can_run
+    assert data.readiness(replace(given, sessions="")).finding.health is Health.BROKEN
+    assert data.readiness(given).can_run
     told: list[tuple[str, float]] = []
     outcome = data.run(given, Progress(lambda *one: told.append(one)))
     assert (outcome.report.title, outcome.folder) == ("Data", Path(given.output))
     assert told == [("Reading", 0.7)]
-    assert "will be replaced" in data.standing(given).finding.found
+    assert "will be replaced" in data.readiness(given).finding.found
     with pytest.raises(CancelledError):
         data.run(given, Progress(is_cancelled=lambda: True))
     run_study(numbers.work.study(entries), Path(entries.output), workers=1)
     with pytest.raises(FileError, match="holds a study"):
-        data.standing(replace(given, output=entries.output))
+        data.readiness(replace(given, output=entries.output))
