@@ -97,7 +97,7 @@ def make(arguments: argparse.Namespace) -> None:
 
 
 def check(arguments: argparse.Namespace) -> None:
-    """Check a rig file: every field, what a person would ask of it, and how it was calibrated."""
+    """Check a rig file: every field, the usual questions about it, and its calibration."""
     from handcal.rig.report import report_rig
 
     rig = _read_rig(arguments.input)
@@ -113,7 +113,7 @@ def check(arguments: argparse.Namespace) -> None:
 
 
 def compare(arguments: argparse.Namespace) -> None:
-    """Compare two rig files, and say how far apart they draw."""
+    """Compare two rig files, and show how far apart they draw."""
     from handcal.rig.compare import compare_rigs
 
     differences = compare_rigs(_read_rig(arguments.a), _read_rig(arguments.b))
@@ -125,7 +125,7 @@ def compare(arguments: argparse.Namespace) -> None:
 
 
 def migrate(arguments: argparse.Namespace) -> None:
-    """Write a rig file of any known version as one of the newest."""
+    """Convert a rig file of any known version to the newest."""
     _write(arguments.output, _read_rig(arguments.input))
 
 
@@ -243,5 +243,5 @@ def _write(path: Path, rig: Rig) -> None:
     try:
         write_rig(path, rig)
     except ValueError as error:
-        raise HandcalError(f"this is no plausible rig: {error}") from error
+        raise HandcalError(f"this rig is not plausible: {error}") from error
     console.print(str(path), markup=False)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def noise(arguments: argparse.Namespace) -> None:
-    """Repeat the paper's simulation, and disturb the solvers by what it left out."""
+    """Repeat the paper's simulation, and add the disturbances that it left out."""
     from handcal.lab.settings import NoiseStudySettings
     from handcal.lab.study.studies import run_noise_study
 

@@ -1,4 +1,4 @@
-"""Why a board was not found in an image."""
+"""Diagnosis of an image in which no board was found."""
 
 from __future__ import annotations
 

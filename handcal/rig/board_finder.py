@@ -95,7 +95,7 @@ def _upright(gray: UInt8, grid: Float64) -> Float64:
 
 
 def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
-    """Tell whether the first square is black, as printed, and how far x points to the right."""
+    """Return whether the first square is black, as printed, and how far x points to the right."""
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
     row, column = np.indices(middles.shape[:2])
     shades = shades_at(gray, middles)
@@ -112,7 +112,7 @@ def _fits(points_m: Float64, pixels: Float64) -> NDArray[np.bool_]:
 
 
 def _goes_on(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> bool:
-    """Tell whether there are corners beyond any side of the grid: it is part of a larger board."""
+    """Return whether there are corners beyond a side of the grid, as of a larger board."""
     columns, rows = board.inner
     corners = corners_m(board)[:, :2] / board.square_m
     H = np.asarray(cv2.findHomography(corners[ids], pixels)[0], dtype=np.float64)

@@ -12,7 +12,7 @@ from handcal.rig.board_finder import find_board
 from handcal.rig.check import MAX_SIDE_PX
 from handcal.types import Float64, UInt8, freeze
 
-# A board is told in metres, and a display's grid in pixels: any scale serves, if it is the same.
+# Boards are described in metres, grids in pixels: any scale will do, if it is always the same.
 _BOARD_M = 1e-4
 _MARKER_SHARE = 0.7
 _SMALLEST_SQUARE_PX, _LARGEST_SQUARE_PX = 20, 2000

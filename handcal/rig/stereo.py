@@ -41,13 +41,13 @@ _SWAPPED = "the cameras are swapped: the depth camera's images are the headset's
 
 @dataclass(frozen=True, slots=True)
 class StereoSettings:
-    """When the pose between two cameras is good."""
+    """Limits of a good pose between two cameras."""
 
     camera: CameraSettings = field(default_factory=CameraSettings)
     """For intrinsics that are not given."""
     good_pairs: int = 10
     good_spread_rad: float = 0.15
-    """How far the boards' normals must spread about their mean, RMS."""
+    """Least spread of the boards' normals about their mean, RMS."""
     max_rms_px: float = 1.0
     max_angle_sigma_rad: float = 1e-3
     max_shift_sigma_m: float = 3e-4
@@ -58,7 +58,7 @@ class StereoSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoCalibration:
-    """Where the depth camera sits, and how far to trust that."""
+    """The pose of the depth camera, with its uncertainty."""
 
     T_H_D: Float64
     """(4, 4); from the depth camera (or its colour imager) to the headset's."""

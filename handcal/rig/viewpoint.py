@@ -1,4 +1,4 @@
-"""Where the viewpoint camera sits in the headset: from tracked poses of a board that it sees."""
+"""Pose of the viewpoint camera in the headset, from tracked poses of a board that it sees."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class TrackedView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewpointPose:
-    """Where the viewpoint camera sits."""
+    """The pose of the viewpoint camera in the headset."""
 
     T_H_C: Float64
     """(4, 4); from the viewpoint camera to the headset rig."""
@@ -148,7 +148,9 @@ def viewpoint_from_stereo(stereo: StereoCalibration) -> ViewpointPose:
         If the pairs do not determine it.
     """
     if stereo.covariance is None:
-        raise ViewsError("these pairs do not tell where the viewpoint camera is: add others")
+        raise ViewsError(
+            "these pairs do not determine the pose of the viewpoint camera: add others"
+        )
     return ViewpointPose(
         stereo.T_H_D, stereo.covariance, stereo.residuals_px, stereo.rms_px, stereo.verdict
     )

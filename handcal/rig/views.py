@@ -32,20 +32,20 @@ class ViewsError(HandcalError):
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One image, and what was found in it."""
+    """An image, with the board found in it."""
 
     name: str
     """Unique among the views, as the file's name."""
     found: BoardView | None
     problem: str = ""
-    """Why nothing was found; empty if it was."""
+    """Reason why nothing was found; empty if it was."""
     dropped: bool = False
     """Left out by a person."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """How the corners of all views lie over the image."""
+    """The distribution of all views' corners over the image."""
 
     hits: NDArray[np.int64]
     """(6, 8); in how many views each cell of the image has a corner."""

@@ -1,4 +1,4 @@
-"""The cube test: what all its captures show, one row for each pair."""
+"""The cube test: errors in all its captures, one row for each pair."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _UNUSABLE = (CubeError, BoardError, ViewsError, FileError, ValueError)
 
 @dataclass(frozen=True, slots=True)
 class CubeTest:
-    """What the captures show."""
+    """The errors found in captures."""
 
     rows: list[CubeRow]
     """`cube_row` of each pair, and whose it is: ``position``, ``pose``, ``drawn``."""
     left_out: dict[str, str]
-    """Why, by what could not be used."""
+    """Reasons, by the name of the capture that could not be used."""
 
 
 def judge_captures(

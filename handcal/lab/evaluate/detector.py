@@ -1,4 +1,4 @@
-"""How well a detector finds the hands in annotated photographs."""
+"""Precision and recall of a hand detector on annotated photographs."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ CornerRow: TypeAlias = dict[str, Any]
 """One corner of one trial: the columns of `trial_rows`, and whose it is."""
 
 Unit: TypeAlias = Literal["wearer", "calibration"]
-"""What an interval takes for independent."""
+"""The unit that an interval takes for independent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class UserTest:
     sessions: Mapping[str, SessionRecord]
     """Those with trials, by a name of their own."""
     left_out: Mapping[str, str]
-    """Why the others are left out, by their folders."""
+    """Reasons why the others are left out, by their folders."""
     corners: Sequence[CornerRow]
     """All errors."""
 
@@ -61,14 +61,14 @@ class GroupErrors:
 
 @dataclass(frozen=True, slots=True)
 class UserTestResult:
-    """What a user test came to; JSON-able with `dataclasses.asdict`."""
+    """The errors found in a user test; JSON-able with `dataclasses.asdict`."""
 
     total: GroupErrors
     by_wearer: Mapping[str, GroupErrors]
     by_eye: Mapping[str, GroupErrors]
     by_depth_m: Mapping[str, GroupErrors]
     components_arcmin: VarianceComponents | None
-    """How far wearers differ, and the errors of one; None for a single wearer."""
+    """Spread between wearers and within one; None for a single wearer."""
     left_out: Mapping[str, str]
 
 

@@ -1,4 +1,4 @@
-"""Run a study: every case once, in any number of processes, and go on after an interruption."""
+"""Runs of a study: every case once, in any number of processes, resumed after an interruption."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """What there is to do."""
+    """The cases of a study, and the function that runs one."""
 
     name: str
     settings: Any

@@ -1,4 +1,4 @@
-"""How far wearers must miss for the paper's own method to err as it did in the paper's user test.
+"""Search of the wearers' errors with which the paper's method errs as in the paper's user test.
 
 A method comparison is worth no more than its wearers. Theirs err in what they overlay by multiples
 of `WearerSettings`' errors: across, in size and in rotation alike.
@@ -28,7 +28,7 @@ _NEAR_ENOUGH = 0.02
 
 @dataclass(frozen=True, slots=True)
 class NoiseFit:
-    """What the search found."""
+    """The result of the search."""
 
     scale: float
     """Errors of an overlay in those of `WearerSettings`."""

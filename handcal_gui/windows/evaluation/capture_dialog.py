@@ -1,4 +1,4 @@
-"""Taking the captures of a cube test with a camera, an image at a time."""
+"""A dialog that takes the captures of a cube test with a camera, one by one."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class CaptureDialog(PreparationDialog):
         self._bar.failed.connect(self._show_not_done)
         self._lay_out()
         self._ask()
-        self._found.show_finding(Finding("", Health.LIMITED, "choose the camera, and show it"))
+        self._found.show_finding(Finding("", Health.LIMITED, "choose the camera, and press Show"))
         self._bar.run("Looking for cameras", lambda *_: self._prepare(), self._begin)
 
     def start(self) -> None:
@@ -132,7 +132,7 @@ class CaptureDialog(PreparationDialog):
         self._ask()
 
     def _ask(self) -> None:
-        """Look what is missing of what is planned."""
+        """Check which planned captures are missing."""
         try:
             self._plan, self._plan_problem = self.entries.plan, ""
         except ValueError as error:

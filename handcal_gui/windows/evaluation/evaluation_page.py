@@ -1,4 +1,4 @@
-"""One evaluation: what to do, how far it is, and what it came to."""
+"""The page of one evaluation: settings, progress and results."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Readiness
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationSpec:
-    """What can be evaluated."""
+    """The specification of an evaluation and its page."""
 
     title: str
     question: str
-    """What it answers, and how long it takes."""
+    """The question that it answers, and its duration."""
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
     """Makes the fields for its entries."""
@@ -39,7 +39,7 @@ class EvaluationSpec:
 
 
 class EvaluationPage(QWidget):
-    """Runs one evaluation in a job, and shows what came of it.
+    """A page that runs one evaluation in a job, and shows its result.
 
     Parameters
     ----------
@@ -68,12 +68,12 @@ class EvaluationPage(QWidget):
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         self._results = ResultsView()
-        self._look = LatestJob(self._stand, self)
+        self._look = LatestJob(self._check, self)
         self._lay_out(spec.question)
         self.form.changed.connect(self._take_entries)
         self._button.clicked.connect(self.run)
         if self._prepare is not None:
-            self._prepare.closed.connect(self._look_anew)
+            self._prepare.closed.connect(self._restart)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
         self._look.answered.connect(self._take_readiness)
@@ -81,63 +81,63 @@ class EvaluationPage(QWidget):
 
     @property
     def entries(self) -> Any:
-        """What is entered."""
+        """The settings as entered."""
         return self._entries
 
     @property
     def is_busy(self) -> bool:
-        """Whether it runs."""
+        """True while the evaluation runs."""
         return self._bar.is_busy
 
     def run(self) -> None:
-        """Begin, or go on."""
+        """Start or resume the evaluation."""
         entries = self._entries
         self._failure = ""
         self._results.show_outcome(None)
         self._bar.run(
-            "Beginning",
+            "Starting",
             lambda *told: self._evaluation.run(entries, Progress(*told)),
             self._show_outcome,
         )
 
     def cancel(self) -> None:
-        """Give up what runs; what is done of a study is kept."""
+        """Cancel the evaluation; completed trials of a study are kept."""
         self._bar.cancel()
 
     def stop(self) -> None:
-        """Give up what runs or is prepared, and wait for its end."""
+        """Cancel the evaluation or its preparation, and wait for the end."""
         if self._prepare is not None:
             self._prepare.stop()
         self._bar.stop()
         self._look.stop()
 
     def wait_for(self, title: str) -> None:
-        """Do not run beside another evaluation, which is named; empty for none."""
+        """Wait for another evaluation, given by its title; empty for none."""
         self._waits_for = title
         self._refresh()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Look at the folder anew."""
+        """Check the folder again."""
         super().showEvent(event)
         self._ask()
 
     def _take_entries(self) -> None:
-        self._look_anew(self.form.take(self._entries))
+        self._restart(self.form.take(self._entries))
 
-    def _look_anew(self, entries: Any) -> None:
+    def _restart(self, entries: Any) -> None:
         self._entries = entries
         self._failure = ""
         self._results.show_outcome(None)
         self._ask()
 
     def _ask(self) -> None:
-        """Look how it stands; until that is known, nothing can be run."""
+        """Check the settings; until the answer is there, nothing can be run."""
         self._readiness = None
         if not self.is_busy and self.isVisible():
             self._look.ask(self._entries)
         self._refresh()
 
-    def _stand(self, entries: Any) -> Readiness:
+    def _check(self, entries: Any) -> Readiness:
         try:
             return self._evaluation.readiness(entries)
         except HandcalError as error:
@@ -173,7 +173,7 @@ class EvaluationPage(QWidget):
             self._found.show_finding(finding)
 
     def _finding(self) -> Finding | None:
-        """Return what is to be said now; None for what is said already."""
+        """Return the message to show; None to keep the present one."""
         if self.is_busy:
             return Finding("", Health.GOOD, "Running")
         if self._failure:

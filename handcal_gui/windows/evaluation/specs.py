@@ -34,8 +34,8 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
     return {
         "noise": EvaluationSpec(
             "Noise study",
-            "How much rotation and noise do the solvers bear, and when do they leave the paper's "
-            "4 mm? About ten minutes on two cores; a quick look, half a minute.",
+            "How much rotation and noise do the solvers tolerate before their error exceeds the "
+            "paper's 4 mm? About ten minutes on two cores; a quick run, half a minute.",
             SimulatedStudy(noise_cases, run_noise_study),
             _noise_form,
         ),
@@ -90,15 +90,15 @@ def _noise_form() -> EntriesForm:
     size = choice(
         "size",
         "Size",
-        {"full": "Full", "quick": "Quick look"},
-        "A quick look's numbers say little.",
+        {"full": "Full", "quick": "Quick"},
+        "A quick run uses few trials; do not report its numbers.",
     )
     return EntriesForm({"size": ("Size", size), **_study_fields()})
 
 
 def _methods_form() -> EntriesForm:
     wearers = whole_number(
-        "wearers", 2, _MOST_WEARERS, "Simulated wearers, each of whom does all methods."
+        "wearers", 2, _MOST_WEARERS, "Simulated wearers; each uses every method."
     )
     return EntriesForm({"wearers": ("Wearers", wearers), **_study_fields()})
 
@@ -142,9 +142,12 @@ def _users_form() -> EntriesForm:
 
 def _study_fields() -> dict[str, tuple[str, QWidget]]:
     processes: QSpinBox = whole_number(
-        "processes", 0, _MOST_PROCESSES, "On this computer; more than its cores are no quicker."
+        "processes",
+        0,
+        _MOST_PROCESSES,
+        "On this computer; more than its cores are not faster.",
     )
-    processes.setSpecialValueText("One a core")
+    processes.setSpecialValueText("One per core")
     scheduler = named(
         QLineEdit(placeholderText="None: this computer", clearButtonEnabled=True),
         "scheduler",
@@ -160,10 +163,10 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
 
 
 def _seed() -> QSpinBox:
-    return whole_number("seed", 0, _MOST_SEED, "Of all that is random: the same, the same numbers.")
+    return whole_number("seed", 0, _MOST_SEED, "Random seed; the same seed gives the same numbers.")
 
 
 def _output() -> dict[str, tuple[str, QWidget]]:
     output = PathField("Results folder", "folder")
-    output.setToolTip("Report, figures and raw numbers; a study that is not done goes on there.")
+    output.setToolTip("Report, figures and raw numbers; an unfinished study there is resumed.")
     return {"output": ("Results folder", output)}

@@ -41,7 +41,7 @@ class EvaluationWindow(QDialog):
     Attributes
     ----------
     remembered : Signal(EvaluationEntries)
-        What was entered, to be proposed next time.
+        The settings as entered, to be proposed next time.
     """
 
     remembered = Signal(object)
@@ -79,7 +79,7 @@ class EvaluationWindow(QDialog):
 
     @property
     def entries(self) -> EvaluationEntries:
-        """What is entered."""
+        """The settings as entered."""
         return replace(self._entries, **{name: one.entries for name, one in self._pages.items()})
 
     @property
@@ -92,7 +92,7 @@ class EvaluationWindow(QDialog):
         self._rail.setCurrentRow(list(self._pages).index(name))
 
     def reject(self) -> None:
-        """Close; what runs is cancelled first."""
+        """Close; a running evaluation is cancelled first."""
         busy = [page for page in self._pages.values() if page.is_busy]
         self._is_closing = bool(busy)
         for page in busy:
@@ -101,7 +101,7 @@ class EvaluationWindow(QDialog):
             self.stop()
 
     def stop(self) -> None:
-        """Give up what runs, wait for its end, and close; before the program ends."""
+        """Cancel the running evaluation, wait for its end, and close."""
         for page in self._pages.values():
             page.stop()
         self.remembered.emit(self.entries)

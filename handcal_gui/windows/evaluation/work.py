@@ -31,7 +31,7 @@ class Readiness:
 
     @property
     def can_run(self) -> bool:
-        """Whether the evaluation can be run."""
+        """True if the evaluation can be run."""
         return self.finding.health is not Health.BROKEN
 
 

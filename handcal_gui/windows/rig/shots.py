@@ -38,7 +38,7 @@ class Shot:
 
     @property
     def problem(self) -> str:
-        """Why nothing was found; empty if all was."""
+        """Reason why nothing was found; empty if everything was."""
         return "; ".join(view.problem for view in self.views if view.problem)
 
 

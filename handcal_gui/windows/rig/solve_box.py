@@ -47,7 +47,7 @@ class SolveBox(QWidget):
         self.show_origin(None)
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
-        """Solve in a job; `then` takes what it comes to."""
+        """Solve in a job, and pass the result to `then`."""
 
         def solve(_report: Report, is_cancelled: IsCancelled) -> object:
             solved = work()

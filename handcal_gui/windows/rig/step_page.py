@@ -1,4 +1,4 @@
-"""What the steps that solve something from images have in common."""
+"""Base of the wizard's pages that solve a step from images."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class TakeDialog(QDialog):
 
     @property
     def shown_images(self) -> Images | None:
-        """What is seen now; None while no camera is shown."""
+        """The present images; None while no camera is shown."""
         return self._cameras.images
 
     def start(self) -> None:

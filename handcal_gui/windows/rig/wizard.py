@@ -45,7 +45,7 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
 
 
 class Page(Protocol):
-    """What the wizard asks of a page."""
+    """A page as the wizard needs it."""
 
     def enter(self) -> None:
         """Come into sight."""
