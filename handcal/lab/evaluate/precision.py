@@ -40,7 +40,7 @@ class PrecisionRecall:
 
 
 def precision_recall(results: Iterable[tuple[ImageResult, Bool]]) -> PrecisionRecall:
-    """Match what was found with what is there, at an intersection over union of 0.5.
+    """Match detections with annotated hands, at an intersection over union of 0.5.
 
     Parameters
     ----------

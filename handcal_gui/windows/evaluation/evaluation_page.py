@@ -131,7 +131,7 @@ class EvaluationPage(QWidget):
         self._ask()
 
     def _ask(self) -> None:
-        """Check the settings; until the answer is there, nothing can be run."""
+        """Check the settings; nothing can be run until the check is done."""
         self._readiness = None
         if not self.is_busy and self.isVisible():
             self._look.ask(self._entries)

@@ -166,13 +166,13 @@ class BoardPage(QWidget):
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _may_give_up(self) -> bool:
-        """Ask before calibrated parts are given up."""
+        """Ask before calibrated parts are discarded."""
         if not self._project.rig.origins:
             return True
         answer = QMessageBox.question(
             self,
             "Begin from another rig",
-            "What has been calibrated here is given up, unless it is saved. Go on?",
+            "Calibrated parts that are not saved will be lost. Continue?",
         )
         return answer == QMessageBox.StandardButton.Yes
 

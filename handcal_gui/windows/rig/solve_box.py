@@ -1,4 +1,4 @@
-"""The foot of a step: solve, and what that came to."""
+"""The foot of a step: the button that solves it, and the result."""
 
 from __future__ import annotations
 
