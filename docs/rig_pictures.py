@@ -18,14 +18,14 @@ from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, write_photographs
 from handcal_gui.theme import use_theme
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.windows.rig.wizard import RigWizard
-from handcal_gui.windows.rig.work import (
+from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
-    RigWork,
+    ProjectFolder,
+    RigInputs,
     StereoEntries,
     ViewpointEntries,
-    WorkFolder,
 )
+from handcal_gui.windows.rig.wizard import RigWizard
 
 PICTURES = Path(__file__).parent / "pictures"
 STEPS = ("", "stereo", "", "left", "", "result")
@@ -39,7 +39,7 @@ def main() -> None:
     app.setStyle("fusion")
     use_theme("light")
     with tempfile.TemporaryDirectory() as scratch:
-        photographs, work = Path(scratch, "photographs"), WorkFolder(Path(scratch, "rig"))
+        photographs, work = Path(scratch, "photographs"), ProjectFolder(Path(scratch, "rig"))
         write_photographs(photographs, example_rig(), 12, np.random.default_rng(0), samples=2)
         os.chdir(scratch)  # so that the paths shown are short
         work.save(entries())
@@ -59,7 +59,7 @@ def main() -> None:
         wizard.accept()
 
 
-def entries() -> RigWork:
+def entries() -> RigInputs:
     """Return what a technician would enter."""
 
     def display(eye: str) -> DisplayEntries:
@@ -69,7 +69,7 @@ def entries() -> RigWork:
             tracked=f"photographs/tracked-{eye}.json",
         )
 
-    return RigWork(
+    return RigInputs(
         board=BOARD,
         stereo=StereoEntries("photographs/depth", "photographs/headset"),
         viewpoint=ViewpointEntries("photographs/viewpoint"),

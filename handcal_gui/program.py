@@ -39,10 +39,10 @@ from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
 from handcal_gui.window import MainWindow, Page, Panels
-from handcal_gui.windows.evaluation.offers import make_offers
+from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.wizard import RigWizard
-from handcal_gui.windows.rig.work import WorkFolder
 
 _KEYS = (
     ("Space", "Press the large button, except from a text field"),
@@ -176,7 +176,7 @@ class Program(QObject):
     def calibrate_rig(self) -> RigWizard | None:
         """Lead through the offline calibration; None if what is entered could not be kept."""
         try:
-            folder = WorkFolder(self._file.path.parent / "rig")
+            folder = ProjectFolder(self._file.path.parent / "rig")
         except FileError as error:
             self.window.banner.show_message(str(error))
             return None
@@ -197,7 +197,7 @@ class Program(QObject):
         if not entries.users.sessions:
             users = replace(entries.users, sessions=self.start.new.settings.sessions)
             entries = replace(entries, users=users)
-        window = EvaluationWindow(make_offers(), entries, self.window)
+        window = EvaluationWindow(make_specs(), entries, self.window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(self._remember_evaluation)
         window.show()

@@ -16,7 +16,7 @@ from handcal.io.images import write_png
 from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
-from handcal.rig.choose import ChooseSettings, ViewChooser
+from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.formats import write_intrinsics, write_pose
 from handcal.types import Frame, UInt8
 
@@ -76,18 +76,18 @@ def capture_views(
     FileError
         If an image cannot be written.
     """
-    chooser = ViewChooser(settings.choose)
+    selector = ViewSelector(settings.choose)
     verdicts: Counter[str] = Counter()
     next_ns = 0
     for images, t_ns in _moments(cameras):
         share = 1e-9 * t_ns / settings.seconds
-        if chooser.is_done or share > 1.0 or progress.is_cancelled():
+        if selector.is_done or share > 1.0 or progress.is_cancelled():
             break
         if t_ns < next_ns:
             continue
         next_ns = t_ns + round(1e9 * settings.every_s)
         progress.show(share, f"{verdicts['']} views kept")
-        why_not = chooser.look(see_board(images, board))
+        why_not = selector.consider(see_board(images, board))
         if not why_not:
             keep_images(images, folders)
         verdicts[why_not] += 1

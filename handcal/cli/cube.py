@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from handcal.cli.output import console, progress, save, table
-from handcal.cli.rig import GRID_OPTION, grid_of
+from handcal.cli.rig import GRID_OPTION
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder
@@ -20,8 +20,7 @@ from handcal.rig.print_page import PAPERS
 from handcal.types import EYES
 
 if TYPE_CHECKING:
-    from handcal.rig.grid import Grid
-    from handcal.types import Rig
+    from handcal.lab.settings import CubeTestSettings
 
 _SHOWN = (
     ("err_t_xy_arcmin", "xy, arcmin"),
@@ -145,12 +144,13 @@ def capture(arguments: argparse.Namespace) -> None:
     from handcal.camera.viewpoint import open_viewpoint
     from handcal.lab.evaluate.cube_capture import take_captures
     from handcal.lab.evaluate.cube_folder import missing_captures
+    from handcal.lab.evaluate.run import cube_and_grid
 
     def ask(what: str) -> None:
         try:
             console.input(f"{escape(what)}, then press Enter ")
         except EOFError:
-            raise HandcalError("no answer; the same command goes on with what is missing") from None
+            raise HandcalError("no answer; repeat the command to take what is missing") from None
 
     try:
         plan = CapturePlan(
@@ -158,7 +158,7 @@ def capture(arguments: argparse.Namespace) -> None:
         )
     except ValueError as error:
         raise HandcalError(str(error)) from error
-    cube, grid = _cube(arguments), _grid(arguments)
+    cube, grid = cube_and_grid(_settings(arguments), arguments.folder)
     if not missing_captures(arguments.folder, plan):
         console.print("All captures are there.")
         return
@@ -194,16 +194,19 @@ def capture(arguments: argparse.Namespace) -> None:
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render all captures of a test, with a display calibrated by a simulated hand."""
-    from handcal.sim.cube_captures import CaptureSettings, write_captures
+    from handcal.lab.evaluate.run import render_captures
+    from handcal.lab.settings import CubeTestSettings
+    from handcal.progress import Progress
 
-    settings = CaptureSettings(
-        seed=arguments.seed,
+    settings = CubeTestSettings(
+        rig=_text(arguments.rig),
         eye=arguments.eye,
+        seed=arguments.seed,
         poses=arguments.poses,
         alignments=arguments.alignments,
     )
     with progress() as show:
-        write_captures(arguments.folder, _rig(arguments), settings, show)
+        render_captures(settings, arguments.folder, Progress(show))
     console.print(f"Captures: {arguments.folder}", markup=False)
 
 
@@ -226,56 +229,49 @@ def simulate(arguments: argparse.Namespace) -> None:
 )
 def report(arguments: argparse.Namespace) -> None:
     """Report the errors of the drawn cube against the real one, over all captures."""
-    from handcal.lab.evaluate.cube_report import cube_report
-    from handcal.lab.evaluate.cube_summary import cube_summary
-    from handcal.lab.evaluate.cube_test import judge_captures
-    from handcal.lab.study.store import free_of_studies
+    from handcal.lab.evaluate.run import run_cube_test
+    from handcal.progress import Progress
     from handcal.report.cells import mean_sd
-    from handcal.report.write import write_report
-    from handcal.rig.formats import read_intrinsics
 
-    output = free_of_studies(arguments.output)
-    cube, grid = _cube(arguments), _grid(arguments)
-    camera = read_intrinsics(arguments.camera_intrinsics or arguments.folder / "camera.json")
+    settings = replace(
+        _settings(arguments),
+        camera=_text(arguments.camera_intrinsics),
+        output=str(arguments.output),
+    )
     with progress() as show:
-        test = judge_captures(arguments.folder, cube, camera, grid, show)
-        for name, why in test.left_out.items():
-            console.print(f"Left out: {name}: {why}", markup=False)
-        if not test.rows:
-            raise HandcalError("no pair of captures can be evaluated; see above")
-        summary = cube_summary(test.rows)
-        described = cube_report(test, summary, cube, camera)
-        written = write_report(output, described, lambda share: show("Writing the report", share))
+        found = run_cube_test(settings, Progress(show))
+    for name, why in found.test.left_out.items():
+        console.print(f"Left out: {name}: {why}", markup=False)
     errors = {
-        drawn: {name: asdict(error) for name, error in found.items()}
-        for drawn, found in summary.items()
+        drawn: {name: asdict(error) for name, error in by_name.items()}
+        for drawn, by_name in found.summary.items()
     }
-    save(arguments.json, {"errors": errors, "pairs": test.rows, "left_out": test.left_out})
+    result = {"errors": errors, "pairs": found.test.rows, "left_out": found.test.left_out}
+    save(arguments.json, result)
     shown_table = table("drawn", "pairs", *(title for _, title in _SHOWN))
-    for drawn, found in summary.items():
-        spreads = [found[name].spread for name, _ in _SHOWN]
+    for drawn, by_name in found.summary.items():
+        spreads = [by_name[name].spread for name, _ in _SHOWN]
         shown_table.add_row(escape(drawn), str(spreads[0].count), *map(mean_sd, spreads))
     console.print(shown_table)
-    for file in written:
+    for file in found.files:
         console.print(str(file), markup=False)
 
 
-def _cube(arguments: argparse.Namespace) -> Cube:
-    from handcal.rig.cube_file import read_cube
+def _settings(arguments: argparse.Namespace) -> CubeTestSettings:
+    """Return the settings that the options of captures describe."""
+    from handcal.lab.settings import CubeTestSettings
 
-    return read_cube(arguments.cube or arguments.folder / "cube.json")
+    return CubeTestSettings(
+        captures=str(arguments.folder),
+        cube=_text(arguments.cube),
+        rig=_text(arguments.rig),
+        eye=arguments.eye,
+        square_px=arguments.square_px,
+    )
 
 
-def _grid(arguments: argparse.Namespace) -> Grid:
-    display = _rig(arguments).eyes[arguments.eye]
-    return grid_of(arguments, display.width_px, display.height_px)
-
-
-def _rig(arguments: argparse.Namespace) -> Rig:
-    from handcal.io.resources import resource_path
-    from handcal.rig.rig_file import read_rig
-
-    return read_rig(arguments.rig or resource_path("example_rig.yaml"))
+def _text(path: Path | None) -> str:
+    return "" if path is None else str(path)
 
 
 def _only_camera() -> int:

@@ -33,15 +33,16 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.lab.evaluate.annotations import read_annotations
     from handcal.lab.evaluate.contact_sheet import write_contact_sheet
     from handcal.lab.evaluate.detector import EVALUATED, detect_all, evaluation
+    from handcal.progress import Progress
 
-    if arguments.sheet is not None:  # before the long work, lest its result is lost
+    if arguments.sheet is not None:  # before the long work, whose result would be lost
         require_suffix(arguments.sheet, ".png")
         make_folder(arguments.sheet.parent)
     model = arguments.model
     finder = load_detector(EVALUATED) if model is None else HandDetector(model, EVALUATED)
     photos = read_annotations(arguments.images, arguments.annotations)
-    with progress() as report:
-        results = detect_all(photos, finder, lambda share: report("Looking for hands", share))
+    with progress() as show:
+        results = detect_all(photos, finder, Progress(show))
     result = evaluation(photos, results)
     shown_table = table("hands", "AP at IoU 0.5")
     for key, name in (
@@ -71,18 +72,15 @@ def detector(arguments: argparse.Namespace) -> None:
 )
 def users(arguments: argparse.Namespace) -> None:
     """Evaluate the user test over sessions: errors of calibrations against the wearers' view."""
-    from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
-    from handcal.lab.evaluate.user_test_report import user_test_report
-    from handcal.lab.study.store import free_of_studies
+    from handcal.lab.evaluate.run import run_user_test
+    from handcal.lab.settings import UserTestSettings
+    from handcal.progress import Progress
     from handcal.report.cells import interval_ends, mean_sd
-    from handcal.report.write import write_report
 
-    output = free_of_studies(arguments.output)
-    with progress() as report:
-        test = read_user_test(arguments.folder, lambda share: report("Reading sessions", share))
-        result = evaluate_user_test(test)
-        described = user_test_report(test, result)
-        written = write_report(output, described, lambda share: report("Writing the report", share))
+    settings = UserTestSettings(tuple(map(str, arguments.folder)), str(arguments.output))
+    with progress() as show:
+        found = run_user_test(settings, Progress(show))
+    result = found.result
     save(arguments.json, asdict(result))
     shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")
     for name, errors in (*result.by_wearer.items(), ("all", result.total)):
@@ -96,6 +94,6 @@ def users(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
     for path, why in result.left_out.items():
         console.print(f"Left out: {path}: {why}", markup=False)
-    console.print(described.lead)
-    for file in written:
+    console.print(found.report.lead)
+    for file in found.files:
         console.print(str(file), markup=False)

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
     from handcal.rig.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
-    from handcal.rig.views import View
-    from handcal.rig.worst import WorstView
+    from handcal.rig.views import View, WorstView
 
 
 _BOARD = Board()
@@ -199,7 +198,7 @@ def camera(arguments: argparse.Namespace) -> None:
     from handcal.rig.camera import CameraSettings, calibrate_camera
     from handcal.rig.formats import camera_json, write_intrinsics
 
-    views = _views(arguments.images, arguments, arguments.drop)
+    views = views_of(arguments.images, board_of(arguments), arguments.drop)
     result = calibrate_camera(views, CameraSettings(lens=arguments.lens))
     show_views(views, result.residuals_px)
     solved = result.intrinsics
@@ -253,25 +252,21 @@ def stereo(arguments: argparse.Namespace) -> None:
     """Calibrate the depth camera's pose on the headset from image pairs of one board."""
     import numpy as np
 
-    from handcal.rig.camera import CameraSettings
-    from handcal.rig.formats import read_intrinsics, stereo_json, write_pose
-    from handcal.rig.stereo import StereoSettings, calibrate_stereo
-    from handcal.rig.views import drop, pair_views
+    from handcal.rig.formats import stereo_json, write_pose
+    from handcal.rig.steps import calibrate_depth_camera
+    from handcal.rig.views import pair_views
 
     if arguments.format == "ros":
         raise HandcalError(
             "ROS camera_info has no pose between cameras; use --format opencv or json"
         )
+    board = board_of(arguments)
     pairs = pair_views(
-        drop(_views(arguments.depth, arguments), arguments.drop),
-        _views(arguments.headset, arguments),
+        views_of(arguments.depth, board, arguments.drop), views_of(arguments.headset, board)
     )
-    depth, headset = (
-        read_intrinsics(path) if path else None
-        for path in (arguments.depth_intrinsics, arguments.headset_intrinsics)
+    result = calibrate_depth_camera(
+        pairs, arguments.lens, arguments.depth_intrinsics, arguments.headset_intrinsics
     )
-    settings = StereoSettings(camera=CameraSettings(lens=arguments.lens))
-    result = calibrate_stereo(pairs, depth, headset, settings)
     show_views([first for first, _ in pairs], result.residuals_px)
     show_views([second for _, second in pairs if second.problem], {})
     shift_mm = 1e3 * result.T_H_D[:3, 3]
@@ -333,21 +328,18 @@ def board_of(arguments: argparse.Namespace) -> Board:
 
 def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
     """Return the grid that the options describe; HandcalError if the display is too small."""
-    from handcal.rig.grid import Grid
+    from handcal.rig.grid import grid_on
 
-    try:
-        return Grid(width_px, height_px, arguments.square_px)
-    except ValueError as error:
-        raise HandcalError(str(error)) from error
+    return grid_on(width_px, height_px, arguments.square_px)
 
 
-def _views(
-    paths: Iterable[Path], arguments: argparse.Namespace, dropped: Sequence[str] = ()
-) -> tuple[View, ...]:
+def views_of(paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()) -> tuple[View, ...]:
+    """Look for a board in images, with progress; leave those out that are dropped."""
+    from handcal.progress import Progress
     from handcal.rig.views import drop, image_files, read_views
 
     with progress() as report:
-        views = read_views(image_files(paths), board_of(arguments), report)
+        views = read_views(image_files(paths), board, Progress(report))
     return drop(views, dropped)
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.output import console, progress, save, table
+from handcal.cli.output import console, save, table
 from handcal.cli.rig import (
     BOARD_OPTIONS,
     GRID_OPTION,
@@ -15,6 +15,7 @@ from handcal.cli.rig import (
     grid_of,
     show_verdict,
     show_views,
+    views_of,
 )
 from handcal.cli.terminal import arg, command, number, one_of
 from handcal.errors import HandcalError
@@ -22,7 +23,6 @@ from handcal.io.files import make_folder
 from handcal.types import EYES
 
 if TYPE_CHECKING:
-    from handcal.rig.display import DisplaySettings
     from handcal.rig.viewpoint import ViewpointPose
     from handcal.types import Intrinsics, Rig
 
@@ -136,30 +136,29 @@ def display(arguments: argparse.Namespace) -> None:
     """Calibrate one eye's display from the viewpoint camera's images of its grid."""
     import numpy as np
 
-    from handcal.rig.assemble import screen_of, with_display
-    from handcal.rig.display import calibrate_display, fit_homography
-    from handcal.rig.formats import read_intrinsics, read_pose
-    from handcal.rig.grid import on_display
-    from handcal.rig.views import drop, image_files, read_views, used
+    from handcal.rig.assemble import with_display
+    from handcal.rig.formats import read_intrinsics
+    from handcal.rig.steps import DisplayInputs, calibrate_eye_display
 
     rig, eye = _read_rig(arguments.rig), arguments.eye
     camera = read_intrinsics(arguments.camera_intrinsics)
     viewpoint = _viewpoint(arguments, camera)
-    screen = screen_of(rig, eye)
-    if arguments.view:
-        screen = replace(screen, T_V_H=read_pose(arguments.view))
-    shown = grid_of(arguments, screen.width_px, screen.height_px)
-    with progress() as report:
-        views = read_views(image_files(arguments.images), shown.board, report)
-    views = drop(views, arguments.drop)
-    seen = {name: on_display(found, shown) for name, found in used(views, 1).items()}
-    homography = fit_homography(seen, camera, screen.width_px, screen.height_px)
-    result = calibrate_display(homography, camera, viewpoint, screen, _distance(arguments))
-    show_views(views, homography.residuals_px)
+    grid = grid_of(arguments, rig.eyes[eye].width_px, rig.eyes[eye].height_px)
+    views = views_of(arguments.images, grid.board, arguments.drop)
+    inputs = DisplayInputs(
+        square_px=arguments.square_px,
+        distance_m=arguments.distance_m,
+        nominal_m=arguments.nominal_distance_m,
+        pose_V_H=arguments.view,
+    )
+    if arguments.square_arcmin is not None:
+        inputs = replace(inputs, square_arcmin=arguments.square_arcmin)
+    result = calibrate_eye_display(rig, eye, views, camera, viewpoint, inputs)
+    show_views(views, result.homography.residuals_px)
     place_mm = " ".join(f"{one:.2f}" for one in -1e3 * result.display.t_C0_V_m)
     console.print(
-        f"z(C0→S) {result.display.z_C0_S_m:.3f} m; C0 at {place_mm} mm in V; the display is turned "
-        f"by {np.degrees(result.turn_rad):.2f}° against V; RMS {homography.rms_px:.3f} px"
+        f"z(C0→S) {result.display.z_C0_S_m:.3f} m; C0 at {place_mm} mm in V; display rotated by "
+        f"{np.degrees(result.turn_rad):.2f}° against V; RMS {result.homography.rms_px:.3f} px"
     )
     show_verdict(result.verdict)
     _write(arguments.output, with_display(rig, eye, result))
@@ -191,17 +190,16 @@ def display(arguments: argparse.Namespace) -> None:
 def make(arguments: argparse.Namespace) -> None:
     """Put the depth camera's pose, a stereo calibration, into a rig file."""
     from handcal.rig.assemble import with_stereo
-    from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
+    from handcal.rig.formats import read_stereo
+    from handcal.rig.steps import intrinsics_in, pose_in
 
     stereo = read_stereo(arguments.stereo)
     show_verdict(stereo.verdict)
     rig = with_stereo(
         _read_rig(arguments.rig),
         stereo,
-        depth_intrinsics=read_intrinsics(arguments.depth_intrinsics)
-        if arguments.depth_intrinsics
-        else None,
-        T_C_D=read_pose(arguments.depth_to_color) if arguments.depth_to_color else None,
+        depth_intrinsics=intrinsics_in(arguments.depth_intrinsics),
+        T_C_D=pose_in(arguments.depth_to_color),
     )
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
 
@@ -250,35 +248,13 @@ def migrate(arguments: argparse.Namespace) -> None:
 
 
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:
-    from handcal.rig.formats import read_stereo
-    from handcal.rig.tracked_file import read_tracked
-    from handcal.rig.viewpoint import viewpoint_from_stereo, viewpoint_from_tracked
-    from handcal.rig.views import image_files, read_views
+    from handcal.rig.steps import calibrate_viewpoint
 
-    if arguments.stereo:
-        return viewpoint_from_stereo(read_stereo(arguments.stereo))
-    poses = read_tracked(arguments.tracked)
-    with progress() as report:
-        views = read_views(image_files(arguments.board_images), board_of(arguments), report)
-    viewpoint = viewpoint_from_tracked(views, poses, camera)
-    show_views(views, viewpoint.residuals_px)
-    return viewpoint
-
-
-def _distance(arguments: argparse.Namespace) -> DisplaySettings:
-    import numpy as np
-
-    from handcal.rig.display import DisplaySettings, pixel_size_m
-
-    if arguments.distance_m is not None:
-        return DisplaySettings(distance_m=arguments.distance_m)
-    return DisplaySettings(
-        pixel_m=pixel_size_m(
-            np.radians(arguments.square_arcmin / 60.0),
-            arguments.square_px,
-            arguments.nominal_distance_m,
-        )
-    )
+    views = () if arguments.stereo else views_of(arguments.board_images, board_of(arguments))
+    pose = calibrate_viewpoint(views, camera, arguments.stereo, arguments.tracked)
+    if views:
+        show_views(views, pose.residuals_px)
+    return pose
 
 
 def _read_rig(path: Path | None) -> Rig:
@@ -295,5 +271,5 @@ def _write(path: Path, rig: Rig) -> None:
     try:
         write_rig(path, rig)
     except ValueError as error:
-        raise HandcalError(f"this is no plausible rig: {error}") from error
+        raise HandcalError(f"this rig is not plausible: {error}") from error
     console.print(str(path), markup=False)

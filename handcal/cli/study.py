@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,8 @@ from handcal.cli.terminal import Option, arg, command, fail, number
 from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
-    from handcal.lab.study.run import Study
-    from handcal.lab.study.store import Row
-    from handcal.report.document import Report
+    from handcal.lab.study.studies import StudyResult
+    from handcal.progress import Progress
 
 
 def _study_options(name: str) -> tuple[Option, ...]:
@@ -52,12 +52,17 @@ def _study_options(name: str) -> tuple[Option, ...]:
 @command(*_study_options("noise"), json=True)
 def noise(arguments: argparse.Namespace) -> None:
     """Repeat the paper's simulation, and add disturbances that it left out."""
-    from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
-    from handcal.lab.study.noise_report import noise_report
+    from handcal.lab.settings import NoiseStudySettings
+    from handcal.lab.study.studies import run_noise_study
 
-    chosen = QUICK_NOISE if arguments.quick else NoiseSettings()
-    settings = replace(chosen, seed=arguments.seed)
-    _run(arguments, noise_study(settings), lambda rows: noise_report(settings, rows))
+    settings = NoiseStudySettings(
+        size="quick" if arguments.quick else "full",
+        seed=arguments.seed,
+        processes=arguments.workers or 0,
+        scheduler=arguments.scheduler or "",
+        output=str(arguments.output),
+    )
+    _run(arguments, partial(run_noise_study, settings))
 
 
 @command(
@@ -79,29 +84,26 @@ def noise(arguments: argparse.Namespace) -> None:
 )
 def methods(arguments: argparse.Namespace) -> None:
     """Compare calibration methods on the same simulated wearers."""
-    from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
-    from handcal.lab.study.methods_report import methods_report
-    from handcal.lab.study.wearer_noise import fit_noise
+    from handcal.lab.settings import MethodComparisonSettings
+    from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
+    from handcal.lab.study.studies import run_method_comparison
 
-    settings = replace(
-        QUICK_METHODS if arguments.quick else MethodSettings(),
+    usual = QUICK_METHODS if arguments.quick else MethodSettings()
+    settings = MethodComparisonSettings(
+        wearers=usual.wearers if arguments.wearers is None else arguments.wearers,
         seed=arguments.seed,
+        processes=arguments.workers or 0,
+        scheduler=arguments.scheduler or "",
+        output=str(arguments.output),
+        size="quick" if arguments.quick else "full",
+        noise_wearers=arguments.fit_noise or 0,
     )
-    if arguments.wearers is not None:
-        settings = replace(settings, wearers=arguments.wearers)
-    if arguments.fit_noise is not None:
-        with progress() as say:
-            found = fit_noise(
-                settings,
-                arguments.fit_noise,
-                lambda scale, mean_arcmin: say(f"Noise {scale:.2f}: {mean_arcmin:.1f}′", 0.0),
-            )
+    noise = _run(arguments, partial(run_method_comparison, settings)).noise
+    if noise is not None:
         console.print(
-            f"Noise {found.scale:.2f}: the paper's method errs by "
-            f"{found.mean_arcmin:.1f} ± {found.sd_arcmin:.1f}′ (± SD)"
+            f"Noise {noise.scale:.2f}: the paper's method errs by "
+            f"{noise.mean_arcmin:.1f} ± {noise.sd_arcmin:.1f}′ (± SD)"
         )
-        settings = replace(settings, noise_scale=found.scale)
-    _run(arguments, methods_study(settings), lambda rows: methods_report(settings, rows))
 
 
 @command(
@@ -127,31 +129,18 @@ def recorded(arguments: argparse.Namespace) -> None:
     console.print(shown)
 
 
-def _run(
-    arguments: argparse.Namespace, study: Study, report_of: Callable[[Sequence[Row]], Report]
-) -> None:
-    """Run a study until it is done or Ctrl+C is pressed, and write its report."""
-    from handcal.lab.study.run import run_study
-    from handcal.report.write import write_report
+def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]) -> StudyResult:
+    """Run a study until it is complete or Ctrl+C is pressed; print and save its results."""
+    from handcal.progress import Progress
 
     try:
-        with until_interrupted() as is_cancelled, progress() as say:
-            rows = run_study(
-                study,
-                arguments.output,
-                workers=arguments.workers,
-                scheduler=arguments.scheduler,
-                progress=lambda share: say("Doing the trials", share),
-                is_cancelled=is_cancelled,
-            )
+        with until_interrupted() as is_cancelled, progress() as show:
+            result = order(Progress(show, is_cancelled))
     except CancelledError as error:
         fail(str(error), 130)
-    report = report_of(rows)
-    with progress() as say:
-        written = write_report(
-            arguments.output, report, lambda share: say("Writing the report", share)
-        )
-    save(arguments.json, {"figures": {figure.name: list(figure.rows) for figure in report.figures}})
-    console.print(report.lead)
-    for file in written:
+    figures = {figure.name: list(figure.rows) for figure in result.report.figures}
+    save(arguments.json, {"figures": figures})
+    console.print(result.report.lead)
+    for file in result.files:
         console.print(str(file), markup=False)
+    return result

@@ -1,7 +1,7 @@
-"""A rig from its calibrated parts, each with how it came about.
+"""A rig assembled from its calibrated parts, each with its origin.
 
-A rig is made by calibrating part after part of one that only says what the headset itself tells:
-displays' sizes and T_V_H. So can one part of a finished rig be calibrated again.
+The first rig holds only what the headset itself reports: the sizes of the displays and T_V_H. Its
+parts are calibrated one after the other; each can be calibrated again later.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from handcal.rig.views import ViewsError
 from handcal.types import Eye, Float64, Intrinsics, Origin, Rig, RigPart
 
 STEREO_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m")
-"""What the covariance of T_H_D is of."""
+"""Parameters of the covariance of T_H_D."""
 
 
 def screen_of(rig: Rig, eye: Eye) -> Screen:
-    """Return what the headset itself tells of an eye's display."""
+    """Return the data of an eye's display that the headset itself reports."""
     display = rig.eyes[eye]
     return Screen(display.width_px, display.height_px, display.T_V_H)
 
@@ -83,7 +83,7 @@ def with_stereo(
         If the pairs do not determine the place.
     """
     if stereo.covariance is None:
-        raise ViewsError("these pairs do not tell where the depth camera is: add others")
+        raise ViewsError("these pairs do not determine the pose of the depth camera: add others")
     origin = _origin(
         "stereo calibration with the headset's camera",
         made,

@@ -89,7 +89,7 @@ class BoardView:
     ids: Int64
     """(N,); their numbers on the board, ascending."""
     blur_px: float
-    """How wide the squares' edges are in the image: 1 to 3 where it is sharp."""
+    """Width of the squares' edges in the image: 1 to 3 where it is sharp."""
 
     def __post_init__(self) -> None:
         freeze(self, "points_m", np.float64, None, 3)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, charuco, corners_m
-from handcal.rig.board_trouble import why_not_found, why_not_plain
+from handcal.rig.board_diagnosis import explain_missing, why_not_plain
 from handcal.types import Float32, Float64, UInt8
 
 # Corners found further from where the others put them belong to something else, in squares.
@@ -40,7 +40,7 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     ids, pixels = find_corners(gray, board)
     points_m = corners_m(board)[ids]
     if len(ids) < MIN_CORNERS or np.linalg.matrix_rank(points_m[:, :2] - points_m[0, :2]) < 2:
-        why = why_not_found(gray, board, find_corners) if explain else "no board is seen"
+        why = explain_missing(gray, board, find_corners) if explain else "no board is seen"
         raise BoardError(why)
     fits = _fits(points_m, pixels)
     if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS:
@@ -95,7 +95,7 @@ def _upright(gray: UInt8, grid: Float64) -> Float64:
 
 
 def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
-    """Tell whether the first square is black, as printed, and how far x points to the right."""
+    """Return whether the first square is black, as printed, and how far x points to the right."""
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
     row, column = np.indices(middles.shape[:2])
     shades = shades_at(gray, middles)
@@ -112,7 +112,7 @@ def _fits(points_m: Float64, pixels: Float64) -> NDArray[np.bool_]:
 
 
 def _goes_on(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> bool:
-    """Tell whether there are corners beyond any side of the grid: it is part of a larger board."""
+    """Return whether there are corners beyond a side of the grid, as of a larger board."""
     columns, rows = board.inner
     corners = corners_m(board)[:, :2] / board.square_m
     H = np.asarray(cv2.findHomography(corners[ids], pixels)[0], dtype=np.float64)

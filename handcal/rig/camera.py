@@ -16,10 +16,18 @@ from numpy.typing import ArrayLike
 
 from handcal.geometry import camera_matrix, rigid
 from handcal.rig.board import BoardView
-from handcal.rig.least_squares import marginal_covariance
+from handcal.rig.fit import marginal_covariance, rms
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import Coverage, View, ViewsError, coverage, one_size, used
-from handcal.rig.worst import WorstView, rms, worst_view
+from handcal.rig.views import (
+    Coverage,
+    View,
+    ViewsError,
+    WorstView,
+    coverage,
+    one_size,
+    used,
+    worst_view,
+)
 from handcal.types import Float64, Intrinsics, freeze
 
 LensModel: TypeAlias = Literal["none", "radial", "full", "rational"]
@@ -42,7 +50,7 @@ MIN_VIEWS = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """How intrinsics are solved, and when they are good."""
+    """Settings of the solver for intrinsics, and limits of good ones."""
 
     lens: LensModel = "full"
     """Distortion: none; k1, k2; k1, k2, p1, p2, k3; the same and k4 to k6."""
@@ -51,7 +59,7 @@ class CameraSettings:
     good_coverage: float = 0.6
     """Share of the image's cells that must have had a corner."""
     good_spread_rad: float = 0.2
-    """How far the boards' normals must spread about their mean, RMS."""
+    """Least spread of the boards' normals about their mean, RMS."""
     max_focal_sigma: float = 0.001
     bad_focal_sigma: float = 0.03
     """Relative standard deviation of the focal lengths: up to which they are good, and from which
@@ -87,7 +95,7 @@ class CameraCalibration:
 
     @property
     def arcmin_per_px(self) -> float:
-        """How much a pixel in the middle of the image covers, arcminutes."""
+        """Angle that a pixel in the middle of the image covers, arcminutes."""
         return float(np.degrees(np.arctan(1 / self.intrinsics.fx)) * 60)
 
     @property

@@ -1,4 +1,4 @@
-"""Whether a rig is plausible: every field checked, with what is wrong and what is expected."""
+"""Plausibility of a rig: checks of every field, with the error and the expected value."""
 
 from __future__ import annotations
 

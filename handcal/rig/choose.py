@@ -1,4 +1,4 @@
-"""Which moments of a moving board to keep: at rest, sharp, and unlike those kept before."""
+"""Selection of views of a moving board: at rest, sharp, and different from earlier ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal.rig.board import BoardView
 
 @dataclass(frozen=True, slots=True)
 class ChooseSettings:
-    """What is kept."""
+    """Limits of the views that are kept."""
 
     most: int = 25
     """Views, or pairs of views."""
@@ -20,7 +20,7 @@ class ChooseSettings:
     """A board at rest has moved by less since the moment looked at before: mean distance of its
     corners, of the image's width. The images of a pair are seldom taken quite together."""
     apart_share: float = 0.06
-    """What is kept differs by more from everything kept before; 0 keeps like views as well."""
+    """Least difference from every view kept before; 0 keeps similar views as well."""
     most_blur_px: float = 4.0
     """Width of the squares' edges."""
 
@@ -29,8 +29,8 @@ ALIKE = ChooseSettings(most=5, apart_share=0.0)
 """A few views by a camera that stands still, as of a display's grid."""
 
 
-class ViewChooser:
-    """Looks at one moment after the other, seen by one camera or by the two of a pair."""
+class ViewSelector:
+    """A selector of views, taken one after the other by one camera or by the two of a pair."""
 
     def __init__(self, settings: ChooseSettings | None = None) -> None:
         self._settings = settings or ChooseSettings()
@@ -39,11 +39,11 @@ class ViewChooser:
 
     @property
     def is_done(self) -> bool:
-        """Whether there are enough."""
+        """True if enough views are kept."""
         return len(self._kept) >= self._settings.most
 
-    def look(self, seen: Sequence[BoardView | None]) -> str:
-        """Return why a moment is not kept; empty if it is.
+    def consider(self, seen: Sequence[BoardView | None]) -> str:
+        """Return the reason why a view is not kept; empty if it is.
 
         Parameters
         ----------

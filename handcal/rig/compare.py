@@ -1,4 +1,4 @@
-"""What differs between two rigs, in a person's units, and what that does to what is drawn."""
+"""Differences between two rigs, in practical units, and their effect on the drawing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class RigDifference:
     """One difference."""
 
     name: str
-    """What differs."""
+    """Name of the difference."""
     value: float
     """By how much; not negative."""
     unit: str

@@ -17,21 +17,20 @@ from scipy.spatial.transform import Rotation
 
 from handcal.geometry import camera_matrix, invert
 from handcal.rig.check import MAX_SIDE_PX
-from handcal.rig.covariance import clustered_covariance
+from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.grid import GridView
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose, plane_pose
 from handcal.rig.views import ViewsError, require_size
-from handcal.rig.worst import rms
 from handcal.types import EyeDisplay, Float64, Intrinsics, freeze
 
 DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
-"""What `DisplayCalibration.covariance` is of."""
+"""Parameters of `DisplayCalibration.covariance`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screen:
-    """What the headset itself tells of one eye's display."""
+    """The data of one eye's display that the headset itself reports."""
 
     width_px: int
     height_px: int
@@ -46,7 +45,7 @@ class Screen:
 
 @dataclass(frozen=True, slots=True)
 class DisplaySettings:
-    """How far the display is, and what calibration is accepted."""
+    """Distance of the display, and limits of a calibration that is accepted."""
 
     distance_m: float | None = None
     """z(C0→S) as measured, such as by the focus of the viewpoint camera."""
@@ -54,13 +53,13 @@ class DisplaySettings:
     """Size of a display's pixel on S, to solve z(C0→S) from the grid: see `pixel_size_m`. Either
     this or `distance_m`."""
     distance_sigma: float = 0.01
-    """How well either is known, relative; standard deviation."""
+    """Relative standard deviation of either."""
     good_px: float = 0.5
     bad_px: float = 2.0
     """Root mean square reprojection error in the camera up to which the plane fits well, and from
     which on it does not fit."""
     good_sigma_px: float = 0.3
-    """How well the place of the display's corners must be known, standard deviation, px."""
+    """Largest standard deviation of the display's corners, px."""
     largest_turn_rad: float = 0.05
     """Between the axes of the display and of V."""
     largest_offset_m: float = 0.02
@@ -69,7 +68,7 @@ class DisplaySettings:
     def __post_init__(self) -> None:
         if (self.distance_m is None) == (self.pixel_m is None):
             raise ValueError(
-                "tell either the measured distance of the display or the size of its pixels"
+                "give either the measured distance of the display or the size of its pixels"
             )
         if not (self.distance_m or self.pixel_m or 0.0) > 0.0:
             raise ValueError("the display's distance, or the size of its pixels, must be positive")
@@ -77,7 +76,7 @@ class DisplaySettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplayHomography:
-    """Where the display's plane is in the viewpoint camera's undistorted image."""
+    """The display's plane in the viewpoint camera's undistorted image."""
 
     H_C_S: Float64
     """(3, 3); pixels of the camera from those of the display."""
@@ -85,8 +84,7 @@ class DisplayHomography:
     """Root mean square error of each view, px of the camera."""
     rms_px: float
     sigma_px: float
-    """How well the least known corner of the display is known: standard deviation, px of the
-    display."""
+    """Standard deviation of the least certain corner of the display, px of the display."""
 
     def __post_init__(self) -> None:
         freeze(self, "H_C_S", np.float64, 3, 3)

@@ -24,7 +24,7 @@ from handcal.rig.check import check_intrinsics, require
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
-from handcal.rig.worst import WorstView
+from handcal.rig.views import WorstView
 from handcal.types import Float64, Intrinsics
 
 Format: TypeAlias = Literal["opencv", "ros", "json"]

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handcal.errors import HandcalError
 from handcal.rig.board import Board, BoardView, charuco
 from handcal.rig.board_finder import find_board
 from handcal.rig.check import MAX_SIDE_PX
 from handcal.types import Float64, UInt8, freeze
 
-# A board is told in metres, and a display's grid in pixels: any scale serves, if it is the same.
+# Boards are described in metres, grids in pixels: any scale will do, if it is always the same.
 _BOARD_M = 1e-4
 _MARKER_SHARE = 0.7
 _SMALLEST_SQUARE_PX, _LARGEST_SQUARE_PX = 20, 2000
@@ -80,6 +81,14 @@ class GridView:
     def __post_init__(self) -> None:
         freeze(self, "display_px", np.float64, None, 2)
         freeze(self, "pixels", np.float64, len(self.display_px), 2)
+
+
+def grid_on(width_px: int, height_px: int, square_px: int) -> Grid:
+    """Return the grid for a display of a size; HandcalError if the display has no room for it."""
+    try:
+        return Grid(width_px, height_px, square_px)
+    except ValueError as error:
+        raise HandcalError(str(error)) from error
 
 
 def draw_grid(grid: Grid) -> UInt8:

@@ -1,4 +1,4 @@
-"""Whether a plausible rig is also a sensible one: what a person would ask of it."""
+"""Report on a rig: the checks that a person would make, beyond plausibility."""
 
 from __future__ import annotations
 

@@ -25,10 +25,9 @@ from handcal.rig.camera import (
     solved_columns,
     tilt,
 )
-from handcal.rig.least_squares import marginal_covariance
+from handcal.rig.fit import marginal_covariance, rms
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import View, ViewsError, one_size
-from handcal.rig.worst import WorstView, rms, worst_view
+from handcal.rig.views import View, ViewsError, WorstView, one_size, worst_view
 from handcal.types import Float64, Intrinsics, freeze
 
 _Both: TypeAlias = tuple[Float64, Float64]  # of the depth camera's and the headset's image
@@ -42,13 +41,13 @@ _SWAPPED = "the cameras are swapped: the depth camera's images are the headset's
 
 @dataclass(frozen=True, slots=True)
 class StereoSettings:
-    """When the pose between two cameras is good."""
+    """Limits of a good pose between two cameras."""
 
     camera: CameraSettings = field(default_factory=CameraSettings)
     """For intrinsics that are not given."""
     good_pairs: int = 10
     good_spread_rad: float = 0.15
-    """How far the boards' normals must spread about their mean, RMS."""
+    """Least spread of the boards' normals about their mean, RMS."""
     max_rms_px: float = 1.0
     max_angle_sigma_rad: float = 1e-3
     max_shift_sigma_m: float = 3e-4
@@ -59,7 +58,7 @@ class StereoSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoCalibration:
-    """Where the depth camera sits, and how far to trust that."""
+    """The pose of the depth camera, with its uncertainty."""
 
     T_H_D: Float64
     """(4, 4); from the depth camera (or its colour imager) to the headset's."""

@@ -42,7 +42,7 @@ class Fields:
         self._node = node
 
     def has(self, name: str) -> bool:
-        """Tell whether the field is there."""
+        """Return whether the field is there."""
         return not self._node.getNode(name).empty()
 
     def section(self, name: str) -> Fields:

@@ -1,4 +1,4 @@
-"""What every part of the offline calibration ends with: whether it may be used, and why."""
+"""The verdict on a part of the offline calibration."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ CalibrationVerdictName: TypeAlias = Literal["good", "needs more views", "bad"]
 
 @dataclass(frozen=True, slots=True)
 class CalibrationVerdict:
-    """Whether a part of the offline calibration may be used, and why."""
+    """A verdict on a part of the offline calibration, with its reason; a bad part is not used."""
 
     name: CalibrationVerdictName
     reason: str

@@ -1,4 +1,4 @@
-"""Where the viewpoint camera sits in the headset: from tracked poses of a board that it sees."""
+"""Pose of the viewpoint camera in the headset, from tracked poses of a board that it sees."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from scipy.optimize import least_squares
 
 from handcal.geometry import camera_matrix, image_points, invert, rigid, transform
 from handcal.rig.board import BoardView
-from handcal.rig.covariance import clustered_covariance
+from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import View, ViewsError, require_size, used
-from handcal.rig.worst import rms
 from handcal.types import Float64, Intrinsics, freeze
 
 MIN_VIEWS = 3
@@ -39,7 +38,7 @@ class TrackedView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewpointPose:
-    """Where the viewpoint camera sits."""
+    """The pose of the viewpoint camera in the headset."""
 
     T_H_C: Float64
     """(4, 4); from the viewpoint camera to the headset rig."""
@@ -149,7 +148,9 @@ def viewpoint_from_stereo(stereo: StereoCalibration) -> ViewpointPose:
         If the pairs do not determine it.
     """
     if stereo.covariance is None:
-        raise ViewsError("these pairs do not tell where the viewpoint camera is: add others")
+        raise ViewsError(
+            "these pairs do not determine the pose of the viewpoint camera: add others"
+        )
     return ViewpointPose(
         stereo.T_H_D, stereo.covariance, stereo.residuals_px, stereo.rms_px, stereo.verdict
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from handcal.cli.main import main
-from handcal.lab.study import noise
+from handcal.lab.study import noise, studies
 
 TINY = replace(
     noise.QUICK_NOISE,
@@ -33,7 +33,7 @@ TINY = replace(
 @pytest.fixture
 def study(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., None]:
     """Run ``handcal study noise``, a tiny one, into a folder."""
-    monkeypatch.setattr(noise, "QUICK_NOISE", TINY)
+    monkeypatch.setattr(studies, "QUICK_NOISE", TINY)
 
     def run(*arguments: str) -> None:
         command = ["handcal", "study", "noise", "--quick", "--output", str(tmp_path / "study")]
@@ -84,10 +84,10 @@ def test_an_interrupted_study_goes_on(
     with monkeypatch.context() as patch:
         patch.setattr("handcal.cli.study.until_interrupted", interrupted)
         assert fails(study) == 130
-    assert "run it again to go on with it" in capsys.readouterr().err
+    assert "run it again to resume it" in capsys.readouterr().err
     assert not (tmp_path / "study" / "rows.csv").exists()
     chunks = set((tmp_path / "study" / "chunks").iterdir())
-    monkeypatch.setattr("handcal.report.write.write_report", lambda *_: ())
+    monkeypatch.setattr("handcal.lab.study.studies.write_report", lambda *_: ())
     study()
     assert chunks < set((tmp_path / "study" / "chunks").iterdir())
     assert (tmp_path / "study" / "rows.csv").exists()

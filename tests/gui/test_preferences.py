@@ -12,9 +12,11 @@ from PySide6.QtCore import QStandardPaths
 
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
+from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings
 from handcal.station.procedure import CalibrationSettings
 from handcal.station.settings import StationSettings
+from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
 from handcal_gui.preferences import Preferences, PreferencesFile
 
 CHANGED = Preferences(
@@ -53,6 +55,47 @@ def test_the_first_start_has_defaults_in_the_users_own_folders(file: Preferences
 def test_preferences_come_back(file: PreferencesFile) -> None:
     file.save(CHANGED)
     assert file.load() == (CHANGED, "")
+
+
+def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:
+    """Read preferences as they were written while the window had entries of its own."""
+    file.path.parent.mkdir()
+    study = {"seed": 3, "processes": 2, "scheduler": "tcp://host:1"}
+    evaluation = {
+        "noise": {"size": "quick", **study, "output": "/n"},
+        "methods": {"wearers": 12, **study, "output": "/m"},
+        "cube": {
+            "captures": "/captures",
+            "cube": "/cube.json",
+            "camera": "/camera.json",
+            "rig": "/rig.yaml",
+            "eye": "right",
+            "square_px": 60,
+            "seed": 5,
+            "output": "/c",
+            "positions": "centre, up",
+            "poses": 2,
+            "drawn": "before, after",
+            "with_grid": False,
+        },
+        "users": {"sessions": "/sessions", "output": "/u"},
+    }
+    file.path.write_text(json.dumps({"theme": "dark", "evaluation": evaluation}))
+    preferences, problem = file.load()
+    assert problem == ""
+    assert preferences.evaluation == EvaluationEntries(
+        NoiseStudySettings("quick", 3, 2, "tcp://host:1", "/n"),
+        MethodComparisonSettings(12, 3, 2, "tcp://host:1", "/m"),
+        CubeEntries(
+            *("/captures", "/cube.json", "/camera.json", "/rig.yaml", "right", 60, 5, "/c", 2),
+            positions="centre, up",
+            drawn="before, after",
+            with_grid=False,
+        ),
+        UserEntries("/sessions", "/u"),
+    )
+    file.save(preferences)
+    assert file.load() == (preferences, "")
 
 
 @pytest.mark.parametrize(

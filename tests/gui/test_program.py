@@ -217,7 +217,7 @@ def test_an_alignment_is_discarded_by_its_own_key_only(live: Technician, studio:
         live.program.window.windowHandle(), Qt.Key.Key_D, Qt.KeyboardModifier.AltModifier
     )
     live.wait_for_state(State.SHOW_HAND)
-    live.wait(lambda: live.record.alignments == ())
+    live.wait(lambda: not live.record.alignments)
 
 
 def shown_checks(technician: Technician) -> list[str]:

@@ -348,7 +348,7 @@ def test_space_presses_only_the_main_button_from_every_focus(
     asked = offer(program, snapshot(State.APPLIED), is_enabled=is_enabled)
     qtbot.waitActive(window)
     wrong: list[object] = []
-    window.panels.session.delete_alignment_requested.connect(wrong.append)
+    window.panels.session.delete_requested.connect(wrong.append)
     clicked = watch_clicks(window)
     expected = [Action.SOLVE] if is_enabled else []
     texts, kinds = 0, set()

@@ -13,12 +13,12 @@ from handcal_gui.pages.wizard.steps import PLANS, Action, Step, View, Wizard
 
 def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[View]:
     """Return a view of every step, with every main button and every other one."""
-    one = replace(record, alignments=record.alignments[:1])
-    one = replace(one, alignments=(replace(one.alignments[0], eyes=("left",)),))
+    left = replace(next(iter(record.alignments.values())), eyes=("left",))
+    one = replace(record, alignments={1: left})
     views = []
     for plan in PLANS:
         wizard = Wizard(plan)
-        start = snapshot(State.SHOW_HAND, record=replace(record, alignments=()))
+        start = snapshot(State.SHOW_HAND, record=replace(record, alignments={}))
         for _ in range(3):
             views.append(wizard.view(start))
             wizard.move(Action.NEXT, start)

@@ -11,8 +11,7 @@ from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import ViewsError
-from handcal.rig.worst import WorstView
+from handcal.rig.views import ViewsError, WorstView
 from handcal.types import Intrinsics
 
 RIG = example_rig()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.rig.board import Board, BoardView, corners_m
-from handcal.rig.choose import ChooseSettings, ViewChooser
+from handcal.rig.choose import ChooseSettings, ViewSelector
 
 POINTS_M = corners_m(Board())
 IDS = np.arange(len(POINTS_M))
@@ -20,8 +20,8 @@ def seen(x_px: float = 0.0, blur_px: float = 2.0, ids: slice = slice(None)) -> B
 
 
 def test_a_board_is_kept_once_it_rests_and_again_elsewhere() -> None:
-    chooser = ViewChooser()
-    said = [chooser.look([seen(x_px)]) for x_px in (0, 1, 2, 300, 301)]
+    selector = ViewSelector()
+    said = [selector.consider([seen(x_px)]) for x_px in (0, 1, 2, 300, 301)]
     assert [not why for why in said] == [False, True, False, False, True]
     assert "moves" in said[0]
     assert "like this before" in said[2]
@@ -39,21 +39,21 @@ def test_a_board_is_kept_once_it_rests_and_again_elsewhere() -> None:
     ],
 )
 def test_what_is_not_kept_is_explained(moment: list[BoardView | None], why: str) -> None:
-    chooser = ViewChooser()
-    chooser.look([seen()])
-    assert why in chooser.look(moment)
+    selector = ViewSelector()
+    selector.consider([seen()])
+    assert why in selector.consider(moment)
 
 
 def test_other_corners_of_the_board_are_another_view() -> None:
-    chooser = ViewChooser()
+    selector = ViewSelector()
     for part in (slice(0, 20), slice(30, 54)):
-        chooser.look([seen(ids=part)])
-        assert chooser.look([seen(ids=part)]) == ""
+        selector.consider([seen(ids=part)])
+        assert selector.consider([seen(ids=part)]) == ""
 
 
 def test_a_grid_is_kept_as_often_as_asked_for() -> None:
-    chooser = ViewChooser(ChooseSettings(most=3, apart_share=0.0))
+    selector = ViewSelector(ChooseSettings(most=3, apart_share=0.0))
     kept = 0
-    while not chooser.is_done:
-        kept += not chooser.look([replace(seen())])
+    while not selector.is_done:
+        kept += not selector.consider([replace(seen())])
     assert kept == 3

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 
 from handcal.geometry import image_points, rigid, transform
-from handcal.rig.cube import Cube, corners_m
-from handcal.rig.marker_corners import refine_corners
+from handcal.rig.cube import Cube, corners_m, refine_corners
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.types import Float64, Intrinsics, UInt8

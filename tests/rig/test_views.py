@@ -6,6 +6,7 @@ import pytest
 
 from handcal.errors import FileError
 from handcal.geometry import rigid
+from handcal.progress import Progress
 from handcal.rig.board import Board, BoardView
 from handcal.rig.board_print import draw_board
 from handcal.rig.views import (
@@ -39,7 +40,7 @@ def test_images_are_read_and_what_is_wrong_is_kept(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("not looked at")
     told: list[str] = []
     files = image_files([tmp_path])
-    views = read_views(files, BOARD, lambda what, _share: told.append(what))
+    views = read_views(files, BOARD, Progress(lambda what, _share: told.append(what)))
     assert told == [view.name for view in views] == ["a1.png", "a2.png", "a3.jpg", "a4.png"]
     assert [view.found is not None for view in views] == [False, True, False, False]
     problems = [view.problem for view in views]
@@ -101,3 +102,9 @@ def test_pairs_end_in_the_same_number() -> None:
         pair_views(left[:1], right)
     with pytest.raises(ViewsError, match="end in the same number"):
         pair_views([View("a1", None), View("b1", None)], right)
+
+
+def test_a_pair_is_left_out_if_one_of_its_views_is() -> None:
+    left = drop([View(f"left{number}.png", None) for number in (1, 2)], ["left1.png"])
+    pairs = pair_views(left, [View(f"right{number}.png", None) for number in (1, 2)])
+    assert [(a.dropped, b.dropped) for a, b in pairs] == [(True, True), (False, False)]

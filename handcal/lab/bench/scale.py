@@ -13,6 +13,7 @@ from handcal.lab.bench.trials import Measured, Progress
 from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
 from handcal.lab.study.run import Study, run_study
 from handcal.lab.study.store import Row
+from handcal.progress import Progress as TaskProgress
 
 # Each process makes its own hands; in a whole study this time is negligible.
 _HANDS = 2
@@ -60,5 +61,6 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
 def _timed(study: Study, workers: int, progress: Progress) -> tuple[float, list[Row]]:
     with TemporaryDirectory() as folder:
         start_s = perf_counter()
-        rows = run_study(study, Path(folder), workers=workers, progress=progress)
+        shown = TaskProgress(report=lambda _what, share: progress(share))
+        rows = run_study(study, Path(folder), workers=workers, progress=shown)
         return perf_counter() - start_s, rows

@@ -1,4 +1,4 @@
-"""How far a virtual cube is from the real one, in two captures by the eye-replacement camera.
+"""Misalignment of a virtual cube and the real one in captures by the eye-replacement camera.
 
 As in Hu et al. 2021 (assessment with eye-replacement camera): across the line of sight by the
 markers' corners in the image, along it and in rotation by the cube's pose from all of them.

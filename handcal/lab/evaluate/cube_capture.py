@@ -84,7 +84,7 @@ def take_captures(
     ask: Callable[[str], None],
     say: Callable[[str], None],
 ) -> None:
-    """Take what is missing; an image in which nothing is found is told why, and taken again.
+    """Take the missing captures; one in which nothing is found is explained and taken again.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The folder of a cube test's captures: which images shall be there, are there, are missing.
+"""The folder of a cube test's captures: planned, present and missing images.
 
 ``POSITION/POSE/real.png`` is the real cube with the display off, ``virtual.png`` the drawn one with
 the real one covered, or ``virtual-NAME.png`` where several are compared, such as before and after
@@ -17,34 +17,34 @@ from handcal.io.images import IMAGE_SUFFIXES
 
 MAX_POSES = 1000
 REAL, VIRTUAL, GRID = "real", "virtual", "grid"
-"""What the images are called, without suffix."""
+"""Names of the images, without suffix."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedCapture:
-    """An image that shall be there."""
+    """A planned image."""
 
     where: str
     """POSITION, or POSITION/POSE."""
     kind: str
     """`REAL`, `VIRTUAL` or `GRID`."""
     drawn: str = ""
-    """Which of the ways of drawing that are compared; empty if there is just one."""
+    """Name of the way of drawing, if several are compared; else empty."""
 
     @property
     def name(self) -> str:
-        """What the image is called, without suffix."""
+        """Name of the image, without suffix."""
         return f"{self.kind}-{self.drawn}" if self.drawn else self.kind
 
     @property
     def file(self) -> str:
-        """Where it is written, below the folder of all captures."""
+        """Path of the image in the folder of all captures."""
         return f"{self.where}/{self.name}.png"
 
 
 @dataclass(frozen=True, slots=True)
 class CapturePlan:
-    """What shall be captured."""
+    """The captures that a test needs."""
 
     positions: Sequence[str] = ("centre", "up", "down", "left", "right")
     """Of the camera in the eye box."""
@@ -53,7 +53,7 @@ class CapturePlan:
     drawn: Sequence[str] = ()
     """Ways of drawing that are compared; empty for just one."""
     with_grid: bool = True
-    """Whether the display's grid is captured at each position."""
+    """The display's grid is captured at each position."""
 
     def __post_init__(self) -> None:
         for names in (self.positions, self.drawn):

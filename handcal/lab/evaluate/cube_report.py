@@ -1,4 +1,4 @@
-"""What the report of a cube test says."""
+"""The report of a cube test."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The cube test: what all its captures show, one row for each pair."""
+"""The cube test: errors in all its captures, one row for each pair."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -16,6 +16,7 @@ from handcal.errors import FileError
 from handcal.io.images import read_image
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
+from handcal.progress import Progress
 from handcal.rig.board import BoardError
 from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.display import fit_homography, pose_before
@@ -32,12 +33,12 @@ _UNUSABLE = (CubeError, BoardError, ViewsError, FileError, ValueError)
 
 @dataclass(frozen=True, slots=True)
 class CubeTest:
-    """What the captures show."""
+    """The errors found in captures."""
 
     rows: list[CubeRow]
     """`cube_row` of each pair, and whose it is: ``position``, ``pose``, ``drawn``."""
     left_out: dict[str, str]
-    """Why, by what could not be used."""
+    """Reasons, by the name of the capture that could not be used."""
 
 
 def judge_captures(
@@ -45,7 +46,7 @@ def judge_captures(
     cube: Cube,
     camera: Intrinsics,
     grid: Grid,
-    report: Callable[[str, float], None] = lambda _what, _share: None,
+    progress: Progress = Progress(),
 ) -> CubeTest:
     """Find and compare the cubes in all captures; what is missing or not seen is left out.
 
@@ -61,8 +62,7 @@ def judge_captures(
         The eye-replacement camera, lens included.
     grid : Grid
         What the display shows in the images of it.
-    report : callable
-        Told what is being looked at, and the share done; may raise to give up.
+    progress : Progress
 
     Raises
     ------
@@ -77,7 +77,7 @@ def judge_captures(
             warp = RotationWarp(camera, _turn(folder / position, camera, grid))
             for pose in of_position:
                 name = f"{position}/{pose.pose}"
-                report(name, poses.index(pose) / len(poses))
+                progress.at(poses.index(pose) / len(poses), f"Looking at {name}")
                 with _noted(left_out, f"{name}/{pose.real.name}"):
                     real_px = find_cube(warp.warp(_read(pose.real)), cube)
                     for drawn, path in pose.virtual.items():

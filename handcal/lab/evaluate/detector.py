@@ -1,9 +1,9 @@
-"""How well a detector finds the hands in annotated photographs."""
+"""Precision and recall of a hand detector on annotated photographs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from handcal.lab.evaluate.precision import (
     PrecisionRecall,
     precision_recall,
 )
+from handcal.progress import Progress
 
 EVALUATED = DetectSettings(score_min=CANDIDATE_SCORE_MIN)
 """A precision/recall curve wants the doubtful detections too."""
@@ -25,9 +26,9 @@ _CURVE_POINTS = 200
 
 
 def detect_all(
-    photos: Sequence[Photo], detector: Detector, report: Callable[[float], None] | None = None
+    photos: Sequence[Photo], detector: Detector, progress: Progress = Progress()
 ) -> list[ImageResult]:
-    """Run a detector on every photograph; `report` is told the share that is done.
+    """Run a detector on every photograph.
 
     Raises
     ------
@@ -38,8 +39,7 @@ def detect_all(
     for number, photo in enumerate(photos, 1):
         found = detector.detect(photo.read())
         results.append(ImageResult(found.boxes_px, found.scores, photo.boxes))
-        if report is not None:
-            report(number / len(photos))
+        progress.at(number / len(photos), "Looking for hands")
     return results
 
 

@@ -16,7 +16,7 @@ MATCH_OVERLAP = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageResult:
-    """What was found in one image, and what is there."""
+    """Detections in one image, and its annotated hands."""
 
     boxes: Float64
     """(N, 4); found: x0, y0, x1, y1 in pixels."""
@@ -40,7 +40,7 @@ class PrecisionRecall:
 
 
 def precision_recall(results: Iterable[tuple[ImageResult, Bool]]) -> PrecisionRecall:
-    """Match what was found with what is there, at an intersection over union of 0.5.
+    """Match detections with annotated hands, at an intersection over union of 0.5.
 
     Parameters
     ----------

@@ -7,13 +7,14 @@ calibrated φ and with the φ that the wearer adjusted by hand; each corner coun
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from handcal.errors import FileError
 from handcal.export.tables import trial_rows
+from handcal.progress import Progress
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import calibration_numbers
 from handcal.statistics import (
@@ -29,7 +30,7 @@ CornerRow: TypeAlias = dict[str, Any]
 """One corner of one trial: the columns of `trial_rows`, and whose it is."""
 
 Unit: TypeAlias = Literal["wearer", "calibration"]
-"""What an interval takes for independent."""
+"""The unit that an interval takes for independent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +40,7 @@ class UserTest:
     sessions: Mapping[str, SessionRecord]
     """Those with trials, by a name of their own."""
     left_out: Mapping[str, str]
-    """Why the others are left out, by their folders."""
+    """Reasons why the others are left out, by their folders."""
     corners: Sequence[CornerRow]
     """All errors."""
 
@@ -60,28 +61,25 @@ class GroupErrors:
 
 @dataclass(frozen=True, slots=True)
 class UserTestResult:
-    """What a user test came to; JSON-able with `dataclasses.asdict`."""
+    """The errors found in a user test; JSON-able with `dataclasses.asdict`."""
 
     total: GroupErrors
     by_wearer: Mapping[str, GroupErrors]
     by_eye: Mapping[str, GroupErrors]
     by_depth_m: Mapping[str, GroupErrors]
     components_arcmin: VarianceComponents | None
-    """How far wearers differ, and the errors of one; None for a single wearer."""
+    """Spread between wearers and within one; None for a single wearer."""
     left_out: Mapping[str, str]
 
 
-def read_user_test(
-    folders: Iterable[Path], checkpoint: Callable[[float], None] = lambda _share: None
-) -> UserTest:
+def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> UserTest:
     """Read the trials of sessions; those that are damaged or hold none are left out and named.
 
     Parameters
     ----------
     folders : iterable of Path
         Sessions, and folders of sessions.
-    checkpoint : callable
-        Told the share done before each session; what it raises ends the reading.
+    progress : Progress
 
     Raises
     ------
@@ -92,7 +90,7 @@ def read_user_test(
     kept: dict[Path, SessionRecord] = {}
     left_out: dict[str, str] = {}
     for done, path in enumerate(paths):
-        checkpoint(done / len(paths))
+        progress.at(done / len(paths), "Reading sessions")
         try:
             record = Session.open(path)
         except FileError as error:

@@ -14,7 +14,7 @@ from handcal.lab.evaluate.user_test import CornerRow, GroupErrors
 from handcal.report.page import plain
 from handcal.types import EYES, Float64
 
-# More points than these are drawn as a picture, lest a page take long to show.
+# More points than these are drawn as a picture: otherwise a page would take long to show.
 _MOST_POINTS = 2000
 _NAME_CHARACTERS = 22
 

@@ -1,4 +1,4 @@
-"""What the report of a user test says."""
+"""The report of a user test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calibration methods on the same simulated wearers: how far each misses, and what it costs them.
+"""Comparison of calibration methods on the same simulated wearers: errors, and the wearers' time.
 
 Every case is a wearer, who does all that every method asks. `docs/methods.md` says what is assumed.
 """
@@ -44,7 +44,7 @@ _PAPER_SOLVES_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class MethodSettings:
-    """What the methods are compared on."""
+    """Settings of the wearers on whom methods are compared."""
 
     wearers: int = 100
     eye_distance_sigmas_m: tuple[float, ...] = (0.0, 0.002)
@@ -57,7 +57,7 @@ class MethodSettings:
     depth_sigma_m: float = 0.001
     """Of each of its points."""
     hands: int = 10
-    """How many different hands there are."""
+    """Number of different hands."""
     pointing_sigma_arcmin: float = 5.9
     """Of a tracked point against crosshairs, about each of two axes: what 11 recorded SPAAM
     calibrations leave, tracker included (`handcal.lab.study.recorded`)."""
@@ -72,12 +72,12 @@ class MethodSettings:
 
 
 QUICK_METHODS = MethodSettings(wearers=3, points=300)
-"""A look whether everything runs; its figures say little."""
+"""Smoke-test settings: results are not meaningful."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """What a method made of one wearer."""
+    """The calibration of one wearer by one method."""
 
     method: str
     alignments: int

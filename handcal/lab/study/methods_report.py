@@ -1,4 +1,4 @@
-"""What the report of a method comparison says, from the rows of its wearers."""
+"""The report of a method comparison, from the rows of its wearers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The noise study: what disturbs the solvers, and how much of it they bear.
+"""The noise study: sensitivity of the solvers to rotation, noise and other disturbances.
 
 The paper's simulation (Hu et al. 2021, "Simulation test on rotation-constrained ICP"), and what it
 left out. Every section varies one thing, on the same people and with the same random numbers.
@@ -36,7 +36,7 @@ _CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179
 
 @dataclass(frozen=True, slots=True)
 class NoiseSettings:
-    """What is simulated, and how often.
+    """Settings of the simulated alignments, and their numbers.
 
     Where a section varies something else, clouds are as a sensor gives them: sampled apart, with
     `depth_sigma_m` of noise, the hand turned by `angle_deg`, φ uniform within ± 10 mm.
@@ -65,14 +65,14 @@ class NoiseSettings:
     depth_sigmas_m: tuple[float, ...] = (0.0, 0.0005, 0.001, 0.002, 0.004)
     """Standard deviations of each point's depth."""
     forearms_m: tuple[float, ...] = (0.0, 0.02, 0.04, 0.06, 0.08)
-    """How much forearm the hand's cloud shows; the cursor's shows 40 mm."""
+    """Length of forearm in the hand's cloud; the cursor's shows 40 mm."""
     counts: tuple[int, ...] = (250, 500, 1000, 2000, 4000)
     """Points of each cloud."""
     shapes: int = 24
     shape_trials: int = 20
     """Hands of other people, and how often each is aligned."""
     slips: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)
-    """How much a wearer who looks through the displays errs, as a multiple of the usual."""
+    """Errors of a wearer who looks through the displays, as a multiple of the usual."""
 
 
 QUICK_NOISE = NoiseSettings(
@@ -91,7 +91,7 @@ QUICK_NOISE = NoiseSettings(
     shape_trials=2,
     slips=(0.0, 1.0),
 )
-"""A look whether everything runs; its numbers say little."""
+"""Smoke-test settings: results are not meaningful."""
 
 _Making: TypeAlias = "tuple[AlignmentSettings, float]"
 
@@ -102,12 +102,12 @@ class Section:
 
     name: str
     values: Callable[[NoiseSettings], Sequence[float]]
-    """What there is of it, from the settings."""
+    """Returns its values from the settings."""
     making: Callable[[NoiseSettings, float], _Making] | None
     """From settings and value, how alignments are made, and their rotation in degrees; None for
     those that a wearer makes."""
     label: str
-    """What varies, with the unit in which it is shown."""
+    """Name of the value that varies, with the unit in which it is shown."""
     scale: float = 1.0
     """From a value to that unit."""
 

@@ -1,4 +1,4 @@
-"""What the report of a noise study says, from the rows of its trials."""
+"""The report of a noise study, from the rows of its trials."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class RecordedSet:
 
 @dataclass(frozen=True, slots=True)
 class RecordedResult:
-    """What one recording gives; errors are means over its alignments."""
+    """The result of one recording; errors are means over its alignments."""
 
     alignments: int
     spaam_px: float
@@ -76,7 +76,7 @@ class RecordedResult:
     """Of INDICA's two setups."""
     pointing_sigma_px: float
     pointing_sigma_arcmin: float
-    """What SPAAM leaves, about each axis, with its 11 unknowns taken into account."""
+    """Residual of SPAAM about each axis, with its 11 unknowns taken into account."""
     eye_miss_mm: tuple[float, float, float]
     """From the eye that best explains the alignments through the base's display to the tracked eye:
     right, along pixel rows downward, away from the eye. The last is hardly determined."""

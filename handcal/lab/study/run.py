@@ -1,4 +1,4 @@
-"""Run a study: every case once, in any number of processes, and go on after an interruption."""
+"""Runs of a study: every case once, in any number of processes, resumed after an interruption."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -14,9 +15,13 @@ from typing import Any, TypeAlias
 from handcal.errors import CancelledError
 from handcal.lab.study.store import Row, StudyFolder, holds_study
 from handcal.lab.study.workers import open_workers
+from handcal.progress import Progress
 
 Case: TypeAlias = dict[str, float | int | str]
 """Names a cell of the study, and the wearer or trial in it: JSON-able."""
+
+RUNNING = "Running the trials"
+"""The activity that `run_study` reports."""
 
 _MAX_CHUNKS = 200
 _POLL_S = 0.2
@@ -24,7 +29,7 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """What there is to do."""
+    """The cases of a study, and the function that runs one."""
 
     name: str
     settings: Any
@@ -42,13 +47,12 @@ def run_study(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
-    is_cancelled: Callable[[], bool] | None = None,
+    progress: Progress = Progress(),
 ) -> list[Row]:
-    """Do what is not yet done of a study, and return the rows of all its cases in their order.
+    """Run the cases of a study that are left, and return the rows of all cases in their order.
 
-    The numbers are the same whoever does the work. Finished chunks of cases are kept in `folder`,
-    so that a study goes on where it was cancelled or killed; ``rows.csv`` there holds all rows.
+    The rows do not depend on the number of workers. Completed chunks of cases are kept in `folder`,
+    so that a study that was cancelled or killed can be resumed; ``rows.csv`` there holds all rows.
 
     Parameters
     ----------
@@ -59,10 +63,8 @@ def run_study(
         Processes; one per core by default, and no other process than this one for 1.
     scheduler : str, optional
         Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers do the work instead.
-    progress : callable, optional
-        Told the share of the cases that are done.
-    is_cancelled : callable, optional
-        Asked several times a second.
+    progress : Progress
+        Checked several times a second.
 
     Returns
     -------
@@ -71,8 +73,8 @@ def run_study(
     Raises
     ------
     CancelledError
-        Once `is_cancelled` says so; what other processes are at is given up, and the trial that
-        this one is at comes to its end.
+        If the study is to end; trials in other processes are stopped, and a trial in this process
+        is completed first.
     FileError
         If `folder` holds another study, or cannot be read or written.
     HandcalError
@@ -83,16 +85,26 @@ def run_study(
     stored = {number: store.read_chunk(number) for number in range(len(chunks))}
     done = {number: rows for number, rows in stored.items() if rows is not None}
     todo = {number: cases for number, cases in enumerate(chunks) if number not in done}
-    if todo:
-        with open_workers(workers, scheduler) as executor:
-            for number, rows in _run_chunks(study, todo, executor, is_cancelled):
-                store.write_chunk(number, rows)
-                done[number] = rows
-                if progress is not None:
-                    progress(len(done) / len(chunks))
+    with resumable():
+        progress.at(len(done) / len(chunks) if chunks else 1.0, RUNNING)
+        if todo:
+            with open_workers(workers, scheduler) as executor:
+                for number, rows in _run_chunks(study, todo, executor, progress):
+                    store.write_chunk(number, rows)
+                    done[number] = rows
+                    progress.at(len(done) / len(chunks), RUNNING)
     table = [row for number in sorted(done) for rows in done[number] for row in rows]
     store.write_rows(table)
     return table
+
+
+@contextmanager
+def resumable() -> Iterator[None]:
+    """Say, where the block is cancelled, that the study can be resumed."""
+    try:
+        yield
+    except CancelledError:
+        raise CancelledError("the study was cancelled; run it again to resume it") from None
 
 
 def share_done(study: Study, folder: Path) -> float:
@@ -122,7 +134,7 @@ def _run_chunks(
     study: Study,
     chunks: Mapping[int, Sequence[Case]],
     executor: Executor,
-    is_cancelled: Callable[[], bool] | None,
+    progress: Progress,
 ) -> Iterator[tuple[int, list[list[Row]]]]:
     """Yield the number of each chunk, and the rows of its cases, once all of them are done."""
     places = {
@@ -135,8 +147,7 @@ def _run_chunks(
         future.add_done_callback(finished.put)
     parts: dict[int, dict[int, list[Row]]] = {number: {} for number in chunks}
     while parts:
-        if is_cancelled is not None and is_cancelled():
-            raise CancelledError("the study was cancelled; run it again to go on with it")
+        progress.check()
         try:
             future = finished.get(timeout=_POLL_S)
         except Empty:

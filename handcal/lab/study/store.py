@@ -1,7 +1,7 @@
-"""A study's folder: what it is a study of, the trials done so far, and the table of them all.
+"""A study's folder: its settings, the completed trials, and the table of all trials.
 
 Rows are stored in chunks, each written at once and checked by its SHA-256 when read; one that is
-damaged counts as not done.
+damaged counts as not run.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from handcal.io.files import make_folder, read_json, write_atomic, write_json
 from handcal.report.rows import rows_csv
 
 Row: TypeAlias = dict[str, float | int | str | bool | None]
-"""One row of a study's table; None where there is nothing to tell."""
+"""One row of a study's table; None for an empty cell."""
 
 _STUDY = "study.json"
 _LIBRARIES = "handcal", "numpy", "scipy", "opencv-python-headless"
 
 
 def holds_study(folder: Path) -> bool:
-    """Tell whether a folder is that of a study."""
+    """Return whether a folder is that of a study."""
     return (folder / _STUDY).exists()
 
 
@@ -89,11 +89,11 @@ class StudyFolder:
         elif others := _differences(read_json(file), study):
             raise FileError(
                 f"{path} holds another study ({others}); "
-                "choose another folder, or delete this one to begin again"
+                "choose another folder, or delete this one to start again"
             )
 
     def has_chunk(self, number: int) -> bool:
-        """Tell at once whether a chunk is there, be it whole or damaged."""
+        """Return at once whether a chunk is there, complete or damaged."""
         return self._file(number).exists()
 
     def read_chunk(self, number: int) -> list[list[Row]] | None:

@@ -1,4 +1,4 @@
-"""How far wearers must miss for the paper's own method to err as it did in the paper's user test.
+"""Search of the wearers' errors with which the paper's method errs as in the paper's user test.
 
 A method comparison is worth no more than its wearers. Theirs err in what they overlay by multiples
 of `WearerSettings`' errors: across, in size and in rotation alike.
@@ -6,7 +6,6 @@ of `WearerSettings`' errors: across, in size and in rotation alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from handcal.display import TARGET_DEPTHS_M
 from handcal.errors import HandcalError
 from handcal.lab.study.methods import MethodSettings, rendered, study_wearer, target_errors
 from handcal.lab.study.wearers import align_hand
+from handcal.progress import Progress
 from handcal.register.solve import solve_alignment
 from handcal.types import EYES, Float64
 
@@ -28,7 +28,7 @@ _NEAR_ENOUGH = 0.02
 
 @dataclass(frozen=True, slots=True)
 class NoiseFit:
-    """What the search found."""
+    """The result of the search."""
 
     scale: float
     """Errors of an overlay in those of `WearerSettings`."""
@@ -39,11 +39,7 @@ class NoiseFit:
     """The mean at every scale tried, in arcmin."""
 
 
-def fit_noise(
-    settings: MethodSettings,
-    wearers: int,
-    told: Callable[[float, float], None] = lambda _scale, _mean_arcmin: None,
-) -> NoiseFit:
+def fit_noise(settings: MethodSettings, wearers: int, progress: Progress = Progress()) -> NoiseFit:
     """Search for the scale at which the paper's method errs by 10.79′ on the mean.
 
     By Brent's method; a wearer's slips are the same at every scale but for their size. Eye
@@ -55,8 +51,8 @@ def fit_noise(
         `noise_scale` and `wearers` do not matter.
     wearers : int
         Seconds each, for every scale tried.
-    told : callable
-        Told each scale tried and the mean error with it.
+    progress : Progress
+        Reports each scale tried and the mean error with it.
 
     Raises
     ------
@@ -69,7 +65,7 @@ def fit_noise(
         if scale not in tried:  # the search asks for its ends again
             scaled = replace(settings, noise_scale=scale)
             tried[scale] = np.array([_errors_arcmin(scaled, wearer) for wearer in range(wearers)])
-            told(scale, float(tried[scale].mean()))
+            progress.at(0.0, f"Noise {scale:.2f}: {tried[scale].mean():.1f}′")
         return float(tried[scale].mean()) - PAPER_MEAN_ARCMIN
 
     if excess(_SCALES[0]) > 0.0 or excess(_SCALES[1]) < 0.0:

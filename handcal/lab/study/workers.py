@@ -1,4 +1,4 @@
-"""Who does a study's trials: this process, processes on this machine, or a Dask cluster."""
+"""Workers of a study: this process, processes on this machine, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _THREAD_LIMITS = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 @contextmanager
 def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executor]:
-    """Yield what runs functions; what has not begun when the context is left is not run.
+    """Yield an executor; functions that have not begun when the context is left are not run.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def _cluster(address: str) -> Iterator[Executor]:
             yield client.get_executor(pure=False)  # type: ignore[no-untyped-call]
         except (KilledWorker, CancelledError) as error:
             raise HandcalError(
-                "the Dask cluster lost its scheduler or its workers; once it is there again, run "
-                "the study again to go on with it"
+                "the Dask cluster lost its scheduler or its workers; restart it, and run the study "
+                "again to resume it"
             ) from error
 
 
@@ -100,12 +100,12 @@ def _processes(workers: int) -> Iterator[Executor]:
             try:
                 yield executor
             except BaseException:
-                ours.close()  # trials may take long, and what they come to is not wanted
+                ours.close()  # trials may take long, and their results are no longer wanted
                 raise
     except BrokenExecutor as error:
         raise HandcalError(
-            "a process of the study died, perhaps for want of memory; run the study again, with "
-            "fewer processes, to go on with it"
+            "a process of the study died, perhaps for lack of memory; run the study again with "
+            "fewer processes to resume it"
         ) from error
     finally:
         for name, value in before.items():

@@ -1,1 +1,1 @@
-"""How good a calibration is: studies on simulated wearers, the cube test, the user test."""
+"""Evaluation of calibrations: studies on simulated wearers, the cube test, the user test."""

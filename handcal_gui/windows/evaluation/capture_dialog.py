@@ -1,4 +1,4 @@
-"""Taking the captures of a cube test with a camera, an image at a time."""
+"""A dialog that takes the captures of a cube test with a camera, one by one."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.lab.evaluate.cube_capture import instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import CapturePlan, PlannedCapture, missing_captures
+from handcal.lab.evaluate.run import cube_and_grid
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.station.doctor import Finding, Health
@@ -26,11 +27,10 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.evaluation.capture_list import CaptureList
-from handcal_gui.windows.evaluation.cube import capture_plan, read_cube_and_grid
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 _FIRST_SIZE = QSize(1120, 760)
-_MOST_POSES = 100
+MOST_POSES = 100
 
 
 class CaptureDialog(PreparationDialog):
@@ -93,7 +93,7 @@ class CaptureDialog(PreparationDialog):
         self._bar.failed.connect(self._show_not_done)
         self._lay_out()
         self._ask()
-        self._found.show_finding(Finding("", Health.LIMITED, "choose the camera, and show it"))
+        self._found.show_finding(Finding("", Health.LIMITED, "choose the camera, and press Show"))
         self._bar.run("Looking for cameras", lambda *_: self._prepare(), self._begin)
 
     def start(self) -> None:
@@ -120,7 +120,7 @@ class CaptureDialog(PreparationDialog):
         super().done(result)
 
     def _prepare(self) -> tuple[tuple[Cube, Grid], list[int]]:
-        return read_cube_and_grid(self.entries, self._folder), self._list_cameras()
+        return cube_and_grid(self.entries, self._folder), self._list_cameras()
 
     def _begin(self, found: tuple[tuple[Cube, Grid], list[int]]) -> None:
         self._looked_for, numbers = found
@@ -132,9 +132,9 @@ class CaptureDialog(PreparationDialog):
         self._ask()
 
     def _ask(self) -> None:
-        """Look what is missing of what is planned."""
+        """Check which planned captures are missing."""
         try:
-            self._plan, self._plan_problem = capture_plan(self.entries), ""
+            self._plan, self._plan_problem = self.entries.plan, ""
         except ValueError as error:
             self._plan, self._plan_problem = None, str(error)
             self._list.show_captures((), ())
@@ -208,7 +208,7 @@ def _plan_form() -> EntriesForm:
         "Positions",
         "Of the camera in the eye box: the folders' names, with commas between them.",
     )
-    poses = whole_number("poses", 1, _MOST_POSES, "Of the cube, at each position of the camera.")
+    poses = whole_number("poses", 1, MOST_POSES, "Of the cube, at each position of the camera.")
     drawn = named(
         QLineEdit(placeholderText="One", clearButtonEnabled=True),
         "drawn",

@@ -52,12 +52,12 @@ class CaptureList(QTreeWidget):
 
     @property
     def is_complete(self) -> bool:
-        """Whether images are listed, and none is missing."""
+        """True if images are listed, and none is missing."""
         return bool(self._captures) and not self._missing
 
     @property
     def chosen_is_taken(self) -> bool:
-        """Whether there is an image to be replaced."""
+        """True if the chosen image has been taken, and would be replaced."""
         return self.chosen is not None and self.chosen not in self._missing
 
     def show_captures(
@@ -78,7 +78,7 @@ class CaptureList(QTreeWidget):
         self.chosen_changed.emit()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Draw the icons anew when the colours change."""
+        """Redraw the icons when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._show_states()

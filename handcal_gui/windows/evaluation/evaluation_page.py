@@ -1,4 +1,4 @@
-"""One evaluation: what to do, how far it is, and what it came to."""
+"""The page of one evaluation: settings, progress and results."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.windows.evaluation.results_view import ResultsView
-from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Standing
+from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Readiness
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Offer:
-    """What can be evaluated."""
+class EvaluationSpec:
+    """The specification of an evaluation and its page."""
 
     title: str
     question: str
-    """What it answers, and how long it takes."""
+    """The question that it answers, and its duration."""
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
     """Makes the fields for its entries."""
@@ -38,11 +38,11 @@ class Offer:
 
 
 class EvaluationPage(QWidget):
-    """Runs one evaluation in a job, and shows what came of it.
+    """A page that runs one evaluation in a job, and shows its result.
 
     Parameters
     ----------
-    offer : Offer
+    spec : EvaluationSpec
     entries : object
         Dataclass, shown first.
 
@@ -54,97 +54,97 @@ class EvaluationPage(QWidget):
 
     busy_changed = Signal(bool)
 
-    def __init__(self, offer: Offer, entries: Any, parent: QWidget | None = None) -> None:
+    def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._evaluation = offer.evaluation
+        self._evaluation = spec.evaluation
         self._entries = entries
-        self._standing: Standing | None = None
+        self._readiness: Readiness | None = None
         self._failure = self._waits_for = ""
-        self.form = offer.form()
+        self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", "Run")
-        self._prepare = PreparationButton(offer.preparation) if offer.preparation else None
+        self._prepare = PreparationButton(spec.preparation) if spec.preparation else None
         self._bar = JobBar()
-        self._found = FindingLine("standing")
+        self._found = FindingLine("readiness")
         self._results = ResultsView()
-        self._look = LatestJob(self._stand, self)
-        self._lay_out(offer.question)
+        self._look = LatestJob(self._check, self)
+        self._lay_out(spec.question)
         self.form.changed.connect(self._take_entries)
         self._button.clicked.connect(self.run)
         if self._prepare is not None:
-            self._prepare.closed.connect(self._look_anew)
+            self._prepare.closed.connect(self._restart)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
-        self._look.answered.connect(self._take_standing)
+        self._look.answered.connect(self._take_readiness)
         self._look.failed.connect(self._show_failure)
 
     @property
     def entries(self) -> Any:
-        """What is entered."""
+        """The settings as entered."""
         return self._entries
 
     @property
     def is_busy(self) -> bool:
-        """Whether it runs."""
+        """True while the evaluation runs."""
         return self._bar.is_busy
 
     def run(self) -> None:
-        """Begin, or go on."""
+        """Start or resume the evaluation."""
         entries = self._entries
         self._failure = ""
         self._results.show_outcome(None)
         self._bar.run(
-            "Beginning",
-            lambda progress: self._evaluation.run(entries, progress.report, progress.is_cancelled),
+            "Starting",
+            lambda progress: self._evaluation.run(entries, progress),
             self._show_outcome,
         )
 
     def cancel(self) -> None:
-        """Give up what runs; what is done of a study is kept."""
+        """Cancel the evaluation; completed trials of a study are kept."""
         self._bar.cancel()
 
     def stop(self) -> None:
-        """Give up what runs or is prepared, and wait for its end."""
+        """Cancel the evaluation or its preparation, and wait for the end."""
         if self._prepare is not None:
             self._prepare.stop()
         self._bar.stop()
         self._look.stop()
 
     def wait_for(self, title: str) -> None:
-        """Do not run beside another evaluation, which is named; empty for none."""
+        """Wait for another evaluation, given by its title; empty for none."""
         self._waits_for = title
         self._refresh()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Look at the folder anew."""
+        """Check the folder again."""
         super().showEvent(event)
         self._ask()
 
     def _take_entries(self) -> None:
-        self._look_anew(self.form.take(self._entries))
+        self._restart(self.form.take(self._entries))
 
-    def _look_anew(self, entries: Any) -> None:
+    def _restart(self, entries: Any) -> None:
         self._entries = entries
         self._failure = ""
         self._results.show_outcome(None)
         self._ask()
 
     def _ask(self) -> None:
-        """Look how it stands; until that is known, nothing can be run."""
-        self._standing = None
+        """Check the settings; nothing can be run until the check is done."""
+        self._readiness = None
         if not self.is_busy and self.isVisible():
             self._look.ask(self._entries)
         self._refresh()
 
-    def _stand(self, entries: Any) -> Standing:
+    def _check(self, entries: Any) -> Readiness:
         try:
-            return self._evaluation.standing(entries)
+            return self._evaluation.readiness(entries)
         except HandcalError as error:
-            return Standing(Finding("", Health.BROKEN, str(error)))
+            return Readiness(Finding("", Health.BROKEN, str(error)))
 
-    def _take_standing(self, entries: Any, standing: Standing) -> None:
+    def _take_readiness(self, entries: Any, readiness: Readiness) -> None:
         if entries == self._entries and not self.is_busy:
-            self._standing = standing
+            self._readiness = readiness
             self._refresh()
 
     def _show_outcome(self, outcome: Outcome) -> None:
@@ -161,18 +161,18 @@ class EvaluationPage(QWidget):
         self.busy_changed.emit(is_busy)
 
     def _refresh(self) -> None:
-        standing = self._standing
+        readiness = self._readiness
         if self._prepare is not None:
             self._prepare.follow(None if self.is_busy else self._entries)
-        can_run = standing is not None and standing.can_run and not self._waits_for
+        can_run = readiness is not None and readiness.can_run and not self._waits_for
         self._button.setEnabled(can_run)
-        if standing is not None:
-            self._button.setText(standing.button)
+        if readiness is not None:
+            self._button.setText(readiness.button)
         if finding := self._finding():
             self._found.show_finding(finding)
 
     def _finding(self) -> Finding | None:
-        """Return what is to be said now; None for what is said already."""
+        """Return the message to show; None to keep the present one."""
         if self.is_busy:
             return Finding("", Health.GOOD, "Running")
         if self._failure:
@@ -182,7 +182,7 @@ class EvaluationPage(QWidget):
             return Finding("", Health.LIMITED, found, "one runs at a time")
         if not self._results.is_empty:
             return Finding("", Health.GOOD, "Done")
-        return self._standing.finding if self._standing else None
+        return self._readiness.finding if self._readiness else None
 
     def _lay_out(self, question: str) -> None:
         row = QHBoxLayout()

@@ -1,4 +1,4 @@
-"""What can be made in a dialog before it is evaluated, and the button that opens it."""
+"""A dialog that prepares an evaluation, and the button that opens it."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class PreparationDialog(QDialog):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
-    """How an evaluation offers such a dialog."""
+    """Button and dialog with which an evaluation is prepared."""
 
     button: str
     help_text: str
-    """What the button says that opens it, and its tooltip."""
+    """Text and tooltip of the button."""
     is_possible: Callable[[Any], bool]
-    """Whether entries suffice for it."""
+    """Returns whether entries suffice for it."""
     dialog: Callable[[Any, QWidget], PreparationDialog]
     """Makes it for entries, with a parent."""
 
@@ -61,7 +61,7 @@ class PreparationButton(QPushButton):
         self.clicked.connect(self._open)
 
     def follow(self, entries: Any) -> None:
-        """Be there for other entries; None for none."""
+        """Follow other entries; None to be disabled."""
         self._entries = entries
         self.setEnabled(entries is not None and self._preparation.is_possible(entries))
 

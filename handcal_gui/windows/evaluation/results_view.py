@@ -1,4 +1,4 @@
-"""What an evaluation came to: its figures and numbers, and the way to its files."""
+"""Results of an evaluation: its figures and numbers, and buttons for its files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ResultsView(QWidget):
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is shown."""
+        """True if no result is shown."""
         return self._stack.currentIndex() == 0
 
     def show_outcome(self, outcome: Outcome | None) -> None:

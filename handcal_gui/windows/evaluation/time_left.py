@@ -1,4 +1,4 @@
-"""How long something will yet take, judged by what it has taken so far."""
+"""Remaining time, estimated from elapsed time and progress."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _MINUTE_S = 60.0
 
 
 class TimeLeft:
-    """Tells the time left from the share done.
+    """An estimate of the remaining time from the share done.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class TimeLeft:
         self._start_s = clock()
 
     def at(self, share: float) -> str:
-        """Return the time left as people say it; empty while nothing is done."""
+        """Return the remaining time in words; empty until there is progress."""
         if share <= self._begun:
             return ""
         elapsed_s = self._clock() - self._start_s

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import named
-from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, Offer
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
 
 _FIRST_SIZE = QSize(1240, 860)
 _RAIL_PX = 24 * SPACING_PX
@@ -33,7 +33,7 @@ class EvaluationWindow(QDialog):
 
     Parameters
     ----------
-    offers : mapping of str to Offer
+    specs : mapping of str to EvaluationSpec
         By the field of the entries.
     entries : EvaluationEntries
         Shown first.
@@ -41,14 +41,14 @@ class EvaluationWindow(QDialog):
     Attributes
     ----------
     remembered : Signal(EvaluationEntries)
-        What was entered, to be proposed next time.
+        The settings as entered, to be proposed next time.
     """
 
     remembered = Signal(object)
 
     def __init__(
         self,
-        offers: Mapping[str, Offer],
+        specs: Mapping[str, EvaluationSpec],
         entries: EvaluationEntries,
         parent: QWidget | None = None,
     ) -> None:
@@ -58,17 +58,17 @@ class EvaluationWindow(QDialog):
         # A window of its own, with all the buttons of one.
         self.setWindowFlags(Qt.WindowType.Window)
         self._entries = entries
-        self._offers = offers
+        self._specs = specs
         self._is_closing = False
         self._rail = named(QListWidget(), "evaluationRail", "Evaluations")
         self._title = QLabel()
         self._stack = QStackedWidget()
         self._pages: dict[str, EvaluationPage] = {}
-        for name, offer in offers.items():
-            page = EvaluationPage(offer, getattr(entries, name))
+        for name, spec in specs.items():
+            page = EvaluationPage(spec, getattr(entries, name))
             page.busy_changed.connect(partial(self._change_busy, name))
             self._stack.addWidget(page)
-            item = QListWidgetItem(offer.title)
+            item = QListWidgetItem(spec.title)
             item.setSizeHint(QSize(0, 4 * SPACING_PX))
             self._rail.addItem(item)
             self._pages[name] = page
@@ -79,7 +79,7 @@ class EvaluationWindow(QDialog):
 
     @property
     def entries(self) -> EvaluationEntries:
-        """What is entered."""
+        """The settings as entered."""
         return replace(self._entries, **{name: one.entries for name, one in self._pages.items()})
 
     @property
@@ -92,7 +92,7 @@ class EvaluationWindow(QDialog):
         self._rail.setCurrentRow(list(self._pages).index(name))
 
     def reject(self) -> None:
-        """Close; what runs is cancelled first."""
+        """Close; a running evaluation is cancelled first."""
         busy = [page for page in self._pages.values() if page.is_busy]
         self._is_closing = bool(busy)
         for page in busy:
@@ -101,7 +101,7 @@ class EvaluationWindow(QDialog):
             self.stop()
 
     def stop(self) -> None:
-        """Give up what runs, wait for its end, and close; before the program ends."""
+        """Cancel the running evaluation, wait for its end, and close."""
         for page in self._pages.values():
             page.stop()
         self.remembered.emit(self.entries)
@@ -113,12 +113,12 @@ class EvaluationWindow(QDialog):
             super().keyPressEvent(event)
 
     def _go_to(self, row: int) -> None:
-        self._title.setText(list(self._offers.values())[row].title)
+        self._title.setText(list(self._specs.values())[row].title)
         self._stack.setCurrentIndex(row)
 
     def _change_busy(self, name: str, is_busy: bool) -> None:
         for other, page in self._pages.items():
-            page.wait_for(self._offers[name].title if is_busy and other != name else "")
+            page.wait_for(self._specs[name].title if is_busy and other != name else "")
         if is_busy:
             self.remembered.emit(self.entries)
         elif self._is_closing:

@@ -1,112 +1,105 @@
-"""What an evaluation's job does, and what it comes to."""
+"""Jobs of the evaluation window: what they need, what they run, and their results."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
 
-from handcal.errors import CancelledError, FileError
 from handcal.io.images import read_image
-from handcal.lab.study.run import Study, run_study, share_done
-from handcal.lab.study.store import Row, free_of_studies
+from handcal.lab.settings import output_folder
+from handcal.lab.study.run import RUNNING, Study, share_done
+from handcal.lab.study.store import free_of_studies
+from handcal.lab.study.studies import STUDY_SHARE
+from handcal.progress import Progress
 from handcal.report.document import Report
-from handcal.report.write import write_report
 from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
-from handcal_gui.engine.jobs import IsCancelled
-from handcal_gui.engine.jobs import Report as Tell
 from handcal_gui.windows.evaluation.time_left import TimeLeft
-
-Checkpoint: TypeAlias = Callable[[str, float], None]
-"""Told what is going on and the share done; raises CancelledError once it shall end."""
-
-# Of the time that a study takes, and of that which reading takes.
-_STUDY_SHARE, _READING_SHARE = 0.95, 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
-    """How it stands with what was entered, and what the button does about it."""
+class Readiness:
+    """State of an evaluation with what was entered, and the text of its button."""
 
     finding: Finding
     button: str = "Run"
 
     @property
     def can_run(self) -> bool:
-        """Whether there is anything in the way."""
+        """True if the evaluation can be run."""
         return self.finding.health is not Health.BROKEN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What an evaluation came to."""
+    """The result of an evaluation."""
 
     folder: Path
-    """Of all its files."""
+    """Folder of all its files."""
     report: Report
     pictures: Sequence[UInt8]
-    """each (h, w, 3); the report's figures, RGB, as they were written."""
+    """The report's figures as they were written, each (h, w, 3), RGB."""
+
+
+class Reported(Protocol):
+    """Result of an evaluation whose report was written into the folder that was entered."""
+
+    @property
+    def report(self) -> Report:
+        """The report."""
 
 
 class Evaluation(Protocol):
-    """What a page needs of an evaluation; entries are a dataclass with an `output` folder."""
+    """An evaluation as a page needs it; entries are a dataclass with an `output` folder."""
 
-    def standing(self, entries: Any) -> Standing:
-        """Look at what was entered; HandcalError says what is wrong with it."""
+    def readiness(self, entries: Any) -> Readiness:
+        """Check what was entered; HandcalError says what is wrong with it."""
 
-    def run(self, entries: Any, tell: Tell, is_cancelled: IsCancelled) -> Outcome:
-        """Do it; HandcalError says why not."""
+    def run(self, entries: Any, progress: Progress) -> Outcome:
+        """Run it; HandcalError says why that failed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedStudy:
-    """A study on simulated wearers; entries name processes and scheduler."""
+    """A study on simulated wearers; entries are its settings."""
 
     study: Callable[[Any], Study]
-    """Makes the study of the entries."""
-    describe: Callable[[Any, Sequence[Row]], Report]
-    """Makes the report of the study's settings and rows."""
+    """Returns the cases that settings describe."""
+    order: Callable[[Any, Progress], Reported]
+    """Runs or resumes the study, and writes its report."""
 
-    def standing(self, entries: Any) -> Standing:
-        """Tell how much of the study the folder holds."""
+    def readiness(self, entries: Any) -> Readiness:
+        """Return how much of the study the folder holds."""
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
-            return Standing(_note(f"{folder} holds all of this study"), "Show results")
+            return Readiness(_note(f"{folder} holds all of this study"), "Show results")
         if share:
-            advice = "what is done is not done again"
-            return Standing(
-                _note(f"{folder} holds {100 * share:.0f} % of this study", advice), "Go on"
+            advice = "completed trials are kept"
+            return Readiness(
+                _note(f"{folder} holds {100 * share:.0f} % of this study", advice), "Resume"
             )
-        return Standing(_ready())
+        return Readiness(_ready())
 
-    def run(self, entries: Any, tell: Tell, is_cancelled: IsCancelled) -> Outcome:
-        """Do what is not done yet, and write the report."""
+    def run(self, entries: Any, progress: Progress) -> Outcome:
+        """Run or resume the study, with the time left beside its progress."""
         study, folder = self.study(entries), output_folder(entries.output)
         count = len(study.cases)
-        begun = share_done(study, folder)
-        left = TimeLeft(begun)
+        left = TimeLeft(share_done(study, folder))
 
-        def progress(share: float) -> None:
-            parts = f"{round(share * count):,} of {count:,} cases", left.at(share)
-            tell(", ".join(filter(None, parts)), _STUDY_SHARE * share)
+        def report(doing: str, share: float) -> None:
+            if doing == RUNNING:
+                done = share / STUDY_SHARE
+                parts = f"{round(done * count):,} of {count:,} cases", left.at(done)
+                doing = ", ".join(filter(None, parts))
+            progress.report(doing, share)
 
-        progress(begun)
-        rows = run_study(
-            study,
-            folder,
-            workers=entries.processes or None,
-            scheduler=entries.scheduler or None,
-            progress=progress,
-            is_cancelled=is_cancelled,
-        )
-        report = self.describe(study.settings, rows)
-        return _write(folder, report, _checkpoint(tell, is_cancelled), _STUDY_SHARE)
+        return _outcome(folder, self.order(entries, replace(progress, report=report)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,52 +107,28 @@ class GivenData:
     """An evaluation of what is in files."""
 
     missing: Callable[[Any], str]
-    """Says what has yet to be entered; empty if nothing has."""
-    describe: Callable[[Any, Checkpoint], Report]
-    """Reads the files and makes the report, telling a `Checkpoint`."""
+    """Returns what has yet to be entered; empty if nothing has."""
+    order: Callable[[Any, Progress], Reported]
+    """Evaluates the files, and writes the report."""
 
-    def standing(self, entries: Any) -> Standing:
-        """Tell what is missing, and whether an earlier report will be replaced."""
+    def readiness(self, entries: Any) -> Readiness:
+        """Return what is missing, or that an earlier report will be replaced."""
         if missing := self.missing(entries):
-            return Standing(Finding("", Health.BROKEN, missing))
+            return Readiness(Finding("", Health.BROKEN, missing))
         folder = free_of_studies(output_folder(entries.output))
         if (folder / "report.pdf").exists():
-            return Standing(_note(f"The report in {folder} will be replaced"))
-        return Standing(_ready())
+            return Readiness(_note(f"The report in {folder} will be replaced"))
+        return Readiness(_ready())
 
-    def run(self, entries: Any, tell: Tell, is_cancelled: IsCancelled) -> Outcome:
-        """Read, evaluate, and write the report."""
-        folder = free_of_studies(output_folder(entries.output))
-        checkpoint = _checkpoint(tell, is_cancelled)
-        report = self.describe(
-            entries, lambda doing, share: checkpoint(doing, _READING_SHARE * share)
-        )
-        return _write(folder, report, checkpoint, _READING_SHARE)
+    def run(self, entries: Any, progress: Progress) -> Outcome:
+        """Evaluate, and write the report."""
+        return _outcome(output_folder(entries.output), self.order(entries, progress))
 
 
-def output_folder(text: str) -> Path:
-    """Return the folder that was entered; FileError if there is none."""
-    if not text:
-        raise FileError("choose a folder for the results")
-    return Path(text).expanduser().absolute()
-
-
-def _checkpoint(tell: Tell, is_cancelled: IsCancelled) -> Checkpoint:
-    def check(doing: str, share: float) -> None:
-        if is_cancelled():
-            raise CancelledError("the evaluation was cancelled")
-        tell(doing, share)
-
-    return check
-
-
-def _write(folder: Path, report: Report, checkpoint: Checkpoint, begun: float) -> Outcome:
-    def check(share: float) -> None:
-        checkpoint("Writing the report", begun + (1.0 - begun) * share)
-
-    write_report(folder, report, check)
-    files = [folder / "figures" / f"{figure.name}.png" for figure in report.figures]
-    return Outcome(folder, report, [_read(file) for file in files])
+def _outcome(folder: Path, reported: Reported) -> Outcome:
+    figures = reported.report.figures
+    files = [folder / "figures" / f"{figure.name}.png" for figure in figures]
+    return Outcome(folder, reported.report, [_read(file) for file in files])
 
 
 def _read(file: Path) -> UInt8:

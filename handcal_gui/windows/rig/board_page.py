@@ -38,7 +38,7 @@ from handcal_gui.widgets.fields import (
 )
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.project import RigProject
 
 _KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": "Checkerboard"}
 _PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square
@@ -47,10 +47,10 @@ _PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square
 class BoardPage(QWidget):
     """Describes the board, shows and saves it."""
 
-    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("boardPage")
-        self._draft = draft
+        self._project = project
         squares_help = "Squares, not inner corners."
         self._kind = choice("kind", "Kind of board", _KINDS)
         self._columns = whole_number("columns", 3, 40, squares_help)
@@ -78,8 +78,8 @@ class BoardPage(QWidget):
         self._preview = ImageView("Preview of the board")
         self._draw = LatestJob(_draw, self)
         self._draw.answered.connect(lambda _board, image: self._preview.show_image(image))
-        self._show_board(draft.work.board)
-        self._paper.setCurrentIndex(self._paper.findData(draft.work.paper))
+        self._show_board(project.inputs.board)
+        self._paper.setCurrentIndex(self._paper.findData(project.inputs.paper))
         self._lay_out()
         for options in (self._kind, self._dictionary, self._paper):
             options.currentIndexChanged.connect(self._take)
@@ -89,7 +89,7 @@ class BoardPage(QWidget):
         self._pdf.clicked.connect(self._save_pdf)
         self._picture.clicked.connect(self._save_picture)
         self._begin.clicked.connect(self._ask_for_rig)
-        draft.rig_changed.connect(self._show_rig)
+        project.rig_changed.connect(self._show_rig)
         self._show_rig()
         self._take()
 
@@ -129,7 +129,7 @@ class BoardPage(QWidget):
         self._preview.show_text()
         inner = " × ".join(map(str, board.inner))
         self._found.show_finding(Finding("", Health.GOOD, f"{inner} inner corners to be found"))
-        self._draft.enter(board=board, paper=self._paper.currentData())
+        self._project.enter(board=board, paper=self._paper.currentData())
         self._draw.ask(board)
 
     def _save_pdf(self) -> None:
@@ -140,10 +140,10 @@ class BoardPage(QWidget):
     def _save_picture(self) -> None:
         path, _ = QFileDialog.getSaveFileName(self, "Save the board", "board.png", "PNG (*.png)")
         if path:
-            self._save(lambda: _write_picture(Path(path), self._draft.work.board), path)
+            self._save(lambda: _write_picture(Path(path), self._project.inputs.board), path)
 
     def _printed(self) -> tuple[Board, Paper]:
-        return self._draft.work.board, self._draft.work.paper
+        return self._project.inputs.board, self._project.inputs.paper
 
     def _save(self, write: Callable[[], None], path: str) -> None:
         try:
@@ -161,24 +161,24 @@ class BoardPage(QWidget):
         if not path or not self._may_give_up():
             return
         try:
-            self._draft.begin_from(Path(path))
+            self._project.begin_from(Path(path))
         except HandcalError as error:
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _may_give_up(self) -> bool:
-        """Ask before calibrated parts are given up."""
-        if not self._draft.rig.origins:
+        """Ask before calibrated parts are discarded."""
+        if not self._project.rig.origins:
             return True
         answer = QMessageBox.question(
             self,
             "Begin from another rig",
-            "What has been calibrated here is given up, unless it is saved. Go on?",
+            "Calibrated parts that are not saved will be lost. Continue?",
         )
         return answer == QMessageBox.StandardButton.Yes
 
     def _show_rig(self) -> None:
-        parts = ", ".join(self._draft.rig.origins) or "nothing"
-        self._rig.setText(f"{self._draft.rig.name} (calibrated: {parts})")
+        parts = ", ".join(self._project.rig.origins) or "nothing"
+        self._rig.setText(f"{self._project.rig.name} (calibrated: {parts})")
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()

@@ -1,4 +1,4 @@
-"""Where in the image the board was seen, and how often."""
+"""A map of the image areas in which the board was seen."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class CoverageMap(QWidget):
 
     @property
     def caption(self) -> str:
-        """What is said above the cells."""
+        """The text above the cells."""
         share = "–" if self._coverage is None else f"{100 * self._coverage.share:.0f} %"
         return f"{self._title}: {share}"
 

@@ -12,17 +12,17 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.choose import ALIKE
-from handcal.rig.grid import Grid, draw_grid
+from handcal.rig.grid import Grid, draw_grid, grid_on
 from handcal.station.doctor import Finding, Health
 from handcal.types import Eye
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
-from handcal_gui.windows.rig.solve import Solved, grid_of, solve_display
+from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project_folder import DisplayEntries, Distance
+from handcal_gui.windows.rig.solve import Solved, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
-from handcal_gui.windows.rig.work import DisplayEntries, Distance
 
 _DISTANCES: dict[Distance, str] = {
     "measured": "as measured",
@@ -43,11 +43,11 @@ class DisplayPage(StepPage):
 
     Parameters
     ----------
-    draft : Draft
+    project : RigProject
     eye : {"left", "right"}
     """
 
-    def __init__(self, draft: Draft, eye: Eye, parent: QWidget | None = None) -> None:
+    def __init__(self, project: RigProject, eye: Eye, parent: QWidget | None = None) -> None:
         distance = choice(
             "distance",
             "Distance of the virtual screen",
@@ -95,11 +95,11 @@ class DisplayPage(StepPage):
                 "nominal_m": ("at nominal distance", nominal),
             }
         )
-        form.show_entries(draft.work.left if eye == "left" else draft.work.right)
+        form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
         grid = ImagesPanel(("Viewpoint camera",), _GRID_HINT)
         board = ImagesPanel(("Viewpoint camera",), _BOARD_HINT)
         panels = {"Grid on the display": grid, "Place of the camera": board}
-        super().__init__(f"{eye}DisplayPage", draft, form, panels, parent)
+        super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
@@ -112,7 +112,7 @@ class DisplayPage(StepPage):
 
     @property
     def _entries(self) -> DisplayEntries:
-        work = self.draft.work
+        work = self.project.inputs
         return work.left if self._eye == "left" else work.right
 
     def enter(self) -> None:
@@ -121,7 +121,7 @@ class DisplayPage(StepPage):
         for distance, fields in self._by_distance.items():
             for field in fields:
                 field.setEnabled(distance == entries.distance)
-        self._board.look((entries.board_images,), self.draft.work.board, entries.dropped_board)
+        self._board.look((entries.board_images,), self.project.inputs.board, entries.dropped_board)
         if (grid := self._shown()) is not None:
             self._grid.look((entries.grid_images,), grid.board, entries.dropped_grid)
 
@@ -133,7 +133,7 @@ class DisplayPage(StepPage):
             dropped_grid=self._grid.dropped_of(entries.dropped_grid),
             dropped_board=self._board.dropped_of(entries.dropped_board),
         )
-        self.draft.enter(**{self._eye: entries})
+        self.project.enter(**{self._eye: entries})
         self.enter()
 
     def solve(self) -> None:
@@ -144,28 +144,28 @@ class DisplayPage(StepPage):
             self._board.shots,
             self._entries,
             self._eye,
-            screen_of(self.draft.rig, self._eye),
-            self.draft.camera_file,
+            self.project.rig,
+            self.project.camera_file,
         )
         self.box.run(work, self._show_solved)
 
     def show_known(self) -> None:
         """Show what the rig has of this display."""
-        self.box.show_origin(self.draft.rig.origins.get(self._eye))
+        self.box.show_origin(self.project.rig.origins.get(self._eye))
 
     def _show_solved(self, solved: tuple[Solved, Solved]) -> None:
         display, place = solved
-        self.box.show_solved(display, self.draft.take_part(display))
+        self.box.show_solved(display, self.project.take_part(display))
         self._grid.show_solved(display)
         self._board.show_solved(place)
 
     def _shown(self) -> Grid | None:
         """Return the grid that the display shows; None, and why, if it has no room for it."""
-        screen = screen_of(self.draft.rig, self._eye)
+        screen = screen_of(self.project.rig, self._eye)
         try:
-            return grid_of(self._entries, screen.width_px, screen.height_px)
+            return grid_on(screen.width_px, screen.height_px, self._entries.square_px)
         except HandcalError as error:
-            self._grid.look(("",), self.draft.work.board, ())
+            self._grid.look(("",), self.project.inputs.board, ())
             self._grid.show_trouble(str(error))
             return None
 
@@ -188,7 +188,7 @@ class DisplayPage(StepPage):
     def _take_grid(self) -> None:
         if (grid := self._shown()) is None:
             return
-        folder = self.draft.folder.path / f"grid-{self._eye}"
+        folder = self.project.folder.path / f"grid-{self._eye}"
         self.take_images(
             {"Viewpoint camera": folder},
             grid.board,
@@ -198,10 +198,10 @@ class DisplayPage(StepPage):
         )
 
     def _take_board(self) -> None:
-        folder = self.draft.folder.path / f"board-{self._eye}"
+        folder = self.project.folder.path / f"board-{self._eye}"
         self.take_images(
             {"Viewpoint camera": folder},
-            self.draft.work.board,
+            self.project.inputs.board,
             self._board,
             lambda: self.form.enter(board_images=str(folder)),
         )

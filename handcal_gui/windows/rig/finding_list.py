@@ -1,4 +1,4 @@
-"""What there is to say about a rig, line by line, doubtful things marked."""
+"""The findings about a rig, line by line, with doubtful ones marked."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class ImagesPanel(QWidget):
         self._hint = paragraph("hint", hint)
         self._trouble = FindingLine("images")
         self._trouble.hide()
-        self._again = button("again", "Look again", help_text="Read the folders anew")
+        self._again = button("again", "Look again", help_text="Read the folders again")
         self._take = button("take", "Take images…", help_text="With cameras of this computer")
         self._again.clicked.connect(self._look_again)
         self._take.clicked.connect(self.take_requested)
@@ -96,7 +96,7 @@ class ImagesPanel(QWidget):
             self.bar.stop()
 
     def forget(self) -> None:
-        """Have the next `look` read the folders anew."""
+        """Make the next `look` read the folders again."""
         self._question = None
 
     def show_solved(self, solved: Solved) -> None:

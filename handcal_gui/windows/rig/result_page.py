@@ -28,8 +28,8 @@ from handcal_gui.widgets.fields import button, main_button, named
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.finding_list import FindingList
+from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
 
 _RIG_FILES = "Rig files (*.yaml *.yml)"
@@ -46,10 +46,10 @@ class ResultPage(QWidget):
 
     rig_saved = Signal(object)
 
-    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("resultPage")
-        self._draft = draft
+        self._project = project
         self._saved: Path | None = None
         self._name = named(QLineEdit(maxLength=MAX_TEXT), "rigName", "Name of the rig")
         self._findings = FindingList("Check of the rig")
@@ -66,11 +66,11 @@ class ResultPage(QWidget):
         self._name.editingFinished.connect(self._take_name)
         self._save.clicked.connect(self.save)
         self._use.clicked.connect(self._ask_to_use)
-        draft.rig_changed.connect(self.enter)
+        project.rig_changed.connect(self.enter)
 
     def enter(self) -> None:
         """Show the rig as it is now."""
-        rig = self._draft.rig
+        rig = self._project.rig
         self._name.setText(rig.name)
         findings = report_rig(rig)
         self._findings.show_findings(findings)
@@ -100,7 +100,7 @@ class ResultPage(QWidget):
         """Save the rig file."""
         self._take_name()
         try:
-            write_rig(path, self._draft.rig)
+            write_rig(path, self._project.rig)
         except FileError as error:
             self._end.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
             return
@@ -113,12 +113,12 @@ class ResultPage(QWidget):
 
     def _take_name(self) -> None:
         name = self._name.text().strip()
-        if name == self._draft.rig.name:
+        if name == self._project.rig.name:
             return
         try:
-            self._draft.take_rig(replace(self._draft.rig, name=name))
+            self._project.take_rig(replace(self._project.rig, name=name))
         except HandcalError as error:
-            self._name.setText(self._draft.rig.name)
+            self._name.setText(self._project.rig.name)
             self._end.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _ask_to_use(self) -> None:
@@ -142,7 +142,7 @@ class ResultPage(QWidget):
         self._compared.show_finding(
             Finding("", Health.GOOD, f"how this rig differs from {other.name}")
         )
-        self._differences.show_rows(("Differs by",), difference_rows(other, self._draft.rig))
+        self._differences.show_rows(("Differs by",), difference_rows(other, self._project.rig))
         self._differences.show()
 
     def _lay_out(self) -> None:

@@ -37,7 +37,7 @@ class Shot:
 
     @property
     def problem(self) -> str:
-        """Why nothing was found; empty if all was."""
+        """Reason why nothing was found; empty if everything was."""
         return "; ".join(view.problem for view in self.views if view.problem)
 
 
@@ -60,7 +60,7 @@ def look(
             progress.at((number + share) / len(folders), f"Looking for the board in {name}")
 
         paths = image_files([folder])
-        views = read_views(paths, board, told)
+        views = read_views(paths, board, Progress(told))
         files |= {(number, path.name): path for path in paths}
         of_camera.append(views)
     together = pair_views(*of_camera) if len(of_camera) == 2 else [(one,) for one in of_camera[0]]

@@ -1,4 +1,4 @@
-"""The foot of a step: solve, and what that came to."""
+"""The foot of a step: the button that solves it, and the result."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SolveBox(QWidget):
         self.show_origin(None)
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
-        """Solve in a job; `then` takes what it comes to."""
+        """Solve in a job, and pass the result to `then`."""
 
         def solve(progress: Progress) -> object:
             solved = work()

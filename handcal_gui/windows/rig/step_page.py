@@ -1,4 +1,4 @@
-"""What the steps that solve something from images have in common."""
+"""Base of the wizard's pages that solve a step from images."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
@@ -25,7 +25,7 @@ class StepPage(QWidget):
     ----------
     name : str
         Object name.
-    draft : Draft
+    project : RigProject
     form : EntriesForm
     panels : mapping of str to ImagesPanel
         By title.
@@ -40,14 +40,14 @@ class StepPage(QWidget):
     def __init__(
         self,
         name: str,
-        draft: Draft,
+        project: RigProject,
         form: EntriesForm,
         panels: Mapping[str, ImagesPanel],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName(name)
-        self.draft = draft
+        self.project = project
         self.form = form
         self.panels = tuple(panels.values())
         self.box = SolveBox()
@@ -59,7 +59,7 @@ class StepPage(QWidget):
             panel.bar.busy_changed.connect(self._refresh)
             panel.again_requested.connect(self.enter)
         self.box.bar.busy_changed.connect(self._refresh)
-        draft.rig_changed.connect(self.show_known)
+        project.rig_changed.connect(self.show_known)
 
     def enter(self) -> None:
         """Look for what the entries name, unless that was done."""
@@ -98,7 +98,9 @@ class StepPage(QWidget):
             then()
             self.enter()
 
-        dialog = TakeDialog(folders, board, choose or ChooseSettings(), self.draft.realsense, self)
+        dialog = TakeDialog(
+            folders, board, choose or ChooseSettings(), self.project.realsense, self
+        )
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
         dialog.open()

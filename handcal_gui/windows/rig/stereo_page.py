@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import intrinsics_field, lens_field
+from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import Solved, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage
 
@@ -26,7 +26,7 @@ _HINT = (
 class StereoPage(StepPage):
     """Pairs of images of the board, and the pose solved from them."""
 
-    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         imager = PathField("Depth imager's intrinsics", "file", INTRINSICS_FILES, "Not needed")
         imager.setToolTip(
             "Only if the images are those of a colour imager beside the depth imager, and the "
@@ -50,40 +50,40 @@ class StereoPage(StepPage):
                 "depth_to_color": ("Pose from depth to colour", pose),
             }
         )
-        form.show_entries(draft.work.stereo)
+        form.show_entries(project.inputs.stereo)
         panel = ImagesPanel(("Depth camera", "Headset camera"), _HINT)
-        super().__init__("stereoPage", draft, form, {"Pairs": panel}, parent)
+        super().__init__("stereoPage", project, form, {"Pairs": panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
 
     def enter(self) -> None:
         """Look for the board in the folders, unless that was done."""
-        entries = self.draft.work.stereo
+        entries = self.project.inputs.stereo
         folders = entries.depth_images, entries.headset_images
-        self.panel.look(folders, self.draft.work.board, entries.dropped)
+        self.panel.look(folders, self.project.inputs.board, entries.dropped)
 
     def keep(self) -> None:
         """Keep what is entered, and look for the board where it is new."""
-        entries = self.form.take(self.draft.work.stereo)
-        self.draft.enter(stereo=replace(entries, dropped=self.panel.dropped_of(entries.dropped)))
+        entries = self.form.take(self.project.inputs.stereo)
+        self.project.enter(stereo=replace(entries, dropped=self.panel.dropped_of(entries.dropped)))
         self.enter()
 
     def solve(self) -> None:
         """Solve from the pairs that are not left out."""
-        work = partial(solve_stereo, self.panel.shots, self.draft.work.stereo)
+        work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
         self.box.run(work, self._show_solved)
 
     def show_known(self) -> None:
         """Show what the rig has of this step."""
-        self.box.show_origin(self.draft.rig.origins.get("T_H_D"))
+        self.box.show_origin(self.project.rig.origins.get("T_H_D"))
 
     def _show_solved(self, solved: Solved) -> None:
-        self.box.show_solved(solved, self.draft.take_part(solved))
+        self.box.show_solved(solved, self.project.take_part(solved))
         self.panel.show_solved(solved)
 
     def _take(self) -> None:
-        path = self.draft.folder.path
+        path = self.project.folder.path
         folders = {"Depth camera": path / "depth", "Headset camera": path / "headset"}
 
         def then() -> None:
@@ -92,4 +92,4 @@ class StereoPage(StepPage):
             told = {name: path / "depth" / file for name, file in files.items()}
             self.form.enter(**{name: str(file) for name, file in told.items() if file.exists()})
 
-        self.take_images(folders, self.draft.work.board, self.panel, then)
+        self.take_images(folders, self.project.inputs.board, self.panel, then)

@@ -14,7 +14,7 @@ from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.progress import Progress
 from handcal.rig.board import Board
-from handcal.rig.choose import ChooseSettings, ViewChooser
+from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.views import View, view
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
@@ -58,7 +58,7 @@ class TakeDialog(QDialog):
         self.setObjectName("takeDialog")
         self.setWindowTitle("Take images")
         self._folders, self._board, self._choose = dict(folders), board, choose
-        self._chooser = ViewChooser(choose)
+        self._selector = ViewSelector(choose)
         self._kept = 0
         self._is_looking = False
         self._cameras = LiveCameras(
@@ -98,7 +98,7 @@ class TakeDialog(QDialog):
 
     @property
     def shown_images(self) -> Images | None:
-        """What is seen now; None while no camera is shown."""
+        """The present images; None while no camera is shown."""
         return self._cameras.images
 
     def start(self) -> None:
@@ -127,7 +127,7 @@ class TakeDialog(QDialog):
 
     def _begin_anew(self) -> None:
         self._stop_looking()
-        self._chooser, self._kept = ViewChooser(self._choose), 0
+        self._selector, self._kept = ViewSelector(self._choose), 0
 
     def _stop_looking(self) -> None:
         self._looker.stop()
@@ -135,7 +135,7 @@ class TakeDialog(QDialog):
 
     def _take_if_new(self, images: Images) -> str:
         """Keep images if they are worth it; return why not, in the job's thread."""
-        why_not = self._chooser.look(see_board(images, self._board))
+        why_not = self._selector.consider(see_board(images, self._board))
         if not why_not:
             keep_images(images, tuple(self._folders.values()))
         return why_not
@@ -143,7 +143,7 @@ class TakeDialog(QDialog):
     def _show_looked(self, _images: Images, why_not: str) -> None:
         self._is_looking = False
         self._kept += not why_not
-        if self._chooser.is_done:
+        if self._selector.is_done:
             self._by_itself.setChecked(False)
             finding = Finding("", Health.GOOD, f"{self._choose.most} taken: that is enough")
         elif why_not:

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 from handcal.station.doctor import Finding, Health
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-from handcal_gui.windows.rig.draft import Draft
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import lens_field
+from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import Solved, solve_viewpoint
 from handcal_gui.windows.rig.step_page import StepPage
 
@@ -25,7 +25,7 @@ _HINT = (
 class ViewpointPage(StepPage):
     """Images of the board, and the intrinsics solved from them; or a file that has them."""
 
-    def __init__(self, draft: Draft, parent: QWidget | None = None) -> None:
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         given = PathField("Intrinsics", "file", INTRINSICS_FILES, "Solved from the images")
         form = EntriesForm(
             {
@@ -34,50 +34,50 @@ class ViewpointPage(StepPage):
                 "intrinsics": ("or its intrinsics", given),
             }
         )
-        form.show_entries(draft.work.viewpoint)
+        form.show_entries(project.inputs.viewpoint)
         panel = ImagesPanel(("Viewpoint camera",), _HINT)
-        super().__init__("viewpointPage", draft, form, {"Images": panel}, parent)
+        super().__init__("viewpointPage", project, form, {"Images": panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
 
     def enter(self) -> None:
         """Look for the board in the folder, unless that was done."""
-        entries = self.draft.work.viewpoint
-        self.panel.look((entries.images,), self.draft.work.board, entries.dropped)
+        entries = self.project.inputs.viewpoint
+        self.panel.look((entries.images,), self.project.inputs.board, entries.dropped)
 
     def keep(self) -> None:
         """Keep what is entered, and look for the board where it is new."""
-        entries = self.form.take(self.draft.work.viewpoint)
+        entries = self.form.take(self.project.inputs.viewpoint)
         dropped = self.panel.dropped_of(entries.dropped)
-        self.draft.enter(viewpoint=replace(entries, dropped=dropped))
+        self.project.enter(viewpoint=replace(entries, dropped=dropped))
         self.show_known()
         self.enter()
 
     def solve(self) -> None:
         """Solve from the images that are not left out."""
-        entries, output = self.draft.work.viewpoint, self.draft.folder.viewpoint
+        entries, output = self.project.inputs.viewpoint, self.project.folder.viewpoint
         self.box.run(partial(solve_viewpoint, self.panel.shots, entries, output), self._show_solved)
 
     def show_known(self) -> None:
         """Show whether there are intrinsics."""
         self.box.show_origin(None)
-        file = self.draft.camera_file
+        file = self.project.camera_file
         if file.exists():
             self.box.show_finding(Finding("", Health.GOOD, f"the intrinsics are in {file}"))
 
     def _show_solved(self, solved: Solved) -> None:
         is_bad = solved.verdict.name == "bad"
         kept = "it is not used" if is_bad else "the displays are calibrated with it"
-        self.draft.camera_solved()
+        self.project.camera_solved()
         self.box.show_solved(solved, kept)
         self.panel.show_solved(solved)
 
     def _take(self) -> None:
-        folder = self.draft.folder.path / "viewpoint"
+        folder = self.project.folder.path / "viewpoint"
         self.take_images(
             {"Viewpoint camera": folder},
-            self.draft.work.board,
+            self.project.inputs.board,
             self.panel,
             lambda: self.form.enter(images=str(folder)),
         )

@@ -24,11 +24,11 @@ from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, named
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
-from handcal_gui.windows.rig.draft import Draft
+from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
 from handcal_gui.windows.rig.stereo_page import StereoPage
 from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
-from handcal_gui.windows.rig.work import WorkFolder
 
 _FIRST_SIZE = QSize(1240, 760)
 _RAIL_PX = 29 * SPACING_PX
@@ -45,7 +45,7 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
 
 
 class Page(Protocol):
-    """What the wizard asks of a page."""
+    """A page as the wizard needs it."""
 
     def enter(self) -> None:
         """Come into sight."""
@@ -59,7 +59,7 @@ class RigWizard(QDialog):
 
     Parameters
     ----------
-    folder : WorkFolder
+    folder : ProjectFolder
         A later wizard goes on from there.
     realsense : RealSenseSettings, optional
         How one is run that images are taken with.
@@ -68,33 +68,33 @@ class RigWizard(QDialog):
     ----------
     rig_saved : Signal(Path)
         A rig file to be used for the next calibration.
-    draft : Draft
+    project : RigProject
     """
 
     rig_saved = Signal(object)
 
     def __init__(
         self,
-        folder: WorkFolder,
+        folder: ProjectFolder,
         parent: QWidget | None = None,
         realsense: RealSenseSettings | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
         self.setWindowTitle("Calibrate a rig")
-        self.draft = Draft(folder, realsense or RealSenseSettings(), self)
+        self.project = RigProject(folder, realsense or RealSenseSettings(), self)
         self._banner = Banner()
         self._rail = named(QListWidget(), "rigRail", "Steps")
         self._title, self._purpose = QLabel(), QLabel()
         self._stack = QStackedWidget()
-        result = ResultPage(self.draft)
+        result = ResultPage(self.project)
         self._pages: list[Page] = []
         for page in (
-            BoardPage(self.draft),
-            StereoPage(self.draft),
-            ViewpointPage(self.draft),
-            DisplayPage(self.draft, "left"),
-            DisplayPage(self.draft, "right"),
+            BoardPage(self.project),
+            StereoPage(self.project),
+            ViewpointPage(self.project),
+            DisplayPage(self.project, "left"),
+            DisplayPage(self.project, "right"),
             result,
         ):
             self._stack.addWidget(page)
@@ -109,10 +109,10 @@ class RigWizard(QDialog):
         self._back.clicked.connect(lambda: self.show_step(self.step - 1))
         self._next.clicked.connect(lambda: self.show_step(self.step + 1))
         self._close.clicked.connect(self.accept)
-        self.draft.rig_changed.connect(self._refresh)
-        self.draft.failed.connect(self._banner.show_message)
+        self.project.rig_changed.connect(self._refresh)
+        self.project.failed.connect(self._banner.show_message)
         result.rig_saved.connect(self.rig_saved)
-        self._banner.show_message(self.draft.complaint)
+        self._banner.show_message(self.project.complaint)
         screen = QGuiApplication.primaryScreen().availableSize()
         self.resize(screen.boundedTo(_FIRST_SIZE))
         self._refresh()
@@ -136,7 +136,7 @@ class RigWizard(QDialog):
         """Keep everything, end what runs, and close."""
         for page in self._pages:
             page.stop()
-        self.draft.save()
+        self.project.save()
         super().done(result)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -172,14 +172,14 @@ class RigWizard(QDialog):
 
     def _verdict(self, title: str) -> str:
         """Return how a step ended; empty if it has not."""
-        origins = self.draft.rig.origins
+        origins = self.project.rig.origins
         part = _STEPS[title][1]
         if part is not None:
             return origins[part].verdict if part in origins else ""
         if title == "Board":
             return "good"
         if title == "Viewpoint camera":
-            return self.draft.camera_verdict
+            return self.project.camera_verdict
         verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
         return "good" if verdicts == {"good"} else ""
 

@@ -11,6 +11,7 @@ from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.lab.evaluate.cube import CubeMisalignment
 from handcal.lab.evaluate.cube_test import cube_row, judge_captures
+from handcal.progress import Progress
 from handcal.rig.cube import Cube
 from handcal.rig.example import example_rig
 from handcal.rig.grid import Grid, draw_grid
@@ -128,8 +129,8 @@ def test_it_can_be_given_up(tmp_path: Path) -> None:
     write_cube_seen(tmp_path / "a" / "1" / "virtual.png", T_E_T)
 
     def give_up(what: str, share: float) -> None:
-        assert (what, share) == ("a/1", 0.0)
+        assert (what, share) == ("Looking at a/1", 0.0)
         raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
-        judge_captures(tmp_path, CUBE, CAMERA, GRID, give_up)
+        judge_captures(tmp_path, CUBE, CAMERA, GRID, Progress(give_up))

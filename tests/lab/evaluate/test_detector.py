@@ -10,6 +10,7 @@ from handcal.lab.evaluate.annotations import Photo
 from handcal.lab.evaluate.contact_sheet import contact_sheet, write_contact_sheet
 from handcal.lab.evaluate.detector import detect_all, evaluation, summary
 from handcal.lab.evaluate.precision import ImageResult
+from handcal.progress import Progress
 from handcal.types import Float64, UInt8
 
 SMALL, LARGE = [10.0, 10.0, 20.0, 20.0], [30.0, 20.0, 70.0, 60.0]
@@ -57,7 +58,7 @@ def test_no_hand_no_number(photo: Photo) -> None:
 
 def test_runs_the_detector_on_every_photograph(photo: Photo) -> None:
     shares: list[float] = []
-    results = detect_all([photo, photo], Seer(), shares.append)
+    results = detect_all([photo, photo], Seer(), Progress(lambda _, share: shares.append(share)))
     assert [result.boxes.tolist() for result in results] == [[LARGE], [LARGE]]
     assert shares == [0.5, 1.0]
 

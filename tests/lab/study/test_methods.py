@@ -24,6 +24,7 @@ from handcal.lab.study.run import Case
 from handcal.lab.study.store import Row
 from handcal.lab.study.wearer_noise import PAPER_MEAN_ARCMIN, fit_noise
 from handcal.lab.study.wearers import align_cube, align_points
+from handcal.progress import Progress
 from handcal.types import EYES
 
 ERRORLESS = MethodSettings(
@@ -154,12 +155,13 @@ def test_the_noise_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
         return np.array([5.0 + 4.0 * settings.noise_scale + wearer])
 
     monkeypatch.setattr(wearer_noise, "_errors_arcmin", grows)
-    told: list[float] = []
-    found = fit_noise(MethodSettings(), 3, lambda scale, _mean: told.append(scale))
+    told: list[str] = []
+    found = fit_noise(MethodSettings(), 3, Progress(lambda what, _share: told.append(what)))
     assert found.scale == pytest.approx((PAPER_MEAN_ARCMIN - 6.0) / 4.0, abs=0.02)
     assert found.mean_arcmin == pytest.approx(PAPER_MEAN_ARCMIN, abs=0.1)
     assert found.sd_arcmin == pytest.approx(1.0)
-    assert sorted(set(told)) == list(found.mean_by_scale)
+    shown = [f"Noise {scale:.2f}: {mean:.1f}′" for scale, mean in found.mean_by_scale.items()]
+    assert sorted(told) == sorted(shown)
 
 
 def test_noise_that_cannot_explain_the_paper_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

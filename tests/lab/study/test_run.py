@@ -14,6 +14,7 @@ import pytest
 from handcal.errors import CancelledError, FileError, HandcalError
 from handcal.lab.study.run import Case, Study, run_study, share_done
 from handcal.lab.study.store import Row
+from handcal.progress import Progress
 from tests.helpers import ROOT
 
 CASES, MIDDLE = 90, 45
@@ -122,7 +123,9 @@ def cancel_after(calls: int) -> Callable[[], bool]:
 def test_rows_come_in_the_order_of_the_cases(tmp_path: Path) -> None:
     study = make_study()
     shares: list[float] = []
-    rows = run_study(study, tmp_path, workers=1, progress=shares.append)
+    rows = run_study(
+        study, tmp_path, workers=1, progress=Progress(lambda _what, share: shares.append(share))
+    )
     assert rows == [row for case in study.cases for row in trial(study.settings, case)]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -158,7 +161,9 @@ def test_cancelling_gives_up_what_other_processes_are_at(tmp_path: Path) -> None
     study = replace(make_study(Settings(log=str(begun))), trial=sleep)
     before = set(multiprocessing.active_children())
     with pytest.raises(CancelledError):
-        run_study(study, tmp_path / "study", workers=2, is_cancelled=begun.exists)
+        run_study(
+            study, tmp_path / "study", workers=2, progress=Progress(is_cancelled=begun.exists)
+        )
     assert set(multiprocessing.active_children()) == before
 
 
@@ -175,8 +180,13 @@ def test_how_much_of_a_study_is_done_is_told_without_a_trace(tmp_path: Path) -> 
 def test_a_cancelled_study_goes_on(tmp_path: Path) -> None:
     log = tmp_path / "log"
     study = make_study(Settings(log=str(log)))
-    with pytest.raises(CancelledError, match="to go on with it"):
-        run_study(study, tmp_path / "study", workers=1, is_cancelled=cancel_after(CASES // 2))
+    with pytest.raises(CancelledError, match="to resume it"):
+        run_study(
+            study,
+            tmp_path / "study",
+            workers=1,
+            progress=Progress(is_cancelled=cancel_after(CASES // 2)),
+        )
     began = len(log_lines(log))
     kept = len(list((tmp_path / "study" / "chunks").iterdir()))
     assert 0 < kept < 30

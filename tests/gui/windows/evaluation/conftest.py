@@ -13,14 +13,16 @@ from matplotlib.axes import Axes
 from PySide6.QtWidgets import QWidget
 
 from handcal.errors import HandcalError
+from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import Row
+from handcal.lab.study.studies import StudyResult, run_and_report
+from handcal.progress import Progress
 from handcal.report.document import Column, Figure, Report, Section, Table
-from handcal_gui.evaluation_entries import NoiseEntries
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import whole_number
 from handcal_gui.widgets.path_field import PathField
-from handcal_gui.windows.evaluation.evaluation_page import Offer
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.work import SimulatedStudy
 
 CASES = 10
@@ -42,15 +44,18 @@ class Numbers:
 
     @property
     def work(self) -> SimulatedStudy:
-        return SimulatedStudy(self._study, self._describe)
+        return SimulatedStudy(self.study, self._order)
 
     @property
-    def offer(self) -> Offer:
-        return Offer("Numbers", "What are their squares?", self.work, make_form)
+    def spec(self) -> EvaluationSpec:
+        return EvaluationSpec("Numbers", "What are their squares?", self.work, make_form)
 
-    def _study(self, entries: NoiseEntries) -> Study:
+    def study(self, entries: NoiseStudySettings) -> Study:
         cases: list[Case] = [{"number": number} for number in range(CASES)]
         return Study("numbers", Settings(entries.seed), cases, self._square)
+
+    def _order(self, entries: NoiseStudySettings, progress: Progress) -> StudyResult:
+        return run_and_report(self.study(entries), self._describe, entries, progress)
 
     def _square(self, _settings: Any, case: Case) -> list[Row]:
         number = int(case["number"])
@@ -90,5 +95,5 @@ def numbers() -> Iterator[Numbers]:
 
 
 @pytest.fixture
-def entries(tmp_path: Path) -> NoiseEntries:
-    return NoiseEntries(processes=1, output=str(tmp_path / "numbers"))
+def entries(tmp_path: Path) -> NoiseStudySettings:
+    return NoiseStudySettings(processes=1, output=str(tmp_path / "numbers"))

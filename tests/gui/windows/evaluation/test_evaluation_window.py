@@ -13,8 +13,9 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
+from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.lab.study.run import run_study
-from handcal_gui.evaluation_entries import EvaluationEntries, MethodEntries, NoiseEntries
+from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 
@@ -42,7 +43,7 @@ class Student:
 
     @property
     def found(self) -> str:
-        return self.child(QLabel, "standingFound").text()
+        return self.child(QLabel, "readinessFound").text()
 
     @property
     def button(self) -> QPushButton:
@@ -66,11 +67,11 @@ class Student:
 
 
 @pytest.fixture
-def student(qtbot: QtBot, numbers: Any, entries: NoiseEntries) -> Iterator[Student]:
+def student(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[Student]:
     """Show two evaluations of the same study."""
-    others = MethodEntries(processes=1, output=f"{entries.output}-others")
-    offers = {"noise": numbers.offer, "methods": replace(numbers.offer, title="Others")}
-    window = EvaluationWindow(offers, EvaluationEntries(noise=entries, methods=others))
+    others = MethodComparisonSettings(processes=1, output=f"{entries.output}-others")
+    specs = {"noise": numbers.spec, "methods": replace(numbers.spec, title="Others")}
+    window = EvaluationWindow(specs, EvaluationEntries(noise=entries, methods=others))
     qtbot.addWidget(window)
     window.show()
     yield Student(qtbot, window)
@@ -79,7 +80,7 @@ def student(qtbot: QtBot, numbers: Any, entries: NoiseEntries) -> Iterator[Stude
 
 
 def test_a_study_runs_to_its_end(
-    student: Student, entries: NoiseEntries, monkeypatch: pytest.MonkeyPatch
+    student: Student, entries: NoiseStudySettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     student.press("Run")
     student.wait_for_text("Done")
@@ -109,16 +110,16 @@ def test_a_study_is_cancelled_and_goes_on(numbers: Any, student: Student) -> Non
     assert student.remembered[-1] == student.window.entries
     student.child(QPushButton, "cancel").click()
     numbers.may_go_on.set()
-    student.wait_for_text("of this study. What is done is not done again.")
+    student.wait_for_text("of this study. Completed trials are kept.")
     assert not student.child(QPushButton, "openPdf").isVisible()
-    student.press("Go on")
+    student.press("Resume")
     student.wait_for_text("Done")
     assert numbers.squared.count(0) == 1
     assert set(numbers.squared) == set(range(10))
 
 
 def test_a_folder_of_another_study_is_told(
-    numbers: Any, student: Student, entries: NoiseEntries
+    numbers: Any, student: Student, entries: NoiseStudySettings
 ) -> None:
     run_study(numbers.work.study(entries), Path(entries.output), workers=1)
     student.enter(seed=5)
@@ -154,7 +155,7 @@ def test_one_runs_at_a_time(numbers: Any, student: Student) -> None:
 
 
 def test_closing_cancels_and_remembers(
-    numbers: Any, student: Student, entries: NoiseEntries
+    numbers: Any, student: Student, entries: NoiseStudySettings
 ) -> None:
     numbers.pauses_at = 3
     chunks = Path(entries.output, "chunks")

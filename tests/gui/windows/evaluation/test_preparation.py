@@ -11,23 +11,24 @@ import pytest
 from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.evaluation_entries import EvaluationEntries, NoiseEntries
+from handcal.lab.settings import NoiseStudySettings
+from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationDialog
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 
 
 class ScenarioDialog(PreparationDialog):
-    def __init__(self, entries: NoiseEntries, parent: QWidget) -> None:
+    def __init__(self, entries: NoiseStudySettings, parent: QWidget) -> None:
         super().__init__(parent)
         self.entries = entries
 
 
 @pytest.fixture
-def window(qtbot: QtBot, numbers: Any, entries: NoiseEntries) -> Iterator[EvaluationWindow]:
+def window(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[EvaluationWindow]:
     """Show an evaluation that can be prepared with a seed other than 0."""
     preparation = Preparation("Prepare…", "Do.", lambda one: one.seed != 0, ScenarioDialog)
-    offers = {"noise": replace(numbers.offer, preparation=preparation)}
-    window = EvaluationWindow(offers, EvaluationEntries(noise=entries))
+    specs = {"noise": replace(numbers.spec, preparation=preparation)}
+    window = EvaluationWindow(specs, EvaluationEntries(noise=entries))
     qtbot.addWidget(window)
     window.show()
     yield window
@@ -57,7 +58,7 @@ def test_it_is_offered_where_the_entries_suffice(window: EvaluationWindow) -> No
 
 
 def test_what_was_prepared_is_looked_at_anew(
-    qtbot: QtBot, window: EvaluationWindow, entries: NoiseEntries, tmp_path: Path
+    qtbot: QtBot, window: EvaluationWindow, entries: NoiseStudySettings, tmp_path: Path
 ) -> None:
     run = window.findChild(QPushButton, "run")
     assert isinstance(run, QPushButton)
@@ -72,7 +73,7 @@ def test_what_was_prepared_is_looked_at_anew(
 
 
 def test_it_closes_with_the_window_which_remembers_it(
-    window: EvaluationWindow, entries: NoiseEntries
+    window: EvaluationWindow, entries: NoiseStudySettings
 ) -> None:
     remembered: list[EvaluationEntries] = []
     window.remembered.connect(remembered.append)

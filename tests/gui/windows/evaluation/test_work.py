@@ -9,22 +9,22 @@ from typing import Any
 import pytest
 
 from handcal.errors import CancelledError, FileError
+from handcal.lab.evaluate.run import UserTestRun
+from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import run_study
+from handcal.progress import Progress
 from handcal.report.document import Report
+from handcal.report.write import write_report
 from handcal.station.doctor import Health
-from handcal_gui.evaluation_entries import NoiseEntries, UserEntries
-from handcal_gui.windows.evaluation.work import Checkpoint, GivenData
+from handcal_gui.evaluation_entries import UserEntries
+from handcal_gui.windows.evaluation.work import GivenData
 
 
-def never() -> bool:
-    return False
-
-
-def test_a_study_is_done_and_told(numbers: Any, entries: NoiseEntries) -> None:
+def test_a_study_is_done_and_told(numbers: Any, entries: NoiseStudySettings) -> None:
     told: list[tuple[str, float]] = []
-    assert numbers.work.standing(entries).button == "Run"
+    assert numbers.work.readiness(entries).button == "Run"
     assert not Path(entries.output).exists()
-    outcome = numbers.work.run(entries, lambda *one: told.append(one), never)
+    outcome = numbers.work.run(entries, Progress(lambda *one: told.append(one)))
     assert outcome.report.lead == "Squares grow."
     assert (outcome.folder / "report.pdf").exists()
     (picture,) = outcome.pictures
@@ -34,39 +34,43 @@ def test_a_study_is_done_and_told(numbers: Any, entries: NoiseEntries) -> None:
     assert told[0] == ("0 of 10 cases", 0.0)
     assert told[10][0] == "10 of 10 cases, less than a minute left"
     assert told[-1] == ("Writing the report", 1.0)
-    assert numbers.work.standing(entries).button == "Show results"
+    assert numbers.work.readiness(entries).button == "Show results"
 
 
-def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseEntries) -> None:
+def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseStudySettings) -> None:
     shares: list[float] = []
     with pytest.raises(CancelledError):
         numbers.work.run(
-            entries, lambda _doing, share: shares.append(share), lambda: len(shares) > 4
+            entries,
+            Progress(lambda _doing, share: shares.append(share), lambda: len(shares) > 4),
         )
-    standing = numbers.work.standing(entries)
-    assert standing.button == "Go on"
-    assert standing.finding.found.endswith("holds 40 % of this study")
+    readiness = numbers.work.readiness(entries)
+    assert readiness.button == "Resume"
+    assert readiness.finding.found.endswith("holds 40 % of this study")
     with pytest.raises(FileError, match="holds another study"):
-        numbers.work.standing(replace(entries, seed=2))
+        numbers.work.readiness(replace(entries, seed=2))
     with pytest.raises(FileError, match="choose a folder"):
-        numbers.work.standing(replace(entries, output=""))
+        numbers.work.readiness(replace(entries, output=""))
 
 
-def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseEntries) -> None:
-    def describe(_entries: Any, checkpoint: Checkpoint) -> Report:
-        checkpoint("Reading", 1.0)
-        return Report("Data", "given", "Read.", [])
+def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySettings) -> None:
+    def order(given: UserEntries, progress: Progress) -> UserTestRun:
+        progress.at(0.7, "Reading")
+        report = Report("Data", "given", "Read.", [])
+        files = write_report(Path(given.output), report)
+        return UserTestRun(None, report, files)  # type: ignore[arg-type]
 
-    data = GivenData(lambda given: "" if given.sessions else "no sessions", describe)
+    data = GivenData(lambda given: "" if given.sessions else "no sessions", order)
     given = UserEntries(sessions="here", output=f"{entries.output}-data")
-    assert data.standing(replace(given, sessions="")).finding.health is Health.BROKEN
-    assert data.standing(given).can_run
+    assert data.readiness(replace(given, sessions="")).finding.health is Health.BROKEN
+    assert data.readiness(given).can_run
     told: list[tuple[str, float]] = []
-    assert data.run(given, lambda *one: told.append(one), never).report.title == "Data"
-    assert told[0] == ("Reading", 0.7)
-    assert "will be replaced" in data.standing(given).finding.found
+    outcome = data.run(given, Progress(lambda *one: told.append(one)))
+    assert (outcome.report.title, outcome.folder) == ("Data", Path(given.output))
+    assert told == [("Reading", 0.7)]
+    assert "will be replaced" in data.readiness(given).finding.found
     with pytest.raises(CancelledError):
-        data.run(given, lambda *_: None, lambda: True)
+        data.run(given, Progress(is_cancelled=lambda: True))
     run_study(numbers.work.study(entries), Path(entries.output), workers=1)
     with pytest.raises(FileError, match="holds a study"):
-        data.run(replace(given, output=entries.output), lambda *_: None, never)
+        data.readiness(replace(given, output=entries.output))

@@ -14,8 +14,13 @@ from PySide6.QtWidgets import QFileDialog
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
 from handcal.types import Intrinsics, UInt8
+from handcal_gui.windows.rig.project_folder import (
+    DisplayEntries,
+    RigInputs,
+    StereoEntries,
+    ViewpointEntries,
+)
 from handcal_gui.windows.rig.shots import read_color
-from handcal_gui.windows.rig.work import DisplayEntries, RigWork, StereoEntries, ViewpointEntries
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Photographs:
     """Where they are, as a technician would enter them, and the camera behind the display."""
 
     folder: Path
-    work: RigWork
+    work: RigInputs
     viewpoint: Intrinsics
 
     def image(self, folder: str) -> UInt8:
@@ -40,7 +45,7 @@ def photographs(tmp_path_factory: pytest.TempPathFactory) -> Photographs:
         assert cv2.imwrite(
             str(out / folder / f"{folder}-099.png"), np.full((360, 640), 100, np.uint8)
         )
-    work = RigWork(
+    work = RigInputs(
         board=BOARD,
         stereo=StereoEntries(str(out / "depth"), str(out / "headset")),
         viewpoint=ViewpointEntries(str(out / "viewpoint")),

@@ -16,25 +16,25 @@ from handcal.rig.rig_file import write_rig
 from handcal.types import Origin
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.board_page import BoardPage
-from handcal_gui.windows.rig.draft import Draft
-from handcal_gui.windows.rig.work import WorkFolder
+from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project_folder import ProjectFolder
 
 ORIGIN = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
 
 
 @pytest.fixture
-def draft(tmp_path: Path) -> Draft:
-    return Draft(WorkFolder(tmp_path / "work"), RealSenseSettings())
+def project(tmp_path: Path) -> RigProject:
+    return RigProject(ProjectFolder(tmp_path / "work"), RealSenseSettings())
 
 
 @pytest.fixture
-def page(qtbot: QtBot, draft: Draft) -> Iterator[BoardPage]:
-    page = BoardPage(draft)
+def page(qtbot: QtBot, project: RigProject) -> Iterator[BoardPage]:
+    page = BoardPage(project)
     qtbot.addWidget(page)
     page.show()
     yield page
     page.stop()
-    draft.save()
+    project.save()
 
 
 def found(page: BoardPage) -> str:
@@ -49,7 +49,9 @@ def press(page: BoardPage, name: str) -> None:
     button.click()
 
 
-def test_the_board_shown_is_the_one_entered(qtbot: QtBot, page: BoardPage, draft: Draft) -> None:
+def test_the_board_shown_is_the_one_entered(
+    qtbot: QtBot, page: BoardPage, project: RigProject
+) -> None:
     kind, columns = page.findChild(QComboBox, "kind"), page.findChild(QSpinBox, "columns")
     square = page.findChild(QDoubleSpinBox, "square")
     assert isinstance(kind, QComboBox)
@@ -59,19 +61,19 @@ def test_the_board_shown_is_the_one_entered(qtbot: QtBot, page: BoardPage, draft
     columns.setValue(12)
     square.setValue(24.9)
     expected = Board("checkerboard", (12, 7), 0.0249)
-    assert draft.work.board == expected
+    assert project.inputs.board == expected
     assert "11 × 6" in found(page)
     preview = page.findChild(ImageView)
     assert isinstance(preview, ImageView)
     qtbot.waitUntil(lambda: preview.has_image)
 
 
-def test_an_impossible_board_is_told_and_not_taken(page: BoardPage, draft: Draft) -> None:
+def test_an_impossible_board_is_told_and_not_taken(page: BoardPage, project: RigProject) -> None:
     marker = page.findChild(QDoubleSpinBox, "marker")
     assert isinstance(marker, QDoubleSpinBox)
     marker.setValue(25.0)
     assert "0.3 to 0.95" in found(page)
-    assert draft.work.board == Board()
+    assert project.inputs.board == Board()
 
 
 def test_the_board_is_saved(
@@ -91,7 +93,7 @@ def test_the_board_is_saved(
 
 def test_another_rig_is_begun_from(
     page: BoardPage,
-    draft: Draft,
+    project: RigProject,
     choose: Callable[[Path], None],
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
@@ -100,16 +102,16 @@ def test_another_rig_is_begun_from(
     write_rig(tmp_path / "ours.yaml", calibrated)
     choose(tmp_path / "ours.yaml")
     press(page, "begin")
-    assert draft.rig.name == "ours"
+    assert project.rig.name == "ours"
     # What is calibrated is not given up unasked.
     write_rig(tmp_path / "theirs.yaml", replace(example_rig(), name="theirs"))
     choose(tmp_path / "theirs.yaml")
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
     press(page, "begin")
-    assert draft.rig.name == "ours"
+    assert project.rig.name == "ours"
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
     press(page, "begin")
-    assert draft.rig.name == "theirs"
+    assert project.rig.name == "theirs"
     choose(tmp_path / "none.yaml")
     press(page, "begin")
     assert "none.yaml" in found(page)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QTreeWidget, QTreeWidgetItem
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.worst import WorstView
+from handcal.rig.views import WorstView
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.coverage_map import CoverageMap
 from handcal_gui.windows.rig.images_panel import ImagesPanel

@@ -17,10 +17,10 @@ from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from handcal_gui.windows.rig.wizard import RigWizard
-from handcal_gui.windows.rig.work import WorkFolder
 
 BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 
@@ -28,13 +28,13 @@ BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 @pytest.fixture
 def folder(photographs: Any, tmp_path: Path) -> Path:
     """A work folder with everything entered, but nothing solved."""
-    WorkFolder(tmp_path / "rig").save(photographs.work)
+    ProjectFolder(tmp_path / "rig").save(photographs.work)
     return tmp_path / "rig"
 
 
 @pytest.fixture
 def wizard(qtbot: QtBot, folder: Path) -> Iterator[RigWizard]:
-    wizard = RigWizard(WorkFolder(folder))
+    wizard = RigWizard(ProjectFolder(folder))
     qtbot.addWidget(wizard)
     wizard.show()
     yield wizard
@@ -95,11 +95,11 @@ def test_a_rig_is_calibrated_saved_and_used(
     np.testing.assert_array_equal(rig.eyes["right"].K, truth.eyes["right"].K)
     # Nothing of it is lost by closing.
     wizard.accept()
-    again = RigWizard(WorkFolder(folder))
+    again = RigWizard(ProjectFolder(folder))
     qtbot.addWidget(again)
     assert marks(again) == marks(wizard)
-    assert again.draft.rig.name == "Our headset"
-    assert again.draft.work == wizard.draft.work
+    assert again.project.rig.name == "Our headset"
+    assert again.project.inputs == wizard.project.inputs
 
 
 def test_an_image_is_dropped_and_taken_in_again(
@@ -109,9 +109,9 @@ def test_an_image_is_dropped_and_taken_in_again(
     item = child(wizard, QTreeWidget, "shots").topLevelItem(1)
     item.setCheckState(0, Qt.CheckState.Unchecked)
     assert "7 pairs" in solve(qtbot, wizard, STEREO)
-    assert wizard.draft.rig.origins["T_H_D"].views == 7
+    assert wizard.project.rig.origins["T_H_D"].views == 7
     wizard.accept()
-    assert WorkFolder(folder).load()[0].stereo.dropped == ("depth-002.png",)
+    assert ProjectFolder(folder).load()[0].stereo.dropped == ("depth-002.png",)
     wizard.show()
     item.setCheckState(0, Qt.CheckState.Checked)
     assert "8 pairs" in solve(qtbot, wizard, STEREO)
@@ -120,7 +120,7 @@ def test_an_image_is_dropped_and_taken_in_again(
 def test_what_cannot_be_solved_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
     assert "intrinsics are missing" in solve(qtbot, wizard, LEFT)
     assert "intrinsics are missing" in solve(qtbot, wizard, RIGHT)
-    assert not wizard.draft.rig.origins
+    assert not wizard.project.rig.origins
 
 
 def test_what_is_wrong_with_images_is_named(
@@ -137,7 +137,7 @@ def test_what_is_wrong_with_images_is_named(
         assert isinstance(page, StepPage)
         page.form.enter(**{name: value for name, value in fields.items() if "dropped" not in name})
         assert said in solve(qtbot, wizard, step)
-    assert not wizard.draft.rig.origins
+    assert not wizard.project.rig.origins
 
 
 def test_another_board_is_looked_for_anew(qtbot: QtBot, wizard: RigWizard) -> None:
@@ -146,7 +146,7 @@ def test_another_board_is_looked_for_anew(qtbot: QtBot, wizard: RigWizard) -> No
     page = wizard.page
     assert isinstance(page, StepPage)
     assert all(not shot.problem for shot in page.panels[0].shots)
-    wizard.draft.enter(board=Board(squares=(5, 4), square_m=0.03))
+    wizard.project.enter(board=Board(squares=(5, 4), square_m=0.03))
     wizard.show_step(BOARDS)
     wizard.show_step(VIEWPOINT)
     wait(qtbot, wizard)
@@ -187,7 +187,7 @@ def test_a_name_being_typed_is_kept_when_another_step_is_shown(wizard: RigWizard
     wizard.show_step(BOARDS)
     wizard.show_step(RESULT)
     assert child(wizard, QLineEdit, "rigName").text() == "Our headset"
-    assert wizard.draft.rig.name == "Our headset"
+    assert wizard.project.rig.name == "Our headset"
 
 
 def test_a_grid_that_has_no_room_is_told(qtbot: QtBot, wizard: RigWizard) -> None:

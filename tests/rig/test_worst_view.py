@@ -4,7 +4,8 @@ import numpy as np
 
 from handcal.geometry import rigid
 from handcal.rig.board import Board, BoardView
-from handcal.rig.worst import rms, worst_view
+from handcal.rig.fit import rms
+from handcal.rig.views import worst_view
 from handcal.sim.boards import board_view
 from handcal.types import Float64, Intrinsics
 

@@ -1,63 +1,56 @@
-"""The four evaluations that the window offers."""
+"""Specifications of the four evaluations in the window."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
 from handcal.lab.evaluate.cube_folder import find_captures
-from handcal.lab.evaluate.user_test import evaluate_user_test, read_user_test
-from handcal.lab.evaluate.user_test_report import user_test_report
-from handcal.lab.study.methods import MethodSettings, methods_study
-from handcal.lab.study.methods_report import methods_report
-from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
-from handcal.lab.study.noise_report import noise_report
-from handcal.lab.study.run import Study
-from handcal.report.document import Report
-from handcal.types import EYES
-from handcal_gui.evaluation_entries import (
-    CubeEntries,
-    MethodEntries,
-    NoiseEntries,
-    UserEntries,
+from handcal.lab.evaluate.run import run_cube_test, run_user_test
+from handcal.lab.study.studies import (
+    method_cases,
+    noise_cases,
+    run_method_comparison,
+    run_noise_study,
 )
+from handcal.types import EYES
+from handcal_gui.evaluation_entries import CubeEntries, UserEntries
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import choice, named, whole_number
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
-from handcal_gui.windows.evaluation.cube import evaluate_cube
-from handcal_gui.windows.evaluation.evaluation_page import Offer
+from handcal_gui.windows.evaluation.capture_dialog import MOST_POSES, CaptureDialog
+from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.preparation import Preparation
-from handcal_gui.windows.evaluation.work import Checkpoint, GivenData, SimulatedStudy
+from handcal_gui.windows.evaluation.work import GivenData, SimulatedStudy
 
 _MOST_WEARERS, _MOST_SEED, _MOST_PROCESSES = 10_000, 2**31 - 1, 1024
+_MOST_ALIGNMENTS = 20
 
 
-def make_offers() -> Mapping[str, Offer]:
+def make_specs() -> Mapping[str, EvaluationSpec]:
     """Return them by the fields of `EvaluationEntries`."""
     return {
-        "noise": Offer(
+        "noise": EvaluationSpec(
             "Noise study",
-            "How much rotation and noise do the solvers bear, and when do they leave the paper's "
-            "4 mm? About ten minutes on two cores; a quick look, half a minute.",
-            SimulatedStudy(_noise, noise_report),
+            "How much rotation and noise do the solvers tolerate before their error exceeds the "
+            "paper's 4 mm? About ten minutes on two cores; a quick run, half a minute.",
+            SimulatedStudy(noise_cases, run_noise_study),
             _noise_form,
         ),
-        "methods": Offer(
+        "methods": EvaluationSpec(
             "Method comparison",
             "Which calibration method errs least on the same wearers, and what does it cost them? "
             "100 wearers take about eleven minutes on two cores.",
-            SimulatedStudy(_methods, methods_report),
+            SimulatedStudy(method_cases, run_method_comparison),
             _methods_form,
         ),
-        "cube": Offer(
+        "cube": EvaluationSpec(
             "Cube test",
             "How far is a drawn cube from the real one, as a camera in the eye's place sees it? "
             "About a minute with rendered captures.",
-            GivenData(_missing_captures, evaluate_cube),
+            GivenData(_missing_captures, run_cube_test),
             _cube_form,
             Preparation(
                 "Capture…",
@@ -66,23 +59,17 @@ def make_offers() -> Mapping[str, Offer]:
                 CaptureDialog,
             ),
         ),
-        "users": Offer(
+        "users": EvaluationSpec(
             "User test",
             "How far do calibrations miss what their wearers see, over all trials of their "
             "sessions? A few seconds.",
-            GivenData(_missing_sessions, _users),
+            GivenData(
+                _missing_sessions,
+                lambda entries, progress: run_user_test(entries.settings, progress),
+            ),
             _users_form,
         ),
     }
-
-
-def _noise(entries: NoiseEntries) -> Study:
-    chosen = QUICK_NOISE if entries.size == "quick" else NoiseSettings()
-    return noise_study(replace(chosen, seed=entries.seed))
-
-
-def _methods(entries: MethodEntries) -> Study:
-    return methods_study(MethodSettings(wearers=entries.wearers, seed=entries.seed))
 
 
 def _missing_captures(entries: CubeEntries) -> str:
@@ -99,25 +86,19 @@ def _missing_sessions(entries: UserEntries) -> str:
     return "" if entries.sessions else "choose a session, or a folder of sessions"
 
 
-def _users(entries: UserEntries, checkpoint: Checkpoint) -> Report:
-    folder = Path(entries.sessions).expanduser()
-    test = read_user_test([folder], lambda share: checkpoint("Reading sessions", share))
-    return user_test_report(test, evaluate_user_test(test))
-
-
 def _noise_form() -> EntriesForm:
     size = choice(
         "size",
         "Size",
-        {"full": "Full", "quick": "Quick look"},
-        "A quick look's numbers say little.",
+        {"full": "Full", "quick": "Quick"},
+        "A quick run uses few trials; do not report its numbers.",
     )
     return EntriesForm({"size": ("Size", size), **_study_fields()})
 
 
 def _methods_form() -> EntriesForm:
     wearers = whole_number(
-        "wearers", 2, _MOST_WEARERS, "Simulated wearers, each of whom does all methods."
+        "wearers", 2, _MOST_WEARERS, "Simulated wearers; each uses every method."
     )
     return EntriesForm({"wearers": ("Wearers", wearers), **_study_fields()})
 
@@ -131,6 +112,12 @@ def _cube_form() -> EntriesForm:
     rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "The example's")
     square = whole_number("square", 20, 2000, "Side of the squares of the grid on the display.")
     square.setSuffix(" px")
+    poses = whole_number(
+        "poses", 1, MOST_POSES, "Poses of the cube at each position, rendered or to be captured."
+    )
+    alignments = whole_number(
+        "alignments", 1, _MOST_ALIGNMENTS, "Alignments of the hand at each position, if rendered."
+    )
     return EntriesForm(
         {
             "captures": ("Captures", captures),
@@ -141,6 +128,8 @@ def _cube_form() -> EntriesForm:
             "eye": ("Display", choice("eye", "Display", {eye: eye.capitalize() for eye in EYES})),
             "square_px": ("Grid's squares", square),
             "seed": ("Seed of the rendering", _seed()),
+            "poses": ("Poses at each position", poses),
+            "alignments": ("Alignments at each", alignments),
         }
     )
 
@@ -153,9 +142,12 @@ def _users_form() -> EntriesForm:
 
 def _study_fields() -> dict[str, tuple[str, QWidget]]:
     processes: QSpinBox = whole_number(
-        "processes", 0, _MOST_PROCESSES, "On this computer; more than its cores are no quicker."
+        "processes",
+        0,
+        _MOST_PROCESSES,
+        "On this computer; more than its cores are not faster.",
     )
-    processes.setSpecialValueText("One a core")
+    processes.setSpecialValueText("One per core")
     scheduler = named(
         QLineEdit(placeholderText="None: this computer", clearButtonEnabled=True),
         "scheduler",
@@ -171,10 +163,10 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
 
 
 def _seed() -> QSpinBox:
-    return whole_number("seed", 0, _MOST_SEED, "Of all that is random: the same, the same numbers.")
+    return whole_number("seed", 0, _MOST_SEED, "Random seed; the same seed gives the same numbers.")
 
 
 def _output() -> dict[str, tuple[str, QWidget]]:
     output = PathField("Results folder", "folder")
-    output.setToolTip("Report, figures and raw numbers; a study that is not done goes on there.")
+    output.setToolTip("Report, figures and raw numbers; an unfinished study there is resumed.")
     return {"output": ("Results folder", output)}

@@ -1,4 +1,4 @@
-"""The rig that the wizard's pages work on, kept in the work folder as it changes."""
+"""The rig that the wizard's pages calibrate, stored in the project folder as it changes."""
 
 from __future__ import annotations
 
@@ -14,46 +14,46 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
+from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve import Solved
-from handcal_gui.windows.rig.work import WorkFolder
 
 _SETTLE_MS = 500
 
 
-class Draft(QObject):
-    """Entries and rig, which the pages change.
+class RigProject(QObject):
+    """The entries and the rig, which the pages change.
 
     Parameters
     ----------
-    folder : WorkFolder
+    folder : ProjectFolder
     realsense : RealSenseSettings
 
     Attributes
     ----------
-    folder : WorkFolder
+    folder : ProjectFolder
     realsense : RealSenseSettings
-        How one is run that images are taken with.
-    work : RigWork
+        Settings of a RealSense that takes images.
+    inputs : RigInputs
     rig : Rig
         As far as it is calibrated.
     complaint : str
-        What could not be read; empty if nothing.
+        Message about files that could not be read; empty if there is none.
     rig_changed : Signal()
         Another rig, or other intrinsics of the viewpoint camera.
     failed : Signal(str)
-        It could not be kept.
+        The entries could not be saved.
     """
 
     rig_changed = Signal()
     failed = Signal(str)
 
     def __init__(
-        self, folder: WorkFolder, realsense: RealSenseSettings, parent: QObject | None = None
+        self, folder: ProjectFolder, realsense: RealSenseSettings, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
         self.folder = folder
         self.realsense = realsense
-        self.work, of_entries = folder.load()
+        self.inputs, of_entries = folder.load()
         self.rig, of_rig = folder.load_rig()
         self.complaint = " ".join(filter(None, (of_entries, of_rig)))
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
@@ -61,15 +61,15 @@ class Draft(QObject):
 
     @property
     def camera_file(self) -> Path:
-        """Where the viewpoint camera's intrinsics are, once they are known."""
-        given = self.work.viewpoint.intrinsics
+        """File of the viewpoint camera's intrinsics, once they are known."""
+        given = self.inputs.viewpoint.intrinsics
         return Path(given).expanduser() if given else self.folder.viewpoint
 
     @property
     def camera_verdict(self) -> str:
-        """How the viewpoint camera's calibration ended; empty if there is none.
+        """Verdict on the viewpoint camera's calibration; empty if there is none.
 
-        A file that tells no verdict is taken to be good.
+        A file without a verdict counts as good.
         """
         file = self.camera_file
         if not file.exists():
@@ -80,18 +80,18 @@ class Draft(QObject):
         return "good"  # OpenCV's or ROS's
 
     def enter(self, **changes: Any) -> None:
-        """Take fields of `RigWork`."""
-        work = replace(self.work, **changes)
-        if work != self.work:
-            self.work = work
+        """Replace fields of `RigInputs`."""
+        inputs = replace(self.inputs, **changes)
+        if inputs != self.inputs:
+            self.inputs = inputs
             self._settle.start()
 
     def begin_from(self, path: Path) -> None:
-        """Begin from a rig file, or raise HandcalError; what was calibrated before is given up."""
+        """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""
         self.take_rig(read_rig(path))
 
     def take_part(self, solved: Solved) -> str:
-        """Put a calibrated part into the rig; return what became of it, for a person to read."""
+        """Put a calibrated part into the rig; return the outcome as a message."""
         if solved.put is None:
             return "it was not put into the rig"
         try:
@@ -101,7 +101,7 @@ class Draft(QObject):
         return "it is in the rig now"
 
     def camera_solved(self) -> None:
-        """Say that the viewpoint camera's intrinsics may be others now."""
+        """Announce that the viewpoint camera's intrinsics may have changed."""
         self.rig_changed.emit()
 
     def take_rig(self, rig: Rig) -> None:
@@ -109,14 +109,14 @@ class Draft(QObject):
         try:
             self.folder.save_rig(rig)
         except ValueError as error:
-            raise HandcalError(f"this is no plausible rig: {error}") from error
+            raise HandcalError(f"this rig is not plausible: {error}") from error
         self.rig = rig
         self.rig_changed.emit()
 
     def save(self) -> None:
-        """Keep the entries."""
+        """Save the entries."""
         self._settle.stop()
         try:
-            self.folder.save(self.work)
+            self.folder.save(self.inputs)
         except FileError as error:
-            self.failed.emit(f"What was entered cannot be kept: {error}")
+            self.failed.emit(f"The entries cannot be saved: {error}")

@@ -1,4 +1,4 @@
-"""What was entered in the rig wizard, and the folder that keeps it from one opening to the next."""
+"""The entries of the rig wizard, and the folder that stores them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from handcal.rig.board import Board
 from handcal.rig.camera import LensModel
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig.steps import DisplayInputs
 from handcal.types import Rig
 
 Distance: TypeAlias = Literal["measured", "solved"]
@@ -22,7 +23,7 @@ Distance: TypeAlias = Literal["measured", "solved"]
 
 @dataclass(frozen=True, slots=True)
 class StereoEntries:
-    """What the pose of the depth camera is solved from; paths, empty where there is none."""
+    """Inputs of the depth camera's pose; paths are empty where there is none."""
 
     depth_images: str = ""
     headset_images: str = ""
@@ -42,7 +43,7 @@ class StereoEntries:
 
 @dataclass(frozen=True, slots=True)
 class ViewpointEntries:
-    """What the viewpoint camera's intrinsics are solved from, or the file that has them."""
+    """Inputs of the viewpoint camera's intrinsics, or the file that has them."""
 
     images: str = ""
     intrinsics: str = ""
@@ -52,7 +53,7 @@ class ViewpointEntries:
 
 @dataclass(frozen=True, slots=True)
 class DisplayEntries:
-    """What one eye's display is calibrated from."""
+    """Inputs of one eye's display calibration."""
 
     grid_images: str = ""
     """Folder of images of the grid on the display."""
@@ -67,7 +68,7 @@ class DisplayEntries:
     view: str = ""
     """File of T_V_H, as the headset reports it; that of the rig if empty."""
     distance: Distance = "measured"
-    """How z(C0→S) is known: as `distance_m`, or from what a square subtends."""
+    """Source of z(C0→S): `distance_m`, or the angle that a square subtends."""
     distance_m: float = 2.0
     square_arcmin: float = 112.0
     nominal_m: float = 2.0
@@ -75,9 +76,20 @@ class DisplayEntries:
     dropped_grid: tuple[str, ...] = ()
     dropped_board: tuple[str, ...] = ()
 
+    @property
+    def inputs(self) -> DisplayInputs:
+        """The same as the calibration takes it."""
+        return DisplayInputs(
+            square_px=self.square_px,
+            distance_m=self.distance_m if self.distance == "measured" else None,
+            square_arcmin=self.square_arcmin,
+            nominal_m=self.nominal_m,
+            pose_V_H=entered_path(self.view),
+        )
+
 
 @dataclass(frozen=True, slots=True)
-class RigWork:
+class RigInputs:
     """Everything entered in the rig wizard."""
 
     board: Board = field(default_factory=Board)
@@ -88,8 +100,8 @@ class RigWork:
     right: DisplayEntries = field(default_factory=DisplayEntries)
 
 
-class WorkFolder:
-    """Keeps entries, images taken, and the rig as far as it is calibrated.
+class ProjectFolder:
+    """A folder that stores the entries, the images and the rig as far as it is calibrated.
 
     Parameters
     ----------
@@ -114,21 +126,21 @@ class WorkFolder:
         self._entries = path / "work.json"
         self._rig = path / "rig.yaml"
 
-    def load(self) -> tuple[RigWork, str]:
-        """Return the entries, and what went wrong for a person to read; empty if nothing did.
+    def load(self) -> tuple[RigInputs, str]:
+        """Return the entries, and a message about what went wrong; empty if nothing did.
 
         A file that cannot be used is kept beside, ending in ``.bad``.
         """
         if not self._entries.exists():
-            return RigWork(), ""
+            return RigInputs(), ""
         try:
-            return read_settings(RigWork, read_json(self._entries), "work"), ""
+            return read_settings(RigInputs, read_json(self._entries), "work"), ""
         except FileError as error:
-            return RigWork(), f"The entries start anew: {error}; {_set_aside(self._entries)}"
+            return RigInputs(), f"The entries were reset: {error}; {_set_aside(self._entries)}"
 
-    def save(self, work: RigWork) -> None:
+    def save(self, inputs: RigInputs) -> None:
         """Write the entries, or raise FileError."""
-        write_json(self._entries, settings_json(work))
+        write_json(self._entries, settings_json(inputs))
 
     def load_rig(self) -> tuple[Rig, str]:
         """Return the rig as far as it is calibrated, the example at first, and what went wrong."""
@@ -138,7 +150,7 @@ class WorkFolder:
         try:
             return read_rig(self._rig), ""
         except FileError as error:
-            return read_rig(example), f"The rig starts anew: {error}; {_set_aside(self._rig)}"
+            return read_rig(example), f"The rig was reset: {error}; {_set_aside(self._rig)}"
 
     def save_rig(self, rig: Rig) -> None:
         """Write the rig as far as it is calibrated.
@@ -153,9 +165,14 @@ class WorkFolder:
         write_rig(self._rig, rig)
 
 
+def entered_path(text: str) -> Path | None:
+    """Return the path that was entered; None if the field is empty."""
+    return Path(text).expanduser() if text else None
+
+
 def _set_aside(path: Path) -> str:
     bad = path.with_name(f"{path.name}.bad")
     with suppress(OSError):
         path.replace(bad)
-        return f"the old are in {bad}"
-    return "they cannot be moved aside"
+        return f"the old file was kept as {bad}"
+    return "the old file cannot be renamed"

@@ -1,4 +1,4 @@
-"""Why a board was not found in an image."""
+"""Diagnosis of an image in which no board was found."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FAMILIES = (
 FindCorners: TypeAlias = Callable[[UInt8, Board], tuple[NDArray[np.int64], Float64]]
 
 
-def why_not_found(gray: UInt8, board: Board, find: FindCorners) -> str:
+def explain_missing(gray: UInt8, board: Board, find: FindCorners) -> str:
     """Return one line on why `find` gave too few corners.
 
     Parameters

@@ -1,12 +1,18 @@
-"""How well a least-squares fit of shared and per-view parameters knows the shared ones."""
+"""Residuals and covariances of least-squares fits."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handcal.types import Float64
+
+
+def rms(off_px: Float64) -> float:
+    """Return the root mean square length of (N, 2) residuals, as OpenCV counts it."""
+    return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))))
 
 
 def marginal_covariance(
@@ -46,3 +52,30 @@ def marginal_covariance(
     variance = residuals @ residuals / max(len(residuals) - count, 1)
     covariance: Float64 = variance * np.linalg.inv(scaled) / np.outer(scale, scale)
     return covariance
+
+
+def clustered_covariance(J: Float64, residuals: Float64, group: NDArray[np.integer]) -> Float64:
+    """Return the covariance (P, P) of the P parameters, the groups taken for independent.
+
+    For residuals that err together, as all corners of one wrongly tracked board. It is the
+    jackknife's: how much the solution moves when one group after the other is left out, to first
+    order (Bell & McCaffrey 2002, Bias reduction in standard errors for linear regression with
+    multi-stage samples), which few groups do not make too small.
+
+    Parameters
+    ----------
+    J : (M, P) float64
+        Derivatives of the residuals.
+    residuals : (M,) float64
+    group : (M,) int
+        Number of each residual's group, from 0 up; two groups at least.
+    """
+    information = J.T @ J
+    count = int(group.max()) + 1
+    moves = np.empty((count, J.shape[1]))
+    for number in range(count):
+        inside = group == number
+        rest = information - J[inside].T @ J[inside]
+        moves[number] = np.linalg.pinv(rest, hermitian=True) @ (J[inside].T @ residuals[inside])
+    covariance: Float64 = moves.T @ moves * (count - 1) / count
+    return 0.5 * (covariance + covariance.T)

@@ -1,0 +1,87 @@
+"""Settings of the studies and tests that can be ordered, all of which can be stored as JSON.
+
+Paths are texts, empty where there is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from handcal.errors import FileError
+from handcal.types import Eye
+
+Size: TypeAlias = Literal["full", "quick"]
+"""``quick`` runs few trials, to see that everything works; its results are not meaningful."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseStudySettings:
+    """Settings of a noise study."""
+
+    size: Size = "full"
+    seed: int = 1
+    processes: int = 0
+    """Processes on this computer; 0 for one on each core."""
+    scheduler: str = ""
+    """Address of a Dask scheduler that does the work instead, ``tcp://HOST:PORT``."""
+    output: str = "results/study-noise"
+    """Folder for this study only; an unfinished study in it is resumed."""
+
+
+@dataclass(frozen=True, slots=True)
+class MethodComparisonSettings:
+    """Settings of a method comparison; `seed` to `output` as in `NoiseStudySettings`."""
+
+    wearers: int = 100
+    """Simulated wearers in each population."""
+    seed: int = 1
+    processes: int = 0
+    scheduler: str = ""
+    output: str = "results/study-methods"
+    size: Size = "full"
+    noise_wearers: int = 0
+    """Simulated wearers for a search of the noise with which the paper's method errs as published;
+    0 for no search."""
+
+
+@dataclass(frozen=True, slots=True)
+class CubeTestSettings:
+    """Settings of a cube test, on captures in a folder or on rendered ones."""
+
+    captures: str = ""
+    """Folder of captures; without one they are rendered."""
+    cube: str = ""
+    camera: str = ""
+    """Files of the cube and of the camera's intrinsics; without them, those with the captures."""
+    rig: str = ""
+    """Rig file; without one, the shipped example."""
+    eye: Eye = "left"
+    square_px: int = 80
+    """Side of the squares of the grid on the display."""
+    seed: int = 1
+    """Seed of rendered captures."""
+    output: str = "results/cube"
+    """Folder for the report."""
+    poses: int = 4
+    """Poses of the cube at each position of the camera."""
+    alignments: int = 1
+    """Alignments of the hand at each position, for rendered captures."""
+
+
+@dataclass(frozen=True, slots=True)
+class UserTestSettings:
+    """Settings of a user test's evaluation."""
+
+    folders: tuple[str, ...] = ()
+    """Sessions, and folders of sessions."""
+    output: str = "results/users"
+    """Folder for the report."""
+
+
+def output_folder(text: str) -> Path:
+    """Return the folder for results; FileError if there is none."""
+    if not text:
+        raise FileError("choose a folder for the results")
+    return Path(text).expanduser().absolute()

@@ -1,0 +1,108 @@
+"""Studies that can be ordered: run, or resumed, and reported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings, output_folder
+from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
+from handcal.lab.study.methods_report import methods_report
+from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
+from handcal.lab.study.noise_report import noise_report
+from handcal.lab.study.run import Study, resumable, run_study
+from handcal.lab.study.store import Row
+from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
+from handcal.progress import Progress
+from handcal.report.document import Report
+from handcal.report.write import write_report
+
+STUDY_SHARE = 0.95
+"""Share of the time that the cases take; the rest is the report."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StudyResult:
+    """The report of a study, as it was written."""
+
+    report: Report
+    files: tuple[Path, ...]
+    """The report as PDF and as HTML."""
+    noise: NoiseFit | None = None
+    """The noise that was searched for; None without a search."""
+
+
+def run_noise_study(settings: NoiseStudySettings, progress: Progress) -> StudyResult:
+    """Run or resume a noise study and write its report; as `run_and_report`."""
+    return run_and_report(noise_cases(settings), noise_report, settings, progress)
+
+
+def run_method_comparison(settings: MethodComparisonSettings, progress: Progress) -> StudyResult:
+    """Run or resume a method comparison and write its report; as `run_and_report`.
+
+    Raises
+    ------
+    HandcalError
+        If no noise makes the paper's method err as published.
+    """
+    study = method_cases(settings)
+    if not settings.noise_wearers:
+        return run_and_report(study, methods_report, settings, progress)
+    noise = fit_noise(study.settings, settings.noise_wearers, progress.part(0.0, 0.0))
+    study = methods_study(replace(study.settings, noise_scale=noise.scale))
+    return replace(run_and_report(study, methods_report, settings, progress), noise=noise)
+
+
+def noise_cases(settings: NoiseStudySettings) -> Study:
+    """Return the noise study that the settings describe."""
+    chosen = QUICK_NOISE if settings.size == "quick" else NoiseSettings()
+    return noise_study(replace(chosen, seed=settings.seed))
+
+
+def method_cases(settings: MethodComparisonSettings) -> Study:
+    """Return the method comparison that the settings describe, with the usual noise."""
+    chosen = QUICK_METHODS if settings.size == "quick" else MethodSettings()
+    return methods_study(replace(chosen, wearers=settings.wearers, seed=settings.seed))
+
+
+def run_and_report(
+    study: Study,
+    report_of: Callable[[Any, Sequence[Row]], Report],
+    settings: NoiseStudySettings | MethodComparisonSettings,
+    progress: Progress,
+) -> StudyResult:
+    """Run a study, or what is left of it, and write its report.
+
+    Parameters
+    ----------
+    study : Study
+    report_of : callable
+        Makes the report from the study's settings and rows.
+    settings : NoiseStudySettings or MethodComparisonSettings
+        Only `processes`, `scheduler` and `output` are used.
+    progress : Progress
+
+    Raises
+    ------
+    CancelledError
+        If the study is to end; completed chunks of cases are kept.
+    FileError
+        If the folder holds another study, or cannot be read or written.
+    HandcalError
+        If the cluster cannot be reached, or a worker died.
+    """
+    folder = output_folder(settings.output)
+    rows = run_study(
+        study,
+        folder,
+        workers=settings.processes or None,
+        scheduler=settings.scheduler or None,
+        progress=progress.part(0.0, STUDY_SHARE),
+    )
+    report = report_of(study.settings, rows)
+    writing = progress.part(STUDY_SHARE, 1.0)
+    with resumable():
+        files = write_report(folder, report, lambda share: writing.at(share, "Writing the report"))
+    return StudyResult(report, files)

@@ -1,0 +1,151 @@
+"""Steps of a headset's offline calibration, as the commands and the rig wizard order them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from handcal.errors import HandcalError
+from handcal.rig.assemble import screen_of
+from handcal.rig.camera import CameraSettings, LensModel
+from handcal.rig.display import (
+    DisplayCalibration,
+    DisplaySettings,
+    calibrate_display,
+    fit_homography,
+    pixel_size_m,
+)
+from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
+from handcal.rig.grid import grid_on, on_display
+from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_stereo
+from handcal.rig.tracked_file import read_tracked
+from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
+from handcal.rig.views import View, used
+from handcal.types import Eye, Float64, Intrinsics, Rig
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayInputs:
+    """The numbers and files that one eye's display is calibrated with, beside the images."""
+
+    square_px: int = 80
+    """Side of the grid's squares."""
+    distance_m: float | None = 2.0
+    """z(C0→S) as measured, or None to solve it from `square_arcmin`."""
+    square_arcmin: float = 112.0
+    nominal_m: float = 2.0
+    """Angle that a square subtends at the nominal distance of the virtual image."""
+    pose_V_H: Path | None = None
+    """File of T_V_H as the headset reports it, or None for that of the rig."""
+
+    @property
+    def settings(self) -> DisplaySettings:
+        """Settings with the distance of the display, or with the size of its pixels."""
+        if self.distance_m is not None:
+            return DisplaySettings(distance_m=self.distance_m)
+        angle_rad = float(np.radians(self.square_arcmin / 60.0))
+        return DisplaySettings(pixel_m=pixel_size_m(angle_rad, self.square_px, self.nominal_m))
+
+
+def calibrate_depth_camera(
+    pairs: Sequence[tuple[View, View]],
+    lens: LensModel,
+    depth_intrinsics: Path | None,
+    headset_intrinsics: Path | None,
+) -> StereoCalibration:
+    """Calibrate the pose of the depth camera in the headset from pairs of views of a board.
+
+    Parameters
+    ----------
+    pairs : sequence of (View, View)
+        By the depth camera and by the headset's.
+    lens : LensModel
+        Distortion model of intrinsics that are solved.
+    depth_intrinsics, headset_intrinsics : Path or None
+        Files; None to solve them from the images.
+    """
+    return calibrate_stereo(
+        pairs,
+        intrinsics_in(depth_intrinsics),
+        intrinsics_in(headset_intrinsics),
+        StereoSettings(camera=CameraSettings(lens=lens)),
+    )
+
+
+def calibrate_viewpoint(
+    board_views: Sequence[View], camera: Intrinsics, stereo: Path | None, tracked: Path | None
+) -> ViewpointPose:
+    """Calibrate the pose of the viewpoint camera in the headset.
+
+    Parameters
+    ----------
+    board_views : sequence of View
+        By the viewpoint camera, of the tracked board; not used with `stereo`.
+    camera : Intrinsics
+        The viewpoint camera.
+    stereo : Path or None
+        Stereo calibration with the viewpoint camera as its depth camera.
+    tracked : Path or None
+        Poses of the board in `board_views`.
+
+    Raises
+    ------
+    HandcalError
+        If both files are missing, one cannot be read, or the views do not suffice.
+    """
+    if stereo is not None:
+        return viewpoint_from_stereo(read_stereo(stereo))
+    if tracked is None:
+        raise HandcalError("tracked poses of the board are missing: choose their file")
+    return viewpoint_from_tracked(board_views, read_tracked(tracked), camera)
+
+
+def calibrate_eye_display(
+    rig: Rig,
+    eye: Eye,
+    grid_views: Sequence[View],
+    camera: Intrinsics,
+    viewpoint: ViewpointPose,
+    inputs: DisplayInputs,
+) -> DisplayCalibration:
+    """Calibrate one eye's display from views of its grid.
+
+    Parameters
+    ----------
+    rig : Rig
+        Tells the size of the display and, unless `inputs` does, T_V_H.
+    eye : {"left", "right"}
+    grid_views : sequence of View
+        By the viewpoint camera, of the grid's board.
+    camera : Intrinsics
+        The viewpoint camera.
+    viewpoint : ViewpointPose
+        Pose of the viewpoint camera while it saw the grid.
+    inputs : DisplayInputs
+
+    Raises
+    ------
+    HandcalError
+        If no view shows the grid, or the display has no room for it.
+    """
+    screen = screen_of(rig, eye)
+    pose_V_H = pose_in(inputs.pose_V_H)
+    if pose_V_H is not None:
+        screen = replace(screen, T_V_H=pose_V_H)
+    grid = grid_on(screen.width_px, screen.height_px, inputs.square_px)
+    seen = {name: on_display(found, grid) for name, found in used(grid_views, 1).items()}
+    homography = fit_homography(seen, camera, screen.width_px, screen.height_px)
+    return calibrate_display(homography, camera, viewpoint, screen, inputs.settings)
+
+
+def intrinsics_in(path: Path | None) -> Intrinsics | None:
+    """Return the intrinsics in a file; None without one."""
+    return None if path is None else read_intrinsics(path)
+
+
+def pose_in(path: Path | None) -> Float64 | None:
+    """Return the pose (4, 4) in a file; None without one."""
+    return None if path is None else read_pose(path)

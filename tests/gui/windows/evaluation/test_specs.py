@@ -1,0 +1,93 @@
+"""The evaluations that are offered, on little data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from handcal.errors import FileError
+from handcal.lab.evaluate.cube_folder import CapturePlan
+from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
+from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
+from handcal.lab.study.noise import QUICK_NOISE
+from handcal.lab.study.studies import run_method_comparison, run_noise_study
+from handcal.progress import Progress
+from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
+from handcal_gui.windows.evaluation.specs import make_specs
+from handcal_gui.windows.evaluation.work import SimulatedStudy
+
+
+def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
+    entries = EvaluationEntries(
+        NoiseStudySettings("quick", 3, 2, "tcp://host:1", "/n"),
+        MethodComparisonSettings(12, 4, 3, "tcp://host:2", "/m"),
+        CubeEntries(
+            *("/captures", "/cube.json", "/camera.json", "/rig.yaml", "right", 60, 5, "/c"),
+            poses=2,
+            alignments=3,
+        ),
+        UserEntries("/sessions", "/u"),
+    )
+    for name, spec in make_specs().items():
+        form = spec.form()
+        qtbot.addWidget(form)
+        form.show_entries(getattr(entries, name))
+        assert form.take(getattr(EvaluationEntries(), name)) == getattr(entries, name)
+
+
+def test_studies_are_those_of_the_commands() -> None:
+    specs = make_specs()
+    noise, methods = specs["noise"].evaluation, specs["methods"].evaluation
+    assert isinstance(noise, SimulatedStudy)
+    assert noise.study(NoiseStudySettings("quick", seed=3)).settings == replace(QUICK_NOISE, seed=3)
+    assert isinstance(methods, SimulatedStudy)
+    study = methods.study(MethodComparisonSettings(wearers=7, seed=3))
+    assert study.settings == MethodSettings(wearers=7, seed=3)
+    quick = methods.study(MethodComparisonSettings(wearers=3, size="quick"))
+    assert quick.settings == QUICK_METHODS
+    assert (noise.order, methods.order) == (run_noise_study, run_method_comparison)
+
+
+def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
+    entries = UserEntries(str(tmp_path / "none"), str(tmp_path / "results"))
+    evaluation = make_specs()["users"].evaluation
+    assert evaluation.readiness(entries).can_run
+    with pytest.raises(FileError, match=r"no trial .*none"):
+        evaluation.run(entries, Progress())
+
+
+def test_without_sessions_there_is_no_user_test(tmp_path: Path) -> None:
+    evaluation = make_specs()["users"].evaluation
+    readiness = evaluation.readiness(UserEntries("", str(tmp_path)))
+    assert not readiness.can_run
+    assert "folder of sessions" in readiness.finding.found
+
+
+def test_a_cube_test_is_run_once_there_are_captures_to_look_at(tmp_path: Path) -> None:
+    spec = make_specs()["cube"]
+    assert spec.preparation is not None
+    entries = CubeEntries(output=str(tmp_path / "results"))
+    assert spec.evaluation.readiness(entries).can_run
+    assert not spec.preparation.is_possible(entries)
+    entries = replace(entries, captures=str(tmp_path / "captures"))
+    assert spec.preparation.is_possible(entries)
+    readiness = spec.evaluation.readiness(entries)
+    assert "no folder" in readiness.finding.found
+    assert not readiness.can_run
+    pose = tmp_path / "captures" / "centre" / "pose-1"
+    pose.mkdir(parents=True)
+    with pytest.raises(FileError, match="no captures"):
+        spec.evaluation.readiness(entries)
+    for name in ("real.png", "virtual.png"):
+        (pose / name).touch()
+    assert spec.evaluation.readiness(entries).can_run
+
+
+def test_names_of_a_plan_are_separated_by_commas() -> None:
+    entries = CubeEntries(positions="up, down,", poses=2, drawn="before ,after", with_grid=False)
+    assert entries.plan == CapturePlan(("up", "down"), 2, ("before", "after"), False)
+    with pytest.raises(ValueError, match="named twice"):
+        _ = CubeEntries(positions="up, up").plan

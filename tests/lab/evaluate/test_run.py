@@ -1,0 +1,118 @@
+"""The evaluations that commands and window order, without either."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.display import TARGET_DEPTHS_M
+from handcal.errors import CancelledError, FileError, HandcalError
+from handcal.io.images import write_png
+from handcal.lab.evaluate.run import run_cube_test, run_user_test
+from handcal.lab.settings import CubeTestSettings, UserTestSettings
+from handcal.progress import Progress
+from handcal.rig.cube import Cube
+from handcal.rig.cube_file import write_cube
+from handcal.rig.example import example_rig
+from handcal.rig.formats import write_intrinsics
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
+from handcal.sim.cube_captures import CaptureSettings
+from handcal.sim.viewpoint import VIEWPOINT_CAMERA
+from handcal.types import EYES, Rig
+
+Report = Callable[[str, float], None]
+
+
+@pytest.fixture
+def sessions(tmp_path: Path) -> Path:
+    """Return a folder of two wearers' sessions, each of one calibration."""
+    rig = example_rig()
+    for wearer, shift_m in (("a", 0.001), ("b", 0.002)):
+        with Session.create(tmp_path / "sessions", rig, {}, wearer) as session:
+            for eye in EYES:
+                for depth_m in TARGET_DEPTHS_M:
+                    given_m = np.array([shift_m, 0.0, 0.0])
+                    session.save_trial(
+                        make_trial(rig.eyes[eye], eye, depth_m, given_m, np.zeros(3))
+                    )
+    return tmp_path / "sessions"
+
+
+def test_a_user_test_is_evaluated_and_written(sessions: Path, tmp_path: Path) -> None:
+    told: list[tuple[str, float]] = []
+    settings = UserTestSettings((str(sessions),), str(tmp_path / "results"))
+    found = run_user_test(settings, Progress(lambda *one: told.append(one)))
+    assert found.report.subject == "2 wearers, 2 sessions, 12 trials"
+    assert found.result.total.trials == 12
+    assert all(file.stat().st_size > 1000 for file in found.files)
+    assert told[:2] == [("Reading sessions", 0.0), ("Reading sessions", 0.35)]
+    assert told[-1] == ("Writing the report", 1.0)
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+
+
+def test_a_user_test_without_trials_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no trial"):
+        run_user_test(UserTestSettings((str(tmp_path / "none"),), str(tmp_path / "results")))
+
+
+def test_results_never_go_into_a_study(sessions: Path, tmp_path: Path) -> None:
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(FileError, match="holds a study"):
+        run_user_test(UserTestSettings((str(sessions),), str(tmp_path)))
+    with pytest.raises(FileError, match="holds a study"):
+        run_cube_test(CubeTestSettings(str(sessions), output=str(tmp_path)))
+
+
+def test_an_evaluation_can_be_cancelled(sessions: Path, tmp_path: Path) -> None:
+    settings = UserTestSettings((str(sessions),), str(tmp_path / "results"))
+    with pytest.raises(CancelledError):
+        run_user_test(settings, Progress(is_cancelled=lambda: True))
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_cube_test_says_what_it_lacks(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"no .*cube\.json.* handcal evaluate cube net"):
+        run_cube_test(CubeTestSettings(captures=str(tmp_path), output=str(tmp_path / "out")))
+
+
+def test_a_cube_test_of_which_nothing_can_be_used_says_why(tmp_path: Path) -> None:
+    write_cube(tmp_path / "cube.json", Cube())
+    write_intrinsics(tmp_path / "camera.json", VIEWPOINT_CAMERA, "json")
+    for number in range(1, 5):
+        pose = tmp_path / "centre" / f"pose-{number}"
+        pose.mkdir(parents=True)
+        for name in ("real.png", "virtual.png"):
+            write_png(pose / name, np.zeros((360, 640), np.uint8))
+    with pytest.raises(HandcalError, match=r"no pair of captures .*pose-1/real\.png: ") as raised:
+        run_cube_test(CubeTestSettings(captures=str(tmp_path), output=str(tmp_path / "out")))
+    assert "pose-3" in str(raised.value)
+    assert "pose-4" not in str(raised.value)
+
+
+def test_a_cube_test_without_captures_renders_them(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    told: list[tuple[str, float]] = []
+    asked: list[CaptureSettings] = []
+
+    def render(folder: Path, rig: Rig, settings: CaptureSettings, report: Report) -> None:
+        assert not any(folder.iterdir())
+        asked.append(settings)
+        report("centre, pose 1", 0.5)
+        raise FileError("no space left")
+
+    monkeypatch.setattr("handcal.lab.evaluate.run.write_captures", render)
+    settings = CubeTestSettings(
+        eye="right", seed=4, poses=2, alignments=3, output=str(tmp_path / "out")
+    )
+    with pytest.raises(FileError, match="no space left"):
+        run_cube_test(settings, Progress(lambda *one: told.append(one)))
+    assert asked == [CaptureSettings(seed=4, eye="right", poses=2, alignments=3)]
+    ((what, share),) = told
+    assert what == "Rendering centre, pose 1"
+    assert share == pytest.approx(0.245)
