@@ -1,0 +1,27 @@
+# Short names for the commands of daily work; https://just.systems
+export PATH := justfile_directory() / ".venv/bin:" + env("PATH")
+export OMP_NUM_THREADS := "1"
+
+# list the recipes
+default:
+    @just --list
+
+# style, layers, the shared vocabulary and the golden numbers
+quick:
+    ruff check && ruff format --check && lint-imports && python -m pytest -q tests/test_*.py
+
+# set-up, then every check and every test
+test *arguments:
+    bash installer/test.sh {{arguments}}
+
+# the documentation site, in results/site
+docs:
+    mkdocs build --strict
+
+# the guides' pictures, from the running program
+pictures:
+    bash docs/pictures.sh && QT_QPA_PLATFORM=offscreen python docs/rig_pictures.py
+
+# every figure of the documentation that a command measures: the benchmarks and both studies
+campaigns:
+    handcal bench --json results/bench.json && handcal study noise && handcal study methods
