@@ -27,9 +27,8 @@ from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
-from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
-from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
@@ -96,9 +95,8 @@ def shots(rig: Rig) -> Shots:
 
 
 @pytest.fixture(scope="session")
-def alignments() -> tuple[Alignment, ...]:
-    """Return two alignments of both eyes, shifted by at most 3 mm each way."""
-    return tuple(_align(seed) for seed in (1, 2))
+def alignments(simulated: Callable[..., Alignment]) -> tuple[Alignment, ...]:
+    return simulated(1), simulated(2)
 
 
 @pytest.fixture(scope="session")
@@ -313,25 +311,6 @@ def _shoot(rig: Rig, world: World, T_D_hand: Float64) -> tuple[Frame, PlacedHand
     points_W_m = transform(T_W_D, cloud.points_m)
     return frame, PlacedHand(
         cloud, frame.t_host_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0)
-    )
-
-
-def _align(seed: int) -> Alignment:
-    """Return an alignment of one hand displacement; both eyes see it from one viewpoint."""
-    simulated = AlignmentSettings(
-        count=600, display_distance_m=Z_E_S_M, shift_max_m=0.003, resample=True, depth_sigma_m=1e-3
-    )
-    one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, simulated)
-    return Alignment(
-        cursor_m=one.cursor_m,
-        hand_m=one.hand_m,
-        cursor_is_cut=one.cursor_cut,
-        hand_is_cut=one.hand_cut,
-        T_E_W=dict.fromkeys(EYES, one.T_E_W),
-        eyes=EYES,
-        rotation_rad=one.rotation_rad,
-        t_a_ns=1_000_000_000 * seed,
-        t_b_ns=1_000_000_000 * seed + 500_000_000,
     )
 
 

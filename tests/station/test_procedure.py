@@ -671,6 +671,7 @@ def test_what_the_disk_did_not_take_is_kept_and_stored_later(
     assert len(Session.open(session.path).alignments) == 2
 
 
+@pytest.mark.process
 def test_a_session_whose_program_was_killed_is_solved_alike(
     stage: Stage, session: Session, tmp_path: Path
 ) -> None:
