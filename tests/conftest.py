@@ -30,6 +30,8 @@ _IN_REAL_TIME = {
 _WINDOWS = {"qtbot", "display"}
 _PROCESSES = {"display", "process", "begun", "cluster"}
 _NOT_QUICK = "window", "process", "slow", "campaign"
+_LONG = {"tests/register/test_consistent.py", "tests/rig/test_stereo.py"}
+"""Files of long series that are not quick; the files beside them test the same code."""
 _PROGRAMS = {
     "tests/gui/test_real_window.py",
     "tests/gui/test_app.py",
@@ -52,7 +54,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("window")
         if _PROCESSES & fixtures:
             item.add_marker("process")
-        if not any(item.get_closest_marker(name) for name in _NOT_QUICK):
+        if _file(item.nodeid) not in _LONG and not any(map(item.get_closest_marker, _NOT_QUICK)):
             item.add_marker("quick")
     items.sort(key=lambda item: _file(item.nodeid) not in _PROGRAMS)
 

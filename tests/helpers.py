@@ -13,10 +13,10 @@ _PROBE_PERIOD_S = 1.0
 
 
 class Patience:
-    """A time limit that passes more slowly where the machine gives less than a whole core.
+    """A time limit that runs more slowly on a busy machine.
 
-    While one waits, a short computation is timed now and then: where it takes ten times longer
-    than the processor worked on it, a second counts as a tenth.
+    `is_over` times a short computation once a second. If it takes ten times longer than the
+    processor worked on it, the second counts as a tenth.
     """
 
     def __init__(self, limit_s: float) -> None:
@@ -34,7 +34,7 @@ class Patience:
 
 
 def _slowness() -> float:
-    """Return how much longer a computation takes than the processor works on it; at least 1."""
+    """Return the ratio of elapsed to processor time of a short computation; at least 1."""
     wall_s, worked_s = time.perf_counter(), time.thread_time()
     sum(_PROBE)
     wall_s, worked_s = time.perf_counter() - wall_s, time.thread_time() - worked_s

@@ -22,7 +22,7 @@ SETTINGS = {"calibration": settings_json(CalibrationSettings())}
 def record(
     tmp_path_factory: pytest.TempPathFactory, simulated: Callable[..., Alignment]
 ) -> SessionRecord:
-    """Return a session with everything: alignments 1 and 3, trials, and the left eye fine-tuned."""
+    """Return a session with alignments 1 and 3, trials, and a fine-tuned left eye."""
     parent = tmp_path_factory.mktemp("sessions")
     with Session.create(parent, RIG, SETTINGS, name="one", wearer="=P-07, $x_") as session:
         kept = [simulated(1), simulated(2, ("left",))]
@@ -47,7 +47,7 @@ def record(
 
 @pytest.fixture(scope="session")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
-    """Return a session in which nothing was done."""
+    """Return a session without alignments, results or trials."""
     with Session.create(tmp_path_factory.mktemp("sessions"), RIG, SETTINGS) as session:
         pass
     return Session.open(session.path)
