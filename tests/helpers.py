@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -10,6 +11,14 @@ DATA = ROOT / "tests/data"
 
 _PROBE = range(400_000)
 _PROBE_PERIOD_S = 1.0
+
+
+def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
+    """Wait until a condition holds; fail after the timeout."""
+    end_s = time.monotonic() + timeout_s
+    while not is_true():
+        assert time.monotonic() < end_s, "the condition never held"
+        time.sleep(0.001)
 
 
 class Patience:

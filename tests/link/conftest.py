@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -20,19 +19,6 @@ KEY = b"a pairing key of the tests"
 @pytest.fixture
 def pairing_key() -> bytes:
     return KEY
-
-
-@pytest.fixture
-def eventually() -> Callable[..., None]:
-    return _eventually
-
-
-def _eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
-    """Wait until a condition holds; fail after the timeout."""
-    end_s = time.monotonic() + timeout_s
-    while not is_true():
-        assert time.monotonic() < end_s, "the condition never held"
-        time.sleep(0.002)
 
 
 class RawPeer:

@@ -37,6 +37,7 @@ from handcal.station.procedure import (
     State,
 )
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Intrinsics, Projection, UInt16
+from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -168,13 +169,6 @@ class Stage:
         except PoseError:
             return False
         return True
-
-
-def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not is_true():
-        assert time.monotonic() < end_s, "the condition never held"
-        time.sleep(0.001)
 
 
 @pytest.fixture
