@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is missing and passes every check.
+# Installs what is missing, then runs every check and all tests but those marked slow or campaign.
+# Arguments go to pytest: -m quick for a check within two minutes, -m "" for every test.
 set -euo pipefail
 test_packages=(xvfb xauth xdotool poppler-utils) # real windows on a virtual screen, and PDF pages
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
@@ -10,4 +11,4 @@ ruff check
 ruff format --check
 mypy
 lint-imports
-pytest "$@"
+pytest -n 2 --dist loadfile "$@"

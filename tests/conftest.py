@@ -1,13 +1,22 @@
+"""Fixtures for all tests, and the rules of a run: markers, order, processes and second tries."""
+
+import multiprocessing.process
 import os
-from collections.abc import Callable
+import subprocess
+from collections.abc import Callable, Generator, Sequence
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import numpy as np
 import pytest
 
 from handcal.geometry import rigid
-from handcal.types import Alignment
+from handcal.rig.example import Z_E_S_M
+from handcal.sim.alignments import AlignmentSettings, simulate_alignment
+from handcal.sim.hand import make_hand
+from handcal.types import EYES, Alignment, Eye
 
 # A busy machine fails no test.
 hypothesis.settings.register_profile("handcal", deadline=None)
@@ -18,17 +27,99 @@ _IN_REAL_TIME = {
     "cluster",
 }  # fmt: skip
 """Fixtures that run windows, threads or processes, which a busy machine may keep waiting."""
+_WINDOWS = {"qtbot", "display"}
+_PROCESSES = {"display", "process", "begun", "cluster"}
+_NOT_QUICK = "window", "process", "slow", "campaign"
+_LONG = {"tests/register/test_consistent.py", "tests/rig/test_stereo.py"}
+"""Files of long series that are not quick; the files beside them test the same code."""
+_PROGRAMS = {
+    "tests/gui/test_real_window.py",
+    "tests/gui/test_app.py",
+    "tests/station/test_station.py",
+    "tests/cli/test_demo.py",
+}
+"""Files that start whole programs, each of which can keep more than one core busy."""
+_SECOND_TRIES = 1
+"""Most tests of a run that may need a second try."""
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Try what runs in real time a second time, which counts."""
+    """Mark tests by their fixtures, and begin with those that start whole programs."""
     for item in items:
-        if _IN_REAL_TIME & set(getattr(item, "fixturenames", ())):
+        fixtures = set(getattr(item, "fixturenames", ()))
+        if _IN_REAL_TIME & fixtures:
             item.add_marker(pytest.mark.flaky(reruns=1))
+        if _WINDOWS & fixtures:
+            item.add_marker("window")
+        if _PROCESSES & fixtures:
+            item.add_marker("process")
+        if _file(item.nodeid) not in _LONG and not any(map(item.get_closest_marker, _NOT_QUICK)):
+            item.add_marker("quick")
+    items.sort(key=lambda item: _file(item.nodeid) not in _PROGRAMS)
+
+
+def _file(nodeid: str) -> str:
+    return nodeid.split("::", 1)[0]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Fail a quick test that starts a process."""
+    with pytest.MonkeyPatch.context() as patch:
+        if item.get_closest_marker("quick"):
+            patch.setattr(subprocess.Popen, "__init__", _refuse_process)
+            patch.setattr(multiprocessing.process.BaseProcess, "start", _refuse_process)
+        return (yield)
+
+
+def _refuse_process(self: object, *_arguments: object, **_options: object) -> None:
+    pytest.fail("mark this test with pytest.mark.process: it starts one")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
+    """Give out tests by file; all that start whole programs go to one worker, one by one."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):  # type: ignore[misc]  # xdist has no types
+        def _split_scope(self, nodeid: str) -> str:
+            return "programs" if _file(nodeid) in _PROGRAMS else _file(nodeid)
+
+    config.option.loadscopereorder = False  # the programs first, then as collected
+    return Scheduling(config, log)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail a run in which too many tests needed a second try."""
+    too_many = len(_second_tries(session.config)) > _SECOND_TRIES
+    if too_many and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """List the tests that needed a second try."""
+    if tried := _second_tries(config):
+        terminalreporter.section("second tries")
+        for report in tried:
+            crash = getattr(report.longrepr, "reprcrash", None)
+            why = crash.message.splitlines()[0] if crash else ""
+            terminalreporter.line(f"{report.nodeid} - {why}")
+        if len(tried) > _SECOND_TRIES:
+            terminalreporter.line(
+                f"{len(tried)} tests needed a second try; at most {_SECOND_TRIES} may", red=True
+            )
+
+
+def _second_tries(config: pytest.Config) -> list[pytest.TestReport]:
+    """Return the reports of failed first tries; none in xdist's workers, which have no terminal."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    return list(reporter.stats.get("rerun", ())) if reporter else []
 
 
 @pytest.fixture(scope="session")
 def alignment() -> Alignment:
+    """Return an alignment of random numbers, each field unlike every other."""
     rng = np.random.default_rng(1)
     return Alignment(
         cursor_m=rng.normal(size=(40, 3)),
@@ -48,6 +139,39 @@ def alignment() -> Alignment:
 
 
 @pytest.fixture(scope="session")
+def simulated() -> Callable[..., Alignment]:
+    """Return a maker of simulated alignments, by seed and the eyes that took part.
+
+    The hand is sampled twice with noise and moved; both eyes see it from one viewpoint, shifted by
+    at most 3 mm each way.
+    """
+    settings = AlignmentSettings(
+        count=600,
+        display_distance_m=Z_E_S_M,
+        shift_max_m=0.003,
+        resample=True,
+        depth_sigma_m=0.001,
+    )
+
+    @cache
+    def make(seed: int, eyes: Sequence[Eye] = EYES) -> Alignment:
+        one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, settings)
+        return Alignment(
+            cursor_m=one.cursor_m,
+            hand_m=one.hand_m,
+            cursor_is_cut=one.cursor_cut,
+            hand_is_cut=one.hand_cut,
+            T_E_W=dict.fromkeys(EYES, one.T_E_W),
+            eyes=tuple(eyes),
+            rotation_rad=one.rotation_rad,
+            t_a_ns=1_000_000_000 * seed,
+            t_b_ns=1_000_000_000 * seed + 500_000_000,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Return the folder of real recordings made by others, which is not part of the project."""
     beside = Path(__file__).parents[2] / "shared" / "data"
@@ -59,7 +183,7 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def headset_of() -> Callable[[int], int]:
-    """Return what finds the process of the virtual headset that a process has started."""
+    """Return a function that finds the virtual headset started by a process, by process ids."""
     if not Path("/proc/self/task").is_dir():
         pytest.skip("processes are found only in Linux's /proc")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -12,11 +13,19 @@ _PROBE = range(400_000)
 _PROBE_PERIOD_S = 1.0
 
 
-class Patience:
-    """A time limit that passes more slowly where the machine gives less than a whole core.
+def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
+    """Wait until a condition holds; fail after the timeout."""
+    end_s = time.monotonic() + timeout_s
+    while not is_true():
+        assert time.monotonic() < end_s, "the condition never held"
+        time.sleep(0.001)
 
-    While one waits, a short computation is timed now and then: where it takes ten times longer
-    than the processor worked on it, a second counts as a tenth.
+
+class Patience:
+    """A time limit that runs more slowly on a busy machine.
+
+    `is_over` times a short computation once a second. If it takes ten times longer than the
+    processor worked on it, the second counts as a tenth.
     """
 
     def __init__(self, limit_s: float) -> None:
@@ -34,7 +43,7 @@ class Patience:
 
 
 def _slowness() -> float:
-    """Return how much longer a computation takes than the processor works on it; at least 1."""
+    """Return the ratio of elapsed to processor time of a short computation; at least 1."""
     wall_s, worked_s = time.perf_counter(), time.thread_time()
     sum(_PROBE)
     wall_s, worked_s = time.perf_counter() - wall_s, time.thread_time() - worked_s

@@ -1,6 +1,8 @@
 import subprocess
 import sys
 
+import pytest
+
 IMPORT_EVERYTHING = """
 import importlib, pkgutil, sys, handcal
 for module in pkgutil.walk_packages(handcal.__path__, "handcal."):
@@ -10,6 +12,7 @@ print(len(sys.modules), *{"PySide6", "pyqtgraph", "open3d", "pyrealsense2"} & sy
 """
 
 
+@pytest.mark.process
 def test_the_whole_engine_imports_without_its_heavy_and_optional_parts() -> None:
     run = subprocess.run(
         [sys.executable, "-c", IMPORT_EVERYTHING], capture_output=True, text=True, check=False

@@ -23,7 +23,7 @@ _PERIOD_NS = 33_000_000
 
 @pytest.fixture(scope="session")
 def make_frames() -> Callable[..., Iterator[Frame]]:
-    """Return what makes noisy frames, the same ones each time, of one camera."""
+    """Return a maker of noisy frames of one camera, the same frames at each call."""
 
     def make(count: int, with_color: bool = True) -> Iterator[Frame]:
         rng = np.random.default_rng(1)
@@ -47,20 +47,20 @@ _INVERSE = (-0.055, 0.066, -0.0005, 0.0005, -0.021)
 
 
 class SoftwareRealSense(Closable):
-    """A device of librealsense that gives a frame pair every few milliseconds once it streams.
+    """A software device of librealsense that sends a frame pair every few milliseconds.
 
-    Every depth pixel is 4,000 plus ten times the frame's number, every colour value the number.
+    Each depth pixel is 4,000 plus ten times the frame's number, each colour value the number.
 
     Parameters
     ----------
     plugged : list of SoftwareRealSense
-        What is listed.
+        The connected devices, as listed by the SDK.
     sizes : sequence of (width, height)
-        The profiles on offer.
+        The supported profiles.
     about : mapping of str to str
-        What the device tells of itself, by the names of the SDK's camera_info.
+        The device's description, by the names of the SDK's camera_info.
     options : mapping of str to (low, high)
-        The depth's options that can be set, by the SDK's names.
+        Writable options of the depth sensor, by the SDK's names.
     """
 
     def __init__(
@@ -103,11 +103,11 @@ class SoftwareRealSense(Closable):
         self._thread.start()
 
     def fall_silent(self) -> None:
-        """Give no more frames."""
+        """Stop sending frames."""
         self._may_run.clear()
 
     def unplug(self) -> None:
-        """Give no more frames, and be listed no longer."""
+        """Stop sending frames and leave the list of devices."""
         self.fall_silent()
         self._plugged.remove(self)
 
@@ -170,7 +170,7 @@ def _extrinsics(rs: Any) -> Any:
 def plug_in(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Callable[..., SoftwareRealSense]]:
-    """Return what plugs a software RealSense in, given how it is; `unplug` takes it out again."""
+    """Return a function that connects a software RealSense made with the arguments given."""
     pytest.importorskip("pyrealsense2")
     plugged: list[SoftwareRealSense] = []
     made: list[SoftwareRealSense] = []

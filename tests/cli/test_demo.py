@@ -24,6 +24,8 @@ from handcal.types import EYES, Eye
 
 SEED = 3
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -361,6 +361,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(
     assert "cannot create the folder" in error
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="writes to /dev/full")
 @pytest.mark.parametrize("argument", ["doctor", "--help"])
 def test_an_output_that_cannot_be_written_is_one_line(argument: str) -> None:
@@ -389,6 +390,7 @@ def test_each_command_is_listed_with_its_purpose(
         assert "None" not in capsys.readouterr().out
 
 
+@pytest.mark.process
 def test_the_program_itself_ends_with_one_line(tmp_path: Path) -> None:
     program = shutil.which("handcal", path=Path(sys.executable).parent)
     assert program is not None, "install the project, which brings the command"
@@ -399,6 +401,7 @@ def test_the_program_itself_ends_with_one_line(tmp_path: Path) -> None:
     assert ended.stdout == ""
 
 
+@pytest.mark.process
 def test_opencv_adds_no_line_of_its_own(tmp_path: Path) -> None:
     (tmp_path / "text.txt").write_text("text")
     ended = subprocess.run(
@@ -414,6 +417,7 @@ def test_opencv_adds_no_line_of_its_own(tmp_path: Path) -> None:
     assert ended.stderr.count("\n") == 1
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
 def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: Path) -> None:
     with subprocess.Popen(

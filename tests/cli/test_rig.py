@@ -140,7 +140,10 @@ def test_a_board_without_a_file_is_misuse(
         (("board", "--pdf", "b.png"), "b.png must end in .pdf"),
         (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
         (("camera", "nowhere"), "no PNG or JPEG images"),
-        (("camera", "{depth}", "--drop", "x.png"), "there is no image x.png to drop"),
+        (
+            ("camera", "{depth}", *CHECKERBOARD, "--drop", "x.png"),
+            "there is no image x.png to drop",
+        ),
         (
             ("stereo", "--depth", "{depth}", "--headset", "{depth}", *CHECKERBOARD),
             "both cameras' images are the same",

@@ -139,6 +139,7 @@ def test_a_full_disk_leaves_all_as_it_was(tmp_path: Path, record: SessionRecord)
     assert tree(tmp_path) == before
 
 
+@pytest.mark.process
 def test_a_killed_export_leaves_nothing_that_is_seen_and_the_next_cleans_up(
     tmp_path: Path, record: SessionRecord
 ) -> None:

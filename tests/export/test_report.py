@@ -106,6 +106,7 @@ def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
     assert "Convergence" not in found
 
 
+@pytest.mark.process
 def test_the_file_is_a4_with_its_fonts_and_all_pages(
     tmp_path: Path, outcome: SessionOutcome, pages: list[Figure]
 ) -> None:

@@ -1,4 +1,4 @@
-"""Snapshots of a rendered calibration, for panels to show: no camera, headset or thread."""
+"""Snapshots of a rendered calibration for panels, and a station with a scripted camera."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
-from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
-from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
@@ -75,7 +74,7 @@ LINK = LinkStatistics(
 
 @dataclass(frozen=True, eq=False)
 class Shots:
-    """The hand that became the cursor, and the live one, as the rig's camera sees them."""
+    """The hand that became the cursor and the live hand, as seen by the rig's camera."""
 
     cursor: PlacedHand
     live: PlacedHand
@@ -97,9 +96,8 @@ def shots(rig: Rig) -> Shots:
 
 
 @pytest.fixture(scope="session")
-def alignments() -> tuple[Alignment, ...]:
-    """Return two alignments of both eyes, shifted by at most 3 mm each way."""
-    return tuple(_align(seed) for seed in (1, 2))
+def alignments(simulated: Callable[..., Alignment]) -> tuple[Alignment, ...]:
+    return simulated(1), simulated(2)
 
 
 @pytest.fixture(scope="session")
@@ -111,7 +109,7 @@ def results(rig: Rig, alignments: Sequence[Alignment]) -> Results:
 def record(
     tmp_path: Path, rig: Rig, alignments: Sequence[Alignment], results: Results
 ) -> SessionRecord:
-    """Return what a solved session's folder holds."""
+    """Return the record of a solved session."""
     settings = settings_json(CalibrationSettings())
     with Session.create(tmp_path / "sessions", rig, settings, "wearer-1") as session:
         for alignment in alignments:
@@ -124,7 +122,7 @@ def record(
 def snapshot(
     rig: Rig, shots: Shots, results: Results, record: SessionRecord
 ) -> Callable[..., Snapshot]:
-    """Return a maker of snapshots: of a state, aligning by default, with changes to it.
+    """Return a maker of snapshots of a state, by default of aligning, with changes to it.
 
     ``snapshot(State.ALIGN, observation={"is_over_limit": True}, camera={"dropped": 3}, number=2)``
     changes fields of the parts `observation`, `procedure`, `camera` and `link`, and of the
@@ -163,7 +161,7 @@ def snapshot(
 
 
 class Camera(Closable):
-    """Shows a frame of those rendered, over and over, and can be unplugged."""
+    """A camera that repeats one of the rendered frames and can be unplugged."""
 
     name = "Camera of the tests"
 
@@ -196,7 +194,7 @@ class Camera(Closable):
 
 
 class StillCamera(ViewpointCamera):
-    """Always sees the same; fails when told."""
+    """A viewpoint camera that repeats one image, or fails once with `failure`."""
 
     def __init__(self, image: UInt8) -> None:
         self.name = "still"
@@ -221,7 +219,7 @@ def still_camera() -> type[StillCamera]:
 
 
 class Headset(Closable):
-    """A headset at rest that does what a test tells it."""
+    """A headset at rest, controlled by the test."""
 
     def __init__(self, rig: Rig, address: tuple[str, int], key: str) -> None:
         self._rig, self._address, self._key = rig, address, key
@@ -260,7 +258,7 @@ class Headset(Closable):
 
 @dataclass(frozen=True, eq=False)
 class Studio:
-    """A station's camera and headset in a test's hand: everything else of it is real."""
+    """The camera and headset of a station, controlled by the test; the rest is real."""
 
     settings: StationSettings
     camera: Camera
@@ -269,7 +267,7 @@ class Studio:
 
 @pytest.fixture(scope="session")
 def frames(rig: Rig) -> dict[str, Frame]:
-    """Return what the camera may see, by name."""
+    """Return the frames that the camera can show, by name."""
     world = World(make_hand(1), make_room(1))
     poses = {"cursor": T_D_CURSOR, "live": T_D_LIVE, "turned": T_D_TURNED}
     return {name: _render(rig, world, T) for name, T in {**poses, "nothing": None}.items()}
@@ -279,7 +277,7 @@ def frames(rig: Rig) -> dict[str, Frame]:
 def studio(
     rig: Rig, frames: Mapping[str, Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Studio]:
-    """Return a station's parts; it is opened with these settings and `KEY` as pairing key."""
+    """Return the parts of a station to be opened with their settings and the pairing key `KEY`."""
     camera = Camera(frames)
     monkeypatch.setattr("handcal.station.station.RealSenseCamera", camera)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -317,25 +315,6 @@ def _shoot(rig: Rig, world: World, T_D_hand: Float64) -> tuple[Frame, PlacedHand
     )
 
 
-def _align(seed: int) -> Alignment:
-    """Return an alignment of one hand displacement; both eyes see it from one viewpoint."""
-    simulated = AlignmentSettings(
-        count=600, display_distance_m=Z_E_S_M, shift_max_m=0.003, resample=True, depth_sigma_m=1e-3
-    )
-    one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, simulated)
-    return Alignment(
-        cursor_m=one.cursor_m,
-        hand_m=one.hand_m,
-        cursor_is_cut=one.cursor_cut,
-        hand_is_cut=one.hand_cut,
-        T_E_W=dict.fromkeys(EYES, one.T_E_W),
-        eyes=EYES,
-        rotation_rad=one.rotation_rad,
-        t_a_ns=1_000_000_000 * seed,
-        t_b_ns=1_000_000_000 * seed + 500_000_000,
-    )
-
-
 def _observe(state: State, shots: Shots) -> Observation:
     is_aligning = state is State.ALIGN
     return Observation(
@@ -370,7 +349,7 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
 
 
 def _views(rig: Rig, shots: Shots) -> dict[Eye, EyeView]:
-    """Return what eyes that lie beside the viewpoints see through uncorrected displays."""
+    """Return the views of eyes beside the viewpoints, through uncorrected displays."""
     views = {}
     for eye, display in rig.eyes.items():
         outline_E_m, cursor_E_m = (

@@ -87,6 +87,7 @@ def test_help_tells_every_option(
         assert option in text
 
 
+@pytest.mark.process
 def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     process = run(
@@ -98,6 +99,7 @@ def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -
     assert "file" in errors
 
 
+@pytest.mark.process
 def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
     (tmp_path / "pictures" / "start.png").mkdir(parents=True)
     process = run(
@@ -109,6 +111,7 @@ def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
     assert "start.png" in errors
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="what a process listens to is told by Linux")
 def test_it_ends_well_when_told_to(tmp_path: Path) -> None:
     preferences = tmp_path / "preferences.json"

@@ -269,11 +269,6 @@ def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
     assert not session.is_finished
     (offer,) = find_offers(sessions, ()).unfinished
     assert offer.is_enabled
-    patience = Patience(PATIENCE_S)
-    while Path(f"/proc/{headset}").exists():  # it hears no PC any more
-        assert not patience.is_over()
-        time.sleep(0.2)
-
     with Window(display, session.path, "--preferences", preferences) as window:
         window.find()
         time.sleep(2.0)
@@ -288,8 +283,13 @@ def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
         window.press("ctrl+q")
         window.end_well()
     assert alignments() == len(session.alignments)
+    patience = Patience(PATIENCE_S)
+    while Path(f"/proc/{headset}").exists():  # the killed program's; it hears no PC any more
+        assert not patience.is_over()
+        time.sleep(0.2)
 
 
+@pytest.mark.slow  # tests/gui/autopilot/test_demonstration.py covers all but the X server
 def test_the_autopilot_calibrates_exports_and_takes_pictures(
     display: str, tmp_path: Path, preferences: Path
 ) -> None:

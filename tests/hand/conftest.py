@@ -1,4 +1,4 @@
-"""Simulated frames of hands whose wrist is known."""
+"""Simulated frames of hands with a known wrist."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SENSOR = SensorSettings()
 
 @dataclass(frozen=True)
 class Shot:
-    """A frame of a simulated hand, and the truth about it."""
+    """A frame of a simulated hand and its ground truth."""
 
     frame: Frame
     hand: HandModel
@@ -27,12 +27,12 @@ class Shot:
     depth_m: Float32
 
     def beyond_wrist_m(self, points_m: Float32) -> Float64:
-        """Return how far points lie beyond the wrist along the arm; negative on the hand."""
+        """Return the distance of points beyond the wrist along the arm; negative on the hand."""
         on_hand_m = transform(invert(self.T_D_hand), points_m)
         return np.asarray((on_hand_m - self.hand.wrist_m) @ self.hand.arm_axis, np.float64)
 
     def is_hand(self) -> Bool:
-        """Tell which pixels truly show the hand, wrist included."""
+        """Return the mask of the pixels that truly show the hand, wrist included."""
         rows, columns = np.indices(self.depth_m.shape)
         x = (columns - CAMERA.cx) / CAMERA.fx
         y = (rows - CAMERA.cy) / CAMERA.fy
@@ -52,7 +52,7 @@ def shoot(
     wall_m: float = 1.5,
     noise_seed: int = 0,
 ) -> Shot:
-    """Look at a hand in front of a wall."""
+    """Render a hand in front of a wall, as seen by the depth camera."""
     hand = make_hand(seed, HandSettings(forearm_m=forearm_m))
     T_D_hand = rigid(turn_rad, at_m)
     image = draw_hand(hand, T_D_hand, CAMERA)

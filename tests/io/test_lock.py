@@ -29,6 +29,7 @@ def test_only_one_can_hold_it_and_the_holder_is_named(tmp_path: Path) -> None:
     FileLock(path).release()
 
 
+@pytest.mark.process
 def test_a_killed_holder_leaves_it_free(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     with subprocess.Popen(

@@ -1,9 +1,8 @@
-"""A hand-made headset and PC: what an attacker, or a broken peer, could send."""
+"""A headset and a PC that can send any datagram, as an attacker or a broken peer could."""
 
 from __future__ import annotations
 
 import socket
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -20,19 +19,6 @@ KEY = b"a pairing key of the tests"
 @pytest.fixture
 def pairing_key() -> bytes:
     return KEY
-
-
-@pytest.fixture
-def eventually() -> Callable[..., None]:
-    return _eventually
-
-
-def _eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
-    """Wait until a condition holds; fail if it does not in time."""
-    end_s = time.monotonic() + timeout_s
-    while not is_true():
-        assert time.monotonic() < end_s, "the condition never held"
-        time.sleep(0.002)
 
 
 class RawPeer:
@@ -60,7 +46,7 @@ class RawPeer:
 
 
 class RawHeadset(RawPeer):
-    """A headset by hand."""
+    """A headset that sends and receives single datagrams."""
 
     def __init__(self, server: Address, key: bytes = KEY) -> None:
         keys = wire.derive_keys(key)
@@ -71,7 +57,7 @@ class RawHeadset(RawPeer):
         self.socket.sendto(datagram, self.server)
 
     def join(self, nonce: int = 1) -> int:
-        """Return the session offered."""
+        """Say hello and return the session offered."""
         self.send(self.seal(pb.Envelope(hello=pb.Hello(nonce=nonce))))
         while True:
             envelope, _, _ = self.receive()
@@ -81,7 +67,7 @@ class RawHeadset(RawPeer):
 
 
 class RawServer(RawPeer):
-    """A PC by hand."""
+    """A PC that sends and receives single datagrams."""
 
     def __init__(self) -> None:
         keys = wire.derive_keys(KEY)
@@ -102,7 +88,7 @@ def server() -> Iterator[HeadsetServer]:
 
 @pytest.fixture
 def new_headset(server: HeadsetServer) -> Iterator[Callable[..., RawHeadset]]:
-    """Make hand-made headsets at the server."""
+    """Return a maker of raw headsets connected to the server."""
     made: list[RawHeadset] = []
 
     def make(key: bytes = KEY) -> RawHeadset:

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,8 @@ from handcal.link.impair import Impairment
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.types import EYES, Float64, Projection, Target
+from tests.helpers import eventually
 
-Eventually = Callable[..., None]
 BAD = Impairment(loss=0.3, reorder=0.2, duplicate=0.2, delay_s=0.003, seed=1)
 OFFSET_NS = 20_000_000
 TARGET = Target("left", target_corners_m(0.5))
@@ -98,9 +98,7 @@ def test_a_confirmation_arrives_once_on_the_hosts_clock(
         np.testing.assert_array_equal(confirmation.T_E_W[eye], T_E_W[eye])
 
 
-def test_a_lost_datagram_loses_no_pose(
-    server: HeadsetServer, pairing_key: bytes, eventually: Eventually
-) -> None:
+def test_a_lost_datagram_loses_no_pose(server: HeadsetServer, pairing_key: bytes) -> None:
     with HeadsetClient(server.address, pairing_key, headset_clock_ns, impairment=BAD) as client:
         client.wait_connected(5.0)
         start_ns, period_ns = headset_clock_ns(), 10_000_000
@@ -129,7 +127,7 @@ def test_loss_only_thins_the_live_hand(server: HeadsetServer, pairing_key: bytes
 
 
 def test_the_live_hand_carries_its_colour_and_its_absence(
-    server: HeadsetServer, pairing_key: bytes, eventually: Eventually
+    server: HeadsetServer, pairing_key: bytes
 ) -> None:
     with HeadsetClient(server.address, pairing_key) as client:
         server.wait_connected(5.0)
@@ -155,14 +153,18 @@ def test_a_target_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -
         assert client.state().target is None
 
 
+def has_prompt(client: HeadsetClient, text: str) -> bool:
+    return client.state().prompt == text
+
+
 def test_a_headset_that_starts_again_is_sent_the_state_again(
-    server: HeadsetServer, pairing_key: bytes, eventually: Eventually
+    server: HeadsetServer, pairing_key: bytes
 ) -> None:
     for _ in range(2):
         with HeadsetClient(server.address, pairing_key) as client:
             if server.statistics().sent == 0:
                 server.wait_acked(server.send_prompt("Raise your hand"), 5.0)
-            eventually(lambda client=client: client.state().prompt == "Raise your hand")
+            eventually(partial(has_prompt, client, "Raise your hand"))
         eventually(lambda: not server.connected)
 
 
@@ -180,7 +182,7 @@ def test_a_pc_that_starts_again_is_found_again(pairing_key: bytes) -> None:
         assert client.state().projections["left"].P[0, 0] == 1.0
 
 
-def test_silence_is_noticed(pairing_key: bytes, raw_server: Any, eventually: Eventually) -> None:
+def test_silence_is_noticed(pairing_key: bytes, raw_server: Any) -> None:
     settings = LinkSettings(silence_s=0.3)
     with HeadsetClient(raw_server.address, pairing_key, settings=settings) as client:
         hello, address = raw_server.wait_for("hello")
@@ -210,7 +212,7 @@ def test_a_wrong_key_connects_nobody(server: HeadsetServer) -> None:
     assert server.statistics().rejected["unpaired"] > 0
 
 
-def test_the_pc_says_good_bye(pairing_key: bytes, eventually: Eventually) -> None:
+def test_the_pc_says_good_bye(pairing_key: bytes) -> None:
     before = threading.active_count()
     server = HeadsetServer(pairing_key)
     with HeadsetClient(server.address, pairing_key) as client:

@@ -9,6 +9,7 @@ import time
 from typing import IO
 
 import numpy as np
+import pytest
 
 from handcal.display import target_corners_m, view_of_eye
 from handcal.io.resources import resource_path
@@ -21,6 +22,7 @@ from tests.helpers import ROOT
 PATIENCE_S = 20.0
 
 
+@pytest.mark.process
 def test_the_example_draws_confirms_and_ends_with_the_pc(pairing_key: bytes) -> None:
     with HeadsetServer(pairing_key) as server:
         process = subprocess.Popen(

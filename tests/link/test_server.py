@@ -19,9 +19,9 @@ from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.types import Projection
+from tests.helpers import eventually
 
 NewHeadset = Callable[..., Any]
-Eventually = Callable[..., None]
 KEEP_ALIVE = messages.ack()
 
 
@@ -64,7 +64,6 @@ def test_a_signed_datagram_of_the_offered_session_connects(
 def test_spoilt_datagrams_are_counted_and_dropped(
     server: HeadsetServer,
     new_headset: NewHeadset,
-    eventually: Eventually,
     spoil: Callable[[bytes], bytes],
     reason: str,
 ) -> None:
@@ -75,7 +74,7 @@ def test_spoilt_datagrams_are_counted_and_dropped(
 
 
 def test_a_wrong_key_is_counted_and_never_answered(
-    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+    server: HeadsetServer, new_headset: NewHeadset
 ) -> None:
     stranger = new_headset(b"another pairing key")
     stranger.send(stranger.seal(pb.Envelope(hello=pb.Hello(nonce=1))))
@@ -83,9 +82,7 @@ def test_a_wrong_key_is_counted_and_never_answered(
     assert server.statistics().sent == 0
 
 
-def test_a_replayed_capture_does_nothing(
-    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
-) -> None:
+def test_a_replayed_capture_does_nothing(server: HeadsetServer, new_headset: NewHeadset) -> None:
     headset, thief = new_headset(), new_headset()
     hello = headset.seal(pb.Envelope(hello=pb.Hello(nonce=1)))
     session = headset.join()
@@ -110,9 +107,7 @@ def test_a_replayed_capture_does_nothing(
         thief.receive()
 
 
-def test_an_older_session_stays_closed(
-    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
-) -> None:
+def test_an_older_session_stays_closed(server: HeadsetServer, new_headset: NewHeadset) -> None:
     first, second = new_headset(), new_headset()
     old = first.join()
     first.send(first.seal(KEEP_ALIVE, old, 1))
@@ -124,7 +119,7 @@ def test_an_older_session_stays_closed(
 
 
 def test_nonsense_from_a_paired_headset_is_corrupt(
-    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+    server: HeadsetServer, new_headset: NewHeadset
 ) -> None:
     headset = new_headset()
     session = headset.join()
@@ -137,7 +132,7 @@ def test_nonsense_from_a_paired_headset_is_corrupt(
 
 
 def test_a_paired_headset_gone_mad_stops_nothing(
-    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
+    server: HeadsetServer, new_headset: NewHeadset
 ) -> None:
     headset, chance = new_headset(), random.Random(0)
     session = headset.join()
@@ -163,9 +158,7 @@ def test_a_paired_headset_gone_mad_stops_nothing(
     assert headset.join() != 0
 
 
-def test_poses_are_told_at_the_hosts_time(
-    server: HeadsetServer, new_headset: NewHeadset, eventually: Eventually
-) -> None:
+def test_poses_are_told_at_the_hosts_time(server: HeadsetServer, new_headset: NewHeadset) -> None:
     headset = new_headset()
     session = headset.join()
     offset_ns = 7_000_000_000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,43 +16,22 @@ from handcal.io.settings import read_settings, settings_json
 from handcal.progress import Progress
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.register.verdict import VerdictSettings, expected_error_arcmin
-from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.rig.example import example_rig
 from handcal.session.session import Session
-from handcal.sim.alignments import AlignmentSettings, simulate_alignment
-from handcal.sim.hand import make_hand
 from handcal.station.procedure import CalibrationSettings
-from handcal.types import EYES, METHODS, Alignment, Eye, Method
+from handcal.types import EYES, METHODS, Alignment, Method
 
 RIG = example_rig()
-SIMULATED = AlignmentSettings(
-    count=600, display_distance_m=Z_E_S_M, shift_max_m=0.003, resample=True, depth_sigma_m=0.001
-)
-
-
-def alignment(seed: int, eyes: Sequence[Eye] = EYES) -> Alignment:
-    """Return an alignment of one hand displacement; both eyes see it from one viewpoint."""
-    one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, SIMULATED)
-    return Alignment(
-        cursor_m=one.cursor_m,
-        hand_m=one.hand_m,
-        cursor_is_cut=one.cursor_cut,
-        hand_is_cut=one.hand_cut,
-        T_E_W=dict.fromkeys(EYES, one.T_E_W),
-        eyes=tuple(eyes),
-        rotation_rad=one.rotation_rad,
-        t_a_ns=1,
-        t_b_ns=2,
-    )
 
 
 @pytest.fixture(scope="module")
-def both() -> Alignment:
-    return alignment(1)
+def both(simulated: Callable[..., Alignment]) -> Alignment:
+    return simulated(1)
 
 
 @pytest.fixture(scope="module")
-def left() -> Alignment:
-    return alignment(2, ("left",))
+def left(simulated: Callable[..., Alignment]) -> Alignment:
+    return simulated(2, ("left",))
 
 
 def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None:

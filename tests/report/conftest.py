@@ -21,7 +21,7 @@ def draw(axes: Sequence[Axes]) -> None:
 
 @pytest.fixture
 def report() -> Report:
-    """Return a report with everything that one may have."""
+    """Return a report with every kind of item."""
     table = Table([Column("method", "left"), Column("mean, mm")], [["paper", "1.50"]], "In mm.")
     figures = [Figure(name, f"Of {name}.", draw, ROWS, 50.0, columns=2) for name in ("one", "two")]
     return Report(

@@ -34,6 +34,7 @@ def test_an_image_too_large_is_refused() -> None:
         draw_board(Board(), 1000)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("kind", ["charuco", "checkerboard"])
 def test_the_printed_board_has_its_true_size(tmp_path: Path, kind: str) -> None:
     if shutil.which("pdftoppm") is None:

@@ -29,6 +29,7 @@ def test_the_net_shows_every_marker_upright_on_its_face() -> None:
         np.testing.assert_allclose(first[marker], np.array(place) + 0.125, atol=0.01)
 
 
+@pytest.mark.process
 def test_the_printed_net_has_its_true_size(tmp_path: Path) -> None:
     if shutil.which("pdftoppm") is None:
         pytest.skip("pdftoppm is not installed")

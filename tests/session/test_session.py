@@ -215,6 +215,7 @@ def test_a_full_disk_loses_nothing_and_the_session_goes_on(
     assert [event.name for event in whole.events] == ["created", "first", "third"]
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("seed", range(6))
 def test_a_session_survives_kill_9(tmp_path: Path, seed: int) -> None:
     Session.create(tmp_path, example_rig(), SETTINGS, name="killed").close()

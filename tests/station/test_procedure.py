@@ -37,6 +37,7 @@ from handcal.station.procedure import (
     State,
 )
 from handcal.types import EYES, Alignment, Eye, Float64, Frame, Intrinsics, Projection, UInt16
+from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -168,13 +169,6 @@ class Stage:
         except PoseError:
             return False
         return True
-
-
-def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not is_true():
-        assert time.monotonic() < end_s, "the condition never held"
-        time.sleep(0.001)
 
 
 @pytest.fixture
@@ -671,6 +665,7 @@ def test_what_the_disk_did_not_take_is_kept_and_stored_later(
     assert len(Session.open(session.path).alignments) == 2
 
 
+@pytest.mark.process
 def test_a_session_whose_program_was_killed_is_solved_alike(
     stage: Stage, session: Session, tmp_path: Path
 ) -> None:

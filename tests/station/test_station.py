@@ -14,12 +14,10 @@ import pytest
 import handcal.station.station
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
-from handcal.rig.example import Z_E_S_M, example_rig
+from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
-from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.camera import SyntheticCamera
-from handcal.sim.hand import make_hand
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.procedure import CalibrationSettings, ProcedureError, State
 from handcal.station.settings import StationSettings
@@ -30,6 +28,7 @@ from tests.helpers import Patience
 
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
+pytestmark = pytest.mark.process
 # A busy computer gives few frames a second, and the wearer's answer lies between two.
 CALIBRATION = CalibrationSettings(apply_timeout_s=0.5, match_tolerance_s=0.6)
 
@@ -42,28 +41,12 @@ def settings(tmp_path: Path) -> StationSettings:
 
 
 @pytest.fixture
-def begun(settings: StationSettings) -> Path:
-    """Return a session with an alignment of both eyes, that was broken off."""
+def begun(settings: StationSettings, simulated: Callable[..., Alignment]) -> Path:
+    """Return an interrupted session with an alignment of both eyes."""
     stored = {"calibration": settings_json(settings.calibration)}
     with Session.create(Path(settings.sessions), example_rig(), stored, wearer="Ada") as session:
-        session.save_alignment(alignment_of(1))
+        session.save_alignment(simulated(1))
     return session.path
-
-
-def alignment_of(seed: int) -> Alignment:
-    simulated = AlignmentSettings(count=600, display_distance_m=Z_E_S_M, shift_max_m=0.003)
-    one = simulate_alignment(np.random.default_rng(seed), make_hand(1), 0.05, simulated)
-    return Alignment(
-        cursor_m=one.cursor_m,
-        hand_m=one.hand_m,
-        cursor_is_cut=one.cursor_cut,
-        hand_is_cut=one.hand_cut,
-        T_E_W=dict.fromkeys(EYES, one.T_E_W),
-        eyes=EYES,
-        rotation_rad=one.rotation_rad,
-        t_a_ns=1_000_000_000,
-        t_b_ns=1_500_000_000,
-    )
 
 
 def step_until(

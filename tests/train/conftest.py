@@ -1,4 +1,4 @@
-"""A network to export, shared by the tests of what is written and of what is read again."""
+"""A network to export, shared by the tests of writing and reading it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def noise() -> UInt8:
 
 @pytest.fixture(scope="session")
 def net(noise: UInt8) -> HandNet:
-    """Return a network that what it sees makes a difference to, unlike an untrained one.
+    """Return a network that responds to its input, unlike an untrained one.
 
-    Weights, moments and signs are its own in every layer.
+    Every layer has weights, moments and signs of its own.
     """
     import torch
 
@@ -47,7 +47,7 @@ def net(noise: UInt8) -> HandNet:
 
 @pytest.fixture(scope="session")
 def float_model(net: HandNet, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return what `export_float` writes of the network."""
+    """Return the file that `export_float` writes of the network."""
     from handcal.train.export import export_float
 
     path = tmp_path_factory.mktemp("models") / "float.onnx"

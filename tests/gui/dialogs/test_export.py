@@ -13,7 +13,6 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
-    QLabel,
     QListWidget,
     QProgressBar,
     QPushButton,
@@ -26,6 +25,7 @@ from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.widgets.path_field import PathField
+from tests.gui.helpers import text
 
 
 class Exporter:
@@ -84,12 +84,6 @@ def box(dialog: ExportDialog, name: str) -> QCheckBox:
     found = dialog.findChild(QCheckBox, name)
     assert isinstance(found, QCheckBox)
     return found
-
-
-def text(dialog: ExportDialog, name: str) -> str:
-    found = dialog.findChild(QLabel, name)
-    assert isinstance(found, QLabel)
-    return found.text()
 
 
 def files(dialog: ExportDialog) -> list[str]:

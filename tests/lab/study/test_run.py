@@ -156,6 +156,7 @@ def test_a_study_that_is_done_is_not_done_again(tmp_path: Path) -> None:
     assert not log.exists()
 
 
+@pytest.mark.process
 def test_cancelling_gives_up_what_other_processes_are_at(tmp_path: Path) -> None:
     begun = tmp_path / "begun"
     study = replace(make_study(Settings(log=str(begun))), trial=sleep)
@@ -196,6 +197,7 @@ def test_a_cancelled_study_goes_on(tmp_path: Path) -> None:
     assert len(log_lines(log)) - began == CASES - 3 * kept
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 def test_a_killed_study_goes_on_and_leaves_no_process(tmp_path: Path) -> None:
     study = make_study(Settings(kills="parent", folder=str(tmp_path)))
@@ -212,6 +214,7 @@ def test_a_killed_study_goes_on_and_leaves_no_process(tmp_path: Path) -> None:
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 def test_a_worker_that_dies_is_told_of_and_the_study_goes_on(tmp_path: Path) -> None:
     study = make_study(Settings(kills="self", folder=str(tmp_path)))
@@ -292,6 +295,7 @@ def test_dask_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         run_study(make_study(), tmp_path, scheduler="tcp://127.0.0.1:9")
 
 
+@pytest.mark.process
 def test_the_environment_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)

@@ -19,29 +19,18 @@ from handcal_gui.panels.camera.depth_scale import DepthLegend
 from handcal_gui.panels.camera.panel import CameraPanel, Mode
 from handcal_gui.widgets.image_view import ImageView
 from tests.gui.conftest import NOW_NS, Shots
+from tests.gui.helpers import child, show, text
 
 Maker = Callable[..., Snapshot]
 
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> CameraPanel:
-    panel = CameraPanel()
-    qtbot.addWidget(panel)
-    panel.resize(380, 300)
-    panel.show()
-    return panel
+    return show(qtbot, CameraPanel(), 380, 300)
 
 
 def view(panel: CameraPanel, name: str) -> ImageView:
-    found = panel.findChild(ImageView, f"{name}-image")
-    assert found is not None
-    return found
-
-
-def text(panel: CameraPanel, name: str) -> str:
-    label = panel.findChild(QLabel, name)
-    assert label is not None
-    return label.text()
+    return child(panel, ImageView, f"{name}-image")
 
 
 def picture(panel: CameraPanel, name: str = "colour") -> QImage:

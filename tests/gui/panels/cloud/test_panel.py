@@ -18,17 +18,14 @@ from handcal_gui.theme import colors
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
+from tests.gui.helpers import show
 
 MakeSnapshot = Callable[..., Snapshot]
 
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> CloudPanel:
-    panel = CloudPanel()
-    qtbot.addWidget(panel)
-    panel.resize(380, 300)
-    panel.show()
-    return panel
+    return show(qtbot, CloudPanel(), 380, 300)
 
 
 def _view(panel: CloudPanel) -> CloudView:

@@ -16,6 +16,7 @@ from handcal_gui.panels.link.panel import LinkPanel
 from handcal_gui.widgets.number_label import NumberLabel
 from handcal_gui.widgets.plots import Plot
 from tests.gui.conftest import NOW_NS
+from tests.gui.helpers import button, child, show
 
 Maker = Callable[..., Snapshot]
 KEY = "a pairing key of the tests"
@@ -23,21 +24,11 @@ KEY = "a pairing key of the tests"
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> LinkPanel:
-    panel = LinkPanel()
-    qtbot.addWidget(panel)
-    panel.resize(430, 470)
-    panel.show()
-    return panel
+    return show(qtbot, LinkPanel(), 430, 470)
 
 
 def text(panel: LinkPanel, name: str) -> str:
-    label = panel.findChild(QLabel, f"link-{name}")
-    assert label is not None
-    return label.text()
-
-
-def button(panel: LinkPanel, text: str) -> QPushButton:
-    return next(found for found in panel.findChildren(QPushButton) if found.text() == text)
+    return child(panel, QLabel, f"link-{name}").text()
 
 
 def later(snapshot: Maker, seconds: float, **link: Any) -> Snapshot:
@@ -47,7 +38,7 @@ def later(snapshot: Maker, seconds: float, **link: Any) -> Snapshot:
 def test_an_empty_panel_says_how_to_begin(panel: LinkPanel) -> None:
     assert text(panel, "state") == "Not connected. Open a session on the start page."
     assert {label.text() for label in panel.findChildren(NumberLabel) if label.isVisible()} == {"–"}
-    assert not button(panel, "Show").isVisible()
+    assert not button(panel, QPushButton, "Show").isVisible()
 
 
 def test_it_tells_whether_the_headset_is_there_and_why_not(
@@ -135,7 +126,7 @@ def test_the_key_is_hidden_until_asked_for(panel: LinkPanel) -> None:
     assert address is not None
     assert address.text() == "192.168.1.5:50123"
     assert key.displayText() != KEY
-    button(panel, "Show").click()
+    button(panel, QPushButton, "Show").click()
     assert key.displayText() == KEY
     panel.show_pairing("192.168.1.5:50124", "another key of the tests")
     assert key.displayText() != "another key of the tests"
@@ -143,18 +134,18 @@ def test_the_key_is_hidden_until_asked_for(panel: LinkPanel) -> None:
 
 def test_the_key_can_be_copied_unseen(panel: LinkPanel) -> None:
     panel.show_pairing("192.168.1.5:50123", KEY)
-    button(panel, "Copy").click()
+    button(panel, QPushButton, "Copy").click()
     assert QGuiApplication.clipboard().text() == KEY
 
 
 def test_a_new_key_is_asked_for(panel: LinkPanel, qtbot: QtBot) -> None:
     panel.show_pairing("192.168.1.5:50123", KEY)
     with qtbot.waitSignal(panel.new_key_requested):
-        button(panel, "New key…").click()
+        button(panel, QPushButton, "New key…").click()
 
 
 def test_only_a_virtual_headset_can_be_restarted(panel: LinkPanel, qtbot: QtBot) -> None:
-    restart = button(panel, "Restart headset")
+    restart = button(panel, QPushButton, "Restart headset")
     panel.show_pairing("192.168.1.5:50123", KEY)
     assert not restart.isVisible()
     panel.show_pairing("127.0.0.1:50123", KEY, is_virtual=True)

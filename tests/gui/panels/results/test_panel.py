@@ -2,11 +2,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTabWidget
@@ -23,13 +22,9 @@ from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.widgets.number_table import NumberTable
+from tests.gui.helpers import child, show
 
 Make = Callable[..., Snapshot]
-Child = TypeVar("Child", bound=QObject)
-
-
-def child(parent: QObject, kind: type[Child], name: str = "") -> Child:
-    return next(found for found in parent.findChildren(kind) if found.objectName().startswith(name))
 
 
 def numbered(alignments: Sequence[Alignment]) -> dict[int, Alignment]:
@@ -38,11 +33,7 @@ def numbered(alignments: Sequence[Alignment]) -> dict[int, Alignment]:
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> ResultsPanel:
-    panel = ResultsPanel()
-    qtbot.addWidget(panel)
-    panel.resize(420, 440)
-    panel.show()
-    return panel
+    return show(qtbot, ResultsPanel(), 420, 440)
 
 
 @pytest.fixture

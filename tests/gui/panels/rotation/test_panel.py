@@ -1,11 +1,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
@@ -15,13 +14,9 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.widgets.plots import Plot
+from tests.gui.helpers import child
 
 Make = Callable[..., Snapshot]
-Child = TypeVar("Child", bound=QObject)
-
-
-def child(parent: QObject, kind: type[Child], name: str = "") -> Child:
-    return next(found for found in parent.findChildren(kind) if found.objectName().startswith(name))
 
 
 @pytest.fixture

@@ -18,20 +18,12 @@ from handcal.station.snapshot import Snapshot
 from handcal.types import Rig
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.record_table import RecordTable
+from tests.gui.helpers import button, child, show, text
 
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> SessionPanel:
-    panel = SessionPanel()
-    qtbot.addWidget(panel)
-    panel.resize(430, 450)
-    panel.show()
-    return panel
-
-
-def table(panel: SessionPanel, name: str) -> RecordTable:
-    [table] = panel.findChildren(RecordTable, name)
-    return table
+    return show(qtbot, SessionPanel(), 430, 450)
 
 
 def cell(table: RecordTable, row: int, column: int) -> str:
@@ -42,23 +34,10 @@ def texts(panel: SessionPanel) -> list[str]:
     return [label.text() for label in panel.findChildren(QLabel)]
 
 
-def button(panel: SessionPanel, text: str) -> QPushButton:
-    return next(b for b in panel.findChildren(QPushButton) if b.text() == text)
-
-
-def tool(panel: SessionPanel, text: str) -> QToolButton:
-    return next(b for b in panel.findChildren(QToolButton) if b.text() == text)
-
-
-def undo_text(panel: SessionPanel) -> str:
-    [label] = panel.findChildren(QLabel, "undoText")
-    return label.text()
-
-
 def test_empty(panel: SessionPanel) -> None:
     assert any("Start or open a session" in text for text in texts(panel))
-    assert not button(panel, "Open folder").isEnabled()
-    assert not button(panel, "Export…").isEnabled()
+    assert not button(panel, QPushButton, "Open folder").isEnabled()
+    assert not button(panel, QPushButton, "Export…").isEnabled()
 
 
 def test_shows_the_session_of_a_snapshot(
@@ -66,7 +45,7 @@ def test_shows_the_session_of_a_snapshot(
 ) -> None:
     panel.show_snapshot(snapshot(State.SOLVED))
     assert str(record.path) in texts(panel)
-    alignments = table(panel, "alignments")
+    alignments = child(panel, RecordTable, "alignments")
     assert alignments.model().rowCount() == 2
     assert "–" not in [cell(alignments, 0, column) for column in range(8)]
     panel.show_snapshot(snapshot(State.ALIGN))
@@ -87,16 +66,16 @@ def test_deletes_and_takes_back(
     qtbot: QtBot, panel: SessionPanel, record: SessionRecord, results: Results
 ) -> None:
     panel.show_record(record, results)
-    alignments = table(panel, "alignments")
+    alignments = child(panel, RecordTable, "alignments")
     alignments.selectRow(1)
     with qtbot.waitSignal(panel.delete_requested) as asked:
-        tool(panel, "Delete").click()
+        button(panel, QToolButton, "Delete").click()
     assert asked.args == ["alignment", 2]
     with Session(record.path) as session:
         session.delete("alignment", 2)
     panel.show_record(Session.open(record.path), None)
     assert alignments.model().rowCount() == 1
-    assert undo_text(panel) == "Alignment 2 deleted."
+    assert text(panel, "undoText") == "Alignment 2 deleted."
     alignments.setFocus()
     with qtbot.waitSignal(panel.restore_requested) as asked:
         QTest.keyClick(alignments, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
@@ -105,8 +84,8 @@ def test_deletes_and_takes_back(
         session.restore("alignment", 2)
     panel.show_record(Session.open(record.path), None)
     assert alignments.model().rowCount() == 2
-    assert undo_text(panel) == ""
-    assert not tool(panel, "Undo").isVisible()
+    assert text(panel, "undoText") == ""
+    assert not button(panel, QToolButton, "Undo").isVisible()
 
 
 def test_deletes_trials_and_takes_back(
@@ -120,15 +99,15 @@ def test_deletes_trials_and_takes_back(
     panel.show_record(Session.open(record.path), None)
     [tabs] = panel.findChildren(QTabWidget)
     tabs.setCurrentIndex(1)
-    table(panel, "trials-of-the-session").selectRow(0)
+    child(panel, RecordTable, "trials-of-the-session").selectRow(0)
     with qtbot.waitSignal(panel.delete_requested) as asked:
-        tool(panel, "Delete").click()
+        button(panel, QToolButton, "Delete").click()
     assert asked.args == ["trial", 1]
     with qtbot.waitSignal(panel.restore_requested) as asked:
-        tool(panel, "Undo").click()
+        button(panel, QToolButton, "Undo").click()
     assert asked.args == ["trial", 2]
     tabs.setCurrentIndex(2)
-    assert not tool(panel, "Delete").isVisible()
+    assert not button(panel, QToolButton, "Delete").isVisible()
 
 
 def test_notes_are_passed_on(qtbot: QtBot, panel: SessionPanel, record: SessionRecord) -> None:
@@ -149,11 +128,11 @@ def test_a_finished_session_is_only_looked_at(
     panel.set_read_only(True)
     panel.show_record(Session.open(record.path), None)
     assert any(text.endswith(", finished") for text in texts(panel))
-    table(panel, "alignments").selectRow(0)
-    assert not tool(panel, "Delete").isEnabled()
-    assert undo_text(panel) == ""
+    child(panel, RecordTable, "alignments").selectRow(0)
+    assert not button(panel, QToolButton, "Delete").isEnabled()
+    assert text(panel, "undoText") == ""
     with qtbot.waitSignal(panel.export_requested):
-        button(panel, "Export…").click()
+        button(panel, QPushButton, "Export…").click()
 
 
 def test_opens_the_folder(
@@ -162,5 +141,5 @@ def test_opens_the_folder(
     opened: list[QUrl] = []
     monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
     panel.show_record(record, None)
-    button(panel, "Open folder").click()
+    button(panel, QPushButton, "Open folder").click()
     assert [url.toLocalFile() for url in opened] == [str(record.path)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
@@ -20,15 +20,12 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
+from tests.gui.helpers import button, show, text
 
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> TrialsPanel:
-    panel = TrialsPanel()
-    qtbot.addWidget(panel)
-    panel.resize(430, 450)
-    panel.show()
-    return panel
+    return show(qtbot, TrialsPanel(), 430, 450)
 
 
 @pytest.fixture
@@ -49,23 +46,14 @@ def tuned(snapshot: Callable[..., Snapshot]) -> Snapshot:
     return snapshot(State.APPLIED, procedure={"applied_shift_m": moved_m})
 
 
-def label(panel: TrialsPanel, name: str) -> str:
-    [label] = panel.findChildren(QLabel, name)
-    return label.text()
-
-
 def choose(panel: TrialsPanel, name: str, text: str) -> None:
     [combo] = (c for c in panel.findChildren(QComboBox) if c.accessibleName() == name)
     combo.setCurrentText(text)
 
 
-def tool(panel: TrialsPanel, text: str) -> QToolButton:
-    return next(b for b in panel.findChildren(QToolButton) if b.text() == text)
-
-
 def test_empty(panel: TrialsPanel) -> None:
-    assert label(panel, "message") == "Trials are recorded while a session runs."
-    assert not tool(panel, "Record trial").isEnabled()
+    assert text(panel, "message") == "Trials are recorded while a session runs."
+    assert not button(panel, QToolButton, "Record trial").isEnabled()
 
 
 @pytest.mark.parametrize("state", [State.SHOW_HAND, State.ALIGN, State.SOLVED, State.APPLYING])
@@ -73,8 +61,8 @@ def test_needs_an_applied_calibration(
     panel: TrialsPanel, snapshot: Callable[..., Snapshot], state: State
 ) -> None:
     panel.show_snapshot(snapshot(state))
-    assert label(panel, "message") == "Solve and apply the alignments first."
-    assert not tool(panel, "Record trial").isEnabled()
+    assert text(panel, "message") == "Solve and apply the alignments first."
+    assert not button(panel, QToolButton, "Record trial").isEnabled()
 
 
 def test_needs_the_eye_to_be_solved(
@@ -82,9 +70,9 @@ def test_needs_the_eye_to_be_solved(
 ) -> None:
     one = replace(results, eyes={"right": results.eyes["right"]})
     panel.show_snapshot(snapshot(State.APPLIED, procedure={"results": one}))
-    assert label(panel, "message") == "The left eye has not been aligned."
+    assert text(panel, "message") == "The left eye has not been aligned."
     choose(panel, "Eye", "Right eye")
-    assert tool(panel, "Record trial").isEnabled()
+    assert button(panel, QToolButton, "Record trial").isEnabled()
 
 
 def test_asks_for_a_trial_by_key(
@@ -142,11 +130,11 @@ def test_takes_the_eyes_in_turn(
     rig: Rig,
 ) -> None:
     panel.show_snapshot(tuned(snapshot))
-    assert label(panel, "message") == "Next: left eye"
+    assert text(panel, "message") == "Next: left eye"
     panel.show_snapshot(replace(tuned(snapshot), record=tried))
-    assert label(panel, "message") == "Next: right eye"
+    assert text(panel, "message") == "Next: right eye"
     with qtbot.waitSignal(panel.trial_requested) as asked:
-        tool(panel, "Record trial").click()
+        button(panel, QToolButton, "Record trial").click()
     assert asked.args[0] == "right"
 
 
@@ -203,7 +191,7 @@ def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -
     numbers = [table.model().index(row, 0).data() for row in range(table.model().rowCount())]
     assert numbers == ["1", "3"]
     mean = np.concatenate([trial.error_arcmin for trial in tried.trials.values()]).mean()
-    assert label(panel, "summary").startswith(f"2 trials: {mean:.1f} ±")
+    assert text(panel, "summary").startswith(f"2 trials: {mean:.1f} ±")
     [statistics] = panel.findChildren(NumberTable)
     assert "0.4 m" in statistics.as_text()
     assert "0.5 m" not in statistics.as_text()
@@ -231,9 +219,9 @@ def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: Session
     [table] = panel.findChildren(RecordTable)
     table.selectRow(1)
     with qtbot.waitSignal(panel.delete_requested) as asked:
-        tool(panel, "Delete").click()
+        button(panel, QToolButton, "Delete").click()
     assert asked.args == ["trial", 3]
-    assert label(panel, "undoText") == "Trial 2 deleted.", "alignments are not of this panel"
+    assert text(panel, "undoText") == "Trial 2 deleted.", "alignments are not of this panel"
     with qtbot.waitSignal(panel.restore_requested) as asked:
         QTest.keyClick(panel, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert asked.args == ["trial", 2]
@@ -242,5 +230,5 @@ def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: Session
 def test_a_finished_session_is_only_looked_at(panel: TrialsPanel, tried: SessionRecord) -> None:
     panel.set_read_only(True)
     panel.show_record(tried)
-    assert not tool(panel, "Record trial").isEnabled()
-    assert label(panel, "undoText") == ""
+    assert not button(panel, QToolButton, "Record trial").isEnabled()
+    assert text(panel, "undoText") == ""

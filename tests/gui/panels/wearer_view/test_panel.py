@@ -13,6 +13,7 @@ from handcal.types import EYES, Eye
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.widgets.legend import LegendEntry
+from tests.gui.helpers import show
 
 MakeSnapshot = Callable[..., Snapshot]
 UNKNOWN = ["–"] * 4
@@ -20,11 +21,7 @@ UNKNOWN = ["–"] * 4
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> WearerViewPanel:
-    panel = WearerViewPanel()
-    qtbot.addWidget(panel)
-    panel.resize(380, 300)
-    panel.show()
-    return panel
+    return show(qtbot, WearerViewPanel(), 380, 300)
 
 
 def _canvas(panel: WearerViewPanel, eye: Eye) -> EyeCanvas:

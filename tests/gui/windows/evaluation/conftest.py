@@ -1,4 +1,4 @@
-"""A study of a few numbers, whose pace a test sets."""
+"""A study of a few numbers at a pace set by the test."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Settings:
 
 @dataclass
 class Numbers:
-    """A study that squares numbers; it pauses at a case while `may_go_on` is cleared."""
+    """A study that squares numbers and pauses at a case until `may_go_on` is set."""
 
     pauses_at: int = CASES
     fails: bool = False

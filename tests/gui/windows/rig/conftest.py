@@ -1,4 +1,4 @@
-"""Photographs of a whole offline calibration, rendered once; and dialogs answered by tests."""
+"""Photographs of a whole offline calibration, rendered once, and file dialogs with an answer."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from handcal_gui.windows.rig.shots import read_color
 
 @dataclass(frozen=True)
 class Photographs:
-    """Where they are, as a technician would enter them, and the camera behind the display."""
+    """Folders of photographs, the entries that name them, and the viewpoint camera."""
 
     folder: Path
     work: RigInputs
     viewpoint: Intrinsics
 
     def image(self, folder: str) -> UInt8:
-        """Return the first of a folder, RGB."""
+        """Return the first image of a folder, RGB."""
         return read_color(self.folder / folder / f"{folder}-001.png")
 
 
 @pytest.fixture(scope="session")
 def photographs(tmp_path_factory: pytest.TempPathFactory) -> Photographs:
-    """Eight views for each camera, a pair without a board, and the left display's."""
+    """Return eight views for each camera, a pair without a board, and the left display's."""
     out = tmp_path_factory.mktemp("photographs")
     write_photographs(out, example_rig(), 8, np.random.default_rng(0))
     for folder in ("depth", "headset"):
@@ -60,7 +60,7 @@ def photographs(tmp_path_factory: pytest.TempPathFactory) -> Photographs:
 
 @pytest.fixture
 def choose(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
-    """Answer the system's dialogs with a path."""
+    """Return a function that sets the answer of the file dialogs."""
 
     def answer(path: Path) -> None:
         for ask in ("getSaveFileName", "getOpenFileName"):
