@@ -34,6 +34,7 @@ from handcal.cli.terminal import (
 from handcal.errors import FileError, HandcalError
 from handcal.export.formats import FORMATS
 from handcal.hand.settings import Roi
+from handcal.io.configuration import keep_font_list_in_configuration
 from handcal.io.files import make_folder
 from handcal.types import METHODS
 
@@ -260,6 +261,7 @@ def doctor(_arguments: argparse.Namespace) -> None:
 def main() -> None:
     """Run a command; every foreseen error is one line."""
     with errors_in_one_line():
+        keep_font_list_in_configuration()
         arguments = _parser().parse_args()
         arguments.command(arguments)
 
