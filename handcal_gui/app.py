@@ -16,6 +16,7 @@ from typing import NoReturn
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
+from handcal.io.configuration import keep_font_list_in_configuration
 from handcal_gui import FIRST_SIZE_PX
 
 
@@ -23,6 +24,7 @@ def main() -> NoReturn:
     """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments."""
     arguments = _parser().parse_args()
     _require_display()
+    keep_font_list_in_configuration()
     keep_window_quick()
     app = QApplication(sys.argv[:1])
     app.setApplicationName("handcal")

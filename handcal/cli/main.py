@@ -121,6 +121,10 @@ def main() -> None:
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # its warnings would be further lines
     with errors_in_one_line():
         arguments = parse(sys.argv[1:])
+        # Imported late: --help needs nothing of it.
+        from handcal.io.configuration import keep_font_list_in_configuration
+
+        keep_font_list_in_configuration()
         arguments.command(arguments)
 
 

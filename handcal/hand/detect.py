@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -80,8 +82,7 @@ class HandDetector:
         self.model = model
         self._settings = settings or DetectSettings()
         try:
-            import onnxruntime
-
+            onnxruntime = _without_telemetry()
             options = onnxruntime.SessionOptions()
             options.intra_op_num_threads = 1
             options.log_severity_level = 3
@@ -108,6 +109,17 @@ class HandDetector:
         [raw] = self._session.run(["raw"], {"image": canvas[None]})
         boxes, scores = decode(raw, canvas.shape[:2], self._settings)
         return Detections(boxes / scale, scores)
+
+
+def _without_telemetry() -> Any:
+    """Return onnxruntime, which then keeps no device id in the user's folder and sends nothing."""
+    # Both are read when the library is loaded; the second is the first's former name.
+    for variable in ("ORT_DISABLE_TELEMETRY", "ORT_TELEMETRY_DISABLED"):
+        os.environ[variable] = "1"
+    import onnxruntime
+
+    onnxruntime.disable_telemetry_events()  # Windows' own tracing knows no such variable
+    return onnxruntime
 
 
 def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from skimage.measure import marching_cubes
 
+from handcal.sim.isosurface import isosurface
 from handcal.types import Float32, Float64, UInt8, freeze
 
 Side: TypeAlias = Literal["left", "right"]
@@ -214,10 +214,12 @@ def _skin(
     field = np.full(shape, 20.0, dtype=np.float32)
     for capsule in capsules:
         _add(field, capsule, low, grid)
-    vertices, triangles, normals, _ = marching_cubes(  # type: ignore[no-untyped-call]
-        field, 0.0, spacing=(grid,) * 3, gradient_direction="descent"
+    vertices, triangles, normals = isosurface(field)
+    return (
+        (vertices * np.float64(grid) + low).astype(np.float32),
+        triangles,
+        normals.astype(np.float32),
     )
-    return (vertices + low).astype(np.float32), triangles, -normals
 
 
 def _add(field: Float32, capsule: _Capsule, low: Float64, grid: float) -> None:

@@ -27,7 +27,6 @@ _PACKAGES = (
     "scipy",
     "opencv-python-headless",
     "protobuf",
-    "scikit-image",
     "onnxruntime",
     "matplotlib",
     "PySide6-Essentials",
