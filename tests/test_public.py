@@ -100,6 +100,7 @@ def test_a_name_that_is_not_public_is_refused_by_name() -> None:
         handcal.segmnt  # type: ignore[attr-defined]  # noqa: B018
 
 
+@pytest.mark.process
 def test_the_import_is_quick() -> None:
     code = "import sys, handcal; dir(handcal); print(*{'numpy', 'scipy', 'cv2'} & set(sys.modules))"
     run = subprocess.run(

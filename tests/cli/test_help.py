@@ -15,6 +15,8 @@ import handcal.cli
 from handcal.cli.main import COMMANDS, Entry, load, main
 from handcal.cli.terminal import Command
 
+pytestmark = pytest.mark.process
+
 HEAVY = {"numpy", "scipy", "cv2", "rich", "matplotlib", "onnxruntime", "handcal.types"}
 HELP = f"""
 import sys

@@ -21,6 +21,8 @@ from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 
+pytestmark = pytest.mark.process
+
 EXAMPLE = resource_path("example_session")
 FOLDERS = {
     "HOME": "home",

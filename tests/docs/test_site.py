@@ -11,6 +11,8 @@ import pytest
 import handcal
 from tests.helpers import ROOT
 
+pytestmark = pytest.mark.process
+
 _LINK = re.compile(r"\]\(([^)#\s]+)")
 
 

@@ -14,6 +14,8 @@ import pytest
 import handcal
 from tests.helpers import ROOT
 
+pytestmark = pytest.mark.process
+
 EXAMPLES = ROOT / "examples"
 ELSEWHERE = {"08_headset_client.py": "tests/link/test_headset_example.py"}
 """Run by a test of their own."""
