@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
-from handcal.cli.output import console, progress, save, table, until_interrupted
+from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import HandcalError
 from handcal.hand.settings import Roi
@@ -91,17 +91,14 @@ def record(arguments: argparse.Namespace) -> None:
     """Record a camera into a .db3 file or a folder of images."""
     from handcal.camera.record import RecordSettings
     from handcal.camera.record import record as record_camera
-    from handcal.progress import Progress
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
     with _open_source(arguments) as camera, until_interrupted() as is_stopped:
         said = f"Recording {camera.name}; press Ctrl+C to stop and keep the recording."
         console.print(said, markup=False)
         try:
-            with progress() as report:
-                recorded = record_camera(
-                    camera, arguments.output, settings, Progress(report, is_stopped)
-                )
+            with show_progress(is_stopped) as progress:
+                recorded = record_camera(camera, arguments.output, settings, progress)
         except ValueError as error:
             raise HandcalError(str(error)) from error
     save(arguments.json, asdict(recorded))

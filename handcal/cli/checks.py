@@ -8,7 +8,7 @@ import subprocess
 import sys
 from typing import Any
 
-from handcal.cli.output import console, progress, save, table
+from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command, fail
 from handcal.errors import HandcalError
 
@@ -32,9 +32,9 @@ def bench(arguments: argparse.Namespace) -> None:
     if arguments.gui:
         result = _bench_window(300 if arguments.quick else 20_000)
     else:
-        with progress() as report:
+        with show_progress() as progress:
             result = run_bench(
-                QUICK if arguments.quick else BenchSettings(), report, arguments.only
+                QUICK if arguments.quick else BenchSettings(), progress, arguments.only
             )
     save(arguments.json, result)
     shown_table = table("figure", "measured", "target", "met")

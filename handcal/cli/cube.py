@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from handcal.cli.output import console, progress, save, table
+from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.rig import GRID_OPTION
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import CameraError, HandcalError
@@ -196,7 +196,6 @@ def simulate(arguments: argparse.Namespace) -> None:
     """Render all captures of a test, with a display calibrated by a simulated hand."""
     from handcal.lab.evaluate.run import render_captures
     from handcal.lab.settings import CubeTestSettings
-    from handcal.progress import Progress
 
     settings = CubeTestSettings(
         rig=_text(arguments.rig),
@@ -205,8 +204,8 @@ def simulate(arguments: argparse.Namespace) -> None:
         poses=arguments.poses,
         alignments=arguments.alignments,
     )
-    with progress() as show:
-        render_captures(settings, arguments.folder, Progress(show))
+    with show_progress() as progress:
+        render_captures(settings, arguments.folder, progress)
     console.print(f"Captures: {arguments.folder}", markup=False)
 
 
@@ -230,7 +229,6 @@ def simulate(arguments: argparse.Namespace) -> None:
 def report(arguments: argparse.Namespace) -> None:
     """Report the errors of the drawn cube against the real one, over all captures."""
     from handcal.lab.evaluate.run import run_cube_test
-    from handcal.progress import Progress
     from handcal.report.cells import mean_sd
 
     settings = replace(
@@ -238,8 +236,8 @@ def report(arguments: argparse.Namespace) -> None:
         camera=_text(arguments.camera_intrinsics),
         output=str(arguments.output),
     )
-    with progress() as show:
-        found = run_cube_test(settings, Progress(show))
+    with show_progress() as progress:
+        found = run_cube_test(settings, progress)
     for name, why in found.test.left_out.items():
         console.print(f"Left out: {name}: {why}", markup=False)
     errors = {

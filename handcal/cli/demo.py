@@ -17,6 +17,8 @@ import numpy as np
 
 from handcal.display import reprojection_arcmin
 from handcal.errors import HandcalError
+from handcal.link.server import LinkStatistics
+from handcal.progress import Progress
 from handcal.register.solve import solve_alignment
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.procedure import Calibration, Observation, State
@@ -24,8 +26,7 @@ from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal.types import EYES, Eye, Rig
 
-Report = Callable[[str, float], None]
-
+_DELIVERY_S = 5.0
 _PATIENCE_S = 60.0
 _PATIENCE_STEPS = 300
 """Minimum number of station steps before giving up, so that a slow computer gets more time."""
@@ -48,7 +49,7 @@ class DemoSettings:
 
 
 def run_demo(
-    settings: DemoSettings, rig_path: Path, output: Path, report: Report
+    settings: DemoSettings, rig_path: Path, output: Path, progress: Progress
 ) -> dict[str, Any]:
     """Calibrate one simulated wearer, and compare the result with the truth.
 
@@ -58,7 +59,7 @@ def run_demo(
     rig_path : Path
     output : Path
         Folder in which the session is created.
-    report : callable
+    progress : Progress
         Called with the current step and the share of the whole that is done.
 
     Returns
@@ -80,9 +81,9 @@ def run_demo(
         sessions=str(output),
     )
     with Station(station_settings, "Simulated wearer") as station:
-        report("Connecting to the virtual headset", 0.0)
-        observations = _follow_plan(station, settings, report)
-        statistics = station.step().link
+        progress.at(0.0, "Connecting to the virtual headset")
+        observations = _follow_plan(station, settings, progress)
+        statistics = _delivered(station)
         station.finish()
     calibration, rig = station.calibration, station.rig
     return {
@@ -105,7 +106,15 @@ def run_demo(
     }
 
 
-def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> list[Observation]:
+def _delivered(station: Station) -> LinkStatistics:
+    """Return the link's counters once every message is acknowledged, or after a while."""
+    deadline_s = time.monotonic() + _DELIVERY_S
+    while (statistics := station.step().link).unacked and time.monotonic() < deadline_s:
+        pass
+    return statistics
+
+
+def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -> list[Observation]:
     """Do every planned alignment; solve and apply after each."""
     calibration = station.calibration
     each: tuple[tuple[Eye, ...], ...] = (
@@ -132,16 +141,16 @@ def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> li
     for number, eyes in enumerate(plan):
         which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
         label = f"Alignment {number + 1} of {len(plan)}, {which}"
-        report(f"{label}: waiting for a steady hand", (number + 0.1) / len(plan))
+        progress.at((number + 0.1) / len(plan), f"{label}: waiting for a steady hand")
         watch(lambda seen: seen.is_steady, "the wearer did not hold the hand still")
         calibration.make_cursor(eyes)
-        report(f"{label}: wearer aligns", (number + 0.3) / len(plan))
+        progress.at((number + 0.3) / len(plan), f"{label}: wearer aligns")
         watch(lambda seen: seen.state is State.ALIGNED, "the wearer did not align the hand")
-        report(f"{label}: solving", (number + 0.9) / len(plan))
+        progress.at((number + 0.9) / len(plan), f"{label}: solving")
         calibration.solve()
         calibration.apply()
         calibration.wait_applied()
-        report(f"{label}: applied and acknowledged", (number + 1.0) / len(plan))
+        progress.at((number + 1.0) / len(plan), f"{label}: applied and acknowledged")
     return observations
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from handcal.cli.output import console, progress, save, table
+from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command
 from handcal.io.files import make_folder, require_suffix
 
@@ -33,7 +33,6 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.lab.evaluate.annotations import read_annotations
     from handcal.lab.evaluate.contact_sheet import write_contact_sheet
     from handcal.lab.evaluate.detector import EVALUATED, detect_all, evaluation
-    from handcal.progress import Progress
 
     if arguments.sheet is not None:  # before the long work, whose result would be lost
         require_suffix(arguments.sheet, ".png")
@@ -41,8 +40,8 @@ def detector(arguments: argparse.Namespace) -> None:
     model = arguments.model
     finder = load_detector(EVALUATED) if model is None else HandDetector(model, EVALUATED)
     photos = read_annotations(arguments.images, arguments.annotations)
-    with progress() as show:
-        results = detect_all(photos, finder, Progress(show))
+    with show_progress() as progress:
+        results = detect_all(photos, finder, progress)
     result = evaluation(photos, results)
     shown_table = table("hands", "AP at IoU 0.5")
     for key, name in (
@@ -74,12 +73,11 @@ def users(arguments: argparse.Namespace) -> None:
     """Evaluate the user test over sessions: errors of calibrations against the wearers' view."""
     from handcal.lab.evaluate.run import run_user_test
     from handcal.lab.settings import UserTestSettings
-    from handcal.progress import Progress
     from handcal.report.cells import interval_ends, mean_sd
 
     settings = UserTestSettings(tuple(map(str, arguments.folder)), str(arguments.output))
-    with progress() as show:
-        found = run_user_test(settings, Progress(show))
+    with show_progress() as progress:
+        found = run_user_test(settings, progress)
     result = found.result
     save(arguments.json, asdict(result))
     shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")

@@ -11,10 +11,12 @@ from typing import Any
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bar
 from rich.table import Table
 
 from handcal.io.files import make_folder, write_json
+from handcal.progress import Progress
 
 console = Console(soft_wrap=True, highlight=False)
 
@@ -40,8 +42,8 @@ def save(path: Path | None, result: dict[str, Any]) -> None:
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str, float], None]]:
-    """Yield a function that shows progress: a bar on a terminal, else plain lines."""
+def show_progress(is_cancelled: Callable[[], bool] = lambda: False) -> Iterator[Progress]:
+    """Show the progress of a task: a bar on a terminal, else plain lines."""
     if not console.is_terminal:
         last = ("", 0)
 
@@ -51,12 +53,14 @@ def progress() -> Iterator[Callable[[str, float], None]]:
                 last = what, int(10 * share)
                 console.print(f"{100 * share:3.0f} % {what}", markup=False)
 
-        yield say
+        yield Progress(say, is_cancelled)
         return
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=1.0)
-        yield lambda what, share: bar.update(task, description=what, completed=share)
+        yield Progress(
+            lambda what, share: bar.update(task, description=what, completed=share), is_cancelled
+        )
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
-from handcal.cli.output import console, progress, table, until_interrupted
+from handcal.cli.output import console, show_progress, table, until_interrupted
 from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
@@ -155,7 +155,6 @@ def take(arguments: argparse.Namespace) -> None:
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.take_board import TakeSettings, capture_views, keep_imager
     from handcal.camera.view_source import open_view_source
-    from handcal.progress import Progress
     from handcal.rig.choose import ALIKE, ChooseSettings
 
     sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
@@ -179,9 +178,9 @@ def take(arguments: argparse.Namespace) -> None:
         names = " and ".join(one.name for one in cameras)
         console.print(f"Capturing from {names}; press Ctrl+C to stop", markup=False)
         is_stopped = stack.enter_context(until_interrupted())
-        report = stack.enter_context(progress())
+        progress = stack.enter_context(show_progress(is_stopped))
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
-        taken = capture_views(cameras, folders, board, settings, Progress(report, is_stopped))
+        taken = capture_views(cameras, folders, board, settings, progress)
     for why, count in taken.passed_over.items():
         console.print(f"{count} of {taken.looked_at} moments skipped: {why}")
     if not taken.kept:
@@ -335,11 +334,10 @@ def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Gri
 
 def views_of(paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()) -> tuple[View, ...]:
     """Look for a board in images, with progress; leave those out that are dropped."""
-    from handcal.progress import Progress
     from handcal.rig.views import drop, image_files, read_views
 
-    with progress() as report:
-        views = read_views(image_files(paths), board, Progress(report))
+    with show_progress() as progress:
+        views = read_views(image_files(paths), board, progress)
     return drop(views, dropped)
 
 

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from handcal.cli.output import console, progress, save, table, triple
+from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import FileError
 from handcal.export.formats import FORMATS
@@ -87,7 +87,6 @@ def solve(arguments: argparse.Namespace) -> None:
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
-    from handcal.progress import Progress
     from handcal.session.session import Session
 
     try:
@@ -98,7 +97,7 @@ def export(arguments: argparse.Namespace) -> None:
         fail(str(error), 2)
     record = Session.open(arguments.session)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
-    with progress() as report:
-        files = export_session(record, folder, settings, Progress(report))
+    with show_progress() as progress:
+        files = export_session(record, folder, settings, progress)
     for file in files:
         console.print(str(file))

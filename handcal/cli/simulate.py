@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from handcal.cli.output import console, progress, save, table, triple
+from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, number
 from handcal.io.files import make_folder
 
@@ -69,8 +69,9 @@ def demo(arguments: argparse.Namespace) -> None:
         reorder=arguments.reorder,
         worn_rig=str(arguments.worn_rig or ""),
     )
-    with progress() as report:
-        result = run_demo(settings, _rig_path(arguments.rig), make_folder(arguments.output), report)
+    with show_progress() as progress:
+        rig = _rig_path(arguments.rig)
+        result = run_demo(settings, rig, make_folder(arguments.output), progress)
     save(arguments.json, result)
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "error, mm", "verdict")
     for eye, found in result["eyes"].items():

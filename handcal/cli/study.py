@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.output import console, progress, save, table, until_interrupted
+from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.terminal import Option, arg, command, fail, number
 from handcal.errors import CancelledError
 
@@ -131,11 +131,9 @@ def recorded(arguments: argparse.Namespace) -> None:
 
 def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]) -> StudyResult:
     """Run a study until it is complete or Ctrl+C is pressed; print and save its results."""
-    from handcal.progress import Progress
-
     try:
-        with until_interrupted() as is_cancelled, progress() as show:
-            result = order(Progress(show, is_cancelled))
+        with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
+            result = order(progress)
     except CancelledError as error:
         fail(str(error), 130)
     figures = {figure.name: list(figure.rows) for figure in result.report.figures}

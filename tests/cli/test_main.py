@@ -23,6 +23,7 @@ from handcal.cli.main import main
 from handcal.geometry import rigid
 from handcal.lab import bench
 from handcal.link.pairing import KEY_VARIABLE
+from handcal.progress import Progress
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.sim.hand import make_hand
@@ -222,10 +223,8 @@ def test_bench_shows_and_saves_its_figures(
         "met": True,
     }
 
-    def pretend(
-        settings: object, report: Callable[[str, float], None], only: str
-    ) -> dict[str, Any]:
-        report("speed", 0.5)
+    def pretend(settings: object, progress: Progress, only: str) -> dict[str, Any]:
+        progress.at(0.5, "speed")
         return {"figures": [figure], "quick": settings == bench.QUICK and not only}
 
     monkeypatch.setattr(bench, "run_bench", pretend)

@@ -109,7 +109,7 @@ def test_a_figure_is_plotted(tmp_path: Path) -> None:
 )
 def test_a_session_that_is_missing_is_named(name: str, tmp_path: Path) -> None:
     error = run(name, "--session", tmp_path / "missing", code=1)
-    assert "missing is no session; give the folder that holds its journal.jsonl" in error
+    assert "missing is not a session; choose the folder that contains journal.jsonl" in error
 
 
 def test_every_example_is_run_and_has_a_docstring_and_a_main() -> None:

@@ -8,11 +8,12 @@ import numpy as np
 
 from handcal.lab.bench.figure import Figure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured
 from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
 from handcal.link.pairing import new_pairing_key
 from handcal.link.server import HeadsetServer
+from handcal.progress import Progress
 
 _LOSSES = 0.0, 0.3
 _PATIENCE_S = 5.0
@@ -27,7 +28,7 @@ def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
         median_ms = float(np.median(durations_ms))
         figures.append(Figure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
         worst_ms[f"{loss:g}"] = max(durations_ms)
-        progress(done / len(_LOSSES))
+        progress.at(done / len(_LOSSES))
     return Measured(figures, {"worst_ms_at_loss": worst_ms})
 
 

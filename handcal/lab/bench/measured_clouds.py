@@ -9,13 +9,13 @@ from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import (
     Errors,
     Measured,
-    Progress,
     collect_errors,
     mean_length_mm,
     run_trials,
     trial_alignment,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
+from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 
 _FOREARM_M = 0.02, 0.06

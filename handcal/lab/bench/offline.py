@@ -13,7 +13,8 @@ from handcal.geometry import image_points, invert, rigid
 from handcal.lab.bench.figure import Figure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured
+from handcal.progress import Progress
 from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.board import Board
 from handcal.rig.camera import calibrate_camera
@@ -91,9 +92,9 @@ def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
     runs = []
     for seed in range(settings.offline_rigs):
         runs.append(calibrate_from_photographs(example_rig(), seed))
-        progress(0.5 * (seed + 1) / settings.offline_rigs)
+        progress.at(0.5 * (seed + 1) / settings.offline_rigs)
     ratios = _stand_in_ratios([run.rig for run in runs], settings.offline_wearers, progress)
-    progress(1.0)
+    progress.at(1.0)
     figures = [
         Figure(what, max(scale * getattr(run, name) for run in runs), unit, at_most=target)
         for what, name, scale, unit, target in _FIGURES
@@ -118,13 +119,16 @@ def _stand_in_ratios(rigs: list[Rig], wearers: int, progress: Progress) -> list[
     """Return the ratio of wearers' reprojection errors with each rig and with the true one."""
     if not rigs:
         return []
-    errors = []
-    for number, rig in enumerate([example_rig(), *rigs]):
-
-        def told(share: float, number: int = number) -> None:
-            progress(0.5 + 0.5 * (number + share) / (1 + len(rigs)))
-
-        errors.append(reprojection_of_wearers(rig, example_rig(), wearers, told))
+    count = 1 + len(rigs)
+    errors = [
+        reprojection_of_wearers(
+            rig,
+            example_rig(),
+            wearers,
+            progress.part(0.5 + 0.5 * number / count, 0.5 + 0.5 * (number + 1) / count),
+        )
+        for number, rig in enumerate([example_rig(), *rigs])
+    ]
     return [ratio_of_means(one, errors[0]) for one in errors[1:]]
 
 

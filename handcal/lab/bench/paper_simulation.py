@@ -18,12 +18,12 @@ from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import (
     Errors,
     Measured,
-    Progress,
     collect_errors,
     mean_length_mm,
     trial_alignment,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
+from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings
 from handcal.types import METHODS, Float64
 

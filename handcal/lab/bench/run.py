@@ -16,8 +16,9 @@ from handcal.lab.bench.paper_simulation import measure_paper_simulation
 from handcal.lab.bench.scale import measure_scale
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.speed import measure_speed
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured
 from handcal.lab.bench.wearer import measure_wearer
+from handcal.progress import Progress
 
 PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "speed": measure_speed,
@@ -35,7 +36,7 @@ _MET = {True: "met", False: "missed", None: ""}
 
 def run_bench(
     settings: BenchSettings,
-    report: Callable[[str, float], None] | None = None,
+    progress: Progress = Progress(),
     only: str = "",
 ) -> dict[str, Any]:
     """Measure all of `PARTS` in turn, or only one.
@@ -43,8 +44,8 @@ def run_bench(
     Parameters
     ----------
     settings : BenchSettings
-    report : callable, optional
-        Called with the name of the present part and the share of it that is done.
+    progress : Progress, optional
+        Reports the name of the present part and the share of it that is done.
     only : str
         Name of a part; empty for all.
 
@@ -58,13 +59,8 @@ def run_bench(
     for name, measure in PARTS.items():
         if only not in ("", name):
             continue
-
-        def progress(fraction: float, name: str = name) -> None:
-            if report is not None:
-                report(name, fraction)
-
-        progress(0.0)
-        measured[name] = measure(settings, progress)
+        progress.at(0.0, name)
+        measured[name] = measure(settings, progress.part(0.0, 1.0, name))
     return {
         "environment": _environment(),
         "settings": asdict(settings),

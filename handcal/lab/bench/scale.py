@@ -9,11 +9,11 @@ from time import perf_counter
 
 from handcal.lab.bench.figure import Figure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured
 from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
 from handcal.lab.study.run import Study, run_study
 from handcal.lab.study.store import Row
-from handcal.progress import Progress as TaskProgress
+from handcal.progress import Progress
 
 # Each process makes its own hands; in a whole study this time is negligible.
 _HANDS = 2
@@ -24,7 +24,7 @@ _PER_MINUTE = 2000.0
 def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
     """Run a small noise study in this process, then in two, including their start."""
     if not settings.study_trials:
-        progress(1.0)
+        progress.at(1.0)
         return Measured([], {})
     study = noise_study(
         replace(
@@ -36,8 +36,8 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
             paper_trials=0,
         )
     )
-    alone_s, _ = _timed(study, 1, lambda share: progress(0.6 * share))
-    together_s, rows = _timed(study, 2, lambda share: progress(0.6 + 0.4 * share))
+    alone_s, _ = _timed(study, 1, progress.part(0.0, 0.6))
+    together_s, rows = _timed(study, 2, progress.part(0.6, 1.0))
     solved = sum(row["method"] != FLOOR for row in rows)
     return Measured(
         [
@@ -61,6 +61,5 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
 def _timed(study: Study, workers: int, progress: Progress) -> tuple[float, list[Row]]:
     with TemporaryDirectory() as folder:
         start_s = perf_counter()
-        shown = TaskProgress(report=lambda _what, share: progress(share))
-        rows = run_study(study, Path(folder), workers=workers, progress=shown)
+        rows = run_study(study, Path(folder), workers=workers, progress=progress)
         return perf_counter() - start_s, rows

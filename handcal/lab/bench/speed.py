@@ -16,7 +16,8 @@ from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.hand.shipped import load_detector
 from handcal.lab.bench.figure import Figure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Measured, Progress, trial_hand
+from handcal.lab.bench.trials import Measured, trial_hand
+from handcal.progress import Progress
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
@@ -43,11 +44,11 @@ def measure_speed(settings: BenchSettings, progress: Progress) -> Measured:
     trials = range(settings.paper_repeats)
     alignments = [_noisy_alignment(trial, settings.points) for trial in trials]
     figures = _segmentation(settings.repeats)
-    progress(0.1)
+    progress.at(0.1)
     figures += _registration(alignments, settings.repeats)
-    progress(0.2)
+    progress.at(0.2)
     figures += _solving(alignments, settings.repeats)
-    progress(1.0)
+    progress.at(1.0)
     return Measured(figures, {"points": settings.points, "alignments": len(alignments)})
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from handcal.display import reprojection_arcmin
-from handcal.lab.bench.trials import Progress, run_trials, trial_hand
+from handcal.lab.bench.trials import run_trials, trial_hand
+from handcal.progress import Progress
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
 from handcal.sim.overlay import overlay_by_eye

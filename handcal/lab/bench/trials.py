@@ -13,6 +13,7 @@ import numpy as np
 
 from handcal.lab.bench.figure import Figure
 from handcal.lab.study.trials import study_hand
+from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment, simulate_alignment
 from handcal.sim.hand import HandModel
 from handcal.types import Float64
@@ -21,8 +22,6 @@ Task = TypeVar("Task")
 Case = TypeVar("Case")
 Outcome = TypeVar("Outcome")
 
-Progress: TypeAlias = Callable[[float], None]
-"""Called with the share done."""
 
 Errors: TypeAlias = Mapping[str, Float64]
 """Errors of φ by method or floor: (3,) for one trial, (trials, 3) for several."""
@@ -46,7 +45,7 @@ def run_trials(
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for outcome in pool.map(trial, tasks):
             outcomes.append(outcome)
-            progress(len(outcomes) / len(tasks))
+            progress.at(len(outcomes) / len(tasks))
     return outcomes
 
 

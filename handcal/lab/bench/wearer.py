@@ -6,7 +6,8 @@ import numpy as np
 
 from handcal.lab.bench.figure import Figure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Errors, Measured, Progress, collect_errors, trial_hand
+from handcal.lab.bench.trials import Errors, Measured, collect_errors, trial_hand
+from handcal.progress import Progress
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye

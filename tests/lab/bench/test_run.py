@@ -4,6 +4,7 @@ from typing import Any
 import pytest
 
 from handcal.lab.bench import QUICK, bench_table, run_bench
+from handcal.progress import Progress
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +14,7 @@ def told() -> list[tuple[str, float]]:
 
 @pytest.fixture(scope="module")
 def results(told: list[tuple[str, float]]) -> dict[str, Any]:
-    return run_bench(QUICK, lambda *progress: told.append(progress))
+    return run_bench(QUICK, Progress(lambda *progress: told.append(progress)))
 
 
 def _value(results: dict[str, Any], what: str) -> float:

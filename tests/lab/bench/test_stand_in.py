@@ -9,6 +9,7 @@ import pytest
 
 from handcal.geometry import rigid
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
+from handcal.progress import Progress
 from handcal.rig.example import example_rig
 
 
@@ -16,7 +17,8 @@ def test_a_rig_that_is_wrong_leaves_wearers_worse_off() -> None:
     true = example_rig()
     wrong = replace(true, T_H_D=true.T_H_D @ rigid([0.0, 0.0, 0.0], [0.02, 0.0, 0.0]))
     told: list[float] = []
-    same, worse = (reprojection_of_wearers(rig, true, 3, told.append) for rig in (true, wrong))
+    progress = Progress(lambda _, share: told.append(share))
+    same, worse = (reprojection_of_wearers(rig, true, 3, progress) for rig in (true, wrong))
     assert told == [1 / 3, 2 / 3, 1.0] * 2
     assert ratio_of_means(worse, same).mean > 1.3
 

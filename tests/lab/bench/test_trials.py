@@ -9,6 +9,7 @@ from handcal.lab.bench.trials import (
     trial_alignment,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
+from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings
 
 SMALL = AlignmentSettings(count=300)
@@ -16,13 +17,15 @@ SMALL = AlignmentSettings(count=300)
 
 def test_outcomes_keep_the_order_of_their_tasks() -> None:
     told: list[float] = []
-    assert run_trials(lambda task: task * task, range(5), told.append) == [0, 1, 4, 9, 16]
+    assert run_trials(
+        lambda task: task * task, range(5), Progress(lambda _, share: told.append(share))
+    ) == [0, 1, 4, 9, 16]
     np.testing.assert_allclose(told, [0.2, 0.4, 0.6, 0.8, 1.0])
 
 
 def test_a_failed_trial_is_not_hidden() -> None:
     with pytest.raises(ZeroDivisionError):
-        run_trials(lambda task: 1 / task, [1, 0], lambda _: None)
+        run_trials(lambda task: 1 / task, [1, 0], Progress())
 
 
 def test_errors_are_stacked_by_case_and_method() -> None:
@@ -30,7 +33,7 @@ def test_errors_are_stacked_by_case_and_method() -> None:
         errors = {"quick": np.full(3, len(case) + number)}
         return errors if number else errors | {"slow": np.zeros(3)}
 
-    by_case = collect_errors(trial, ["a", "bb"], 3, lambda _: None)
+    by_case = collect_errors(trial, ["a", "bb"], 3, Progress())
     assert list(by_case) == ["a", "bb"]
     np.testing.assert_array_equal(by_case["bb"]["quick"][:, 0], [2, 3, 4])
     assert by_case["bb"]["slow"].shape == (1, 3)
