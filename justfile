@@ -6,13 +6,17 @@ export OMP_NUM_THREADS := "1"
 default:
     @just --list
 
-# style, layers, the shared vocabulary and the golden numbers
+# style, layers, and the tests without windows and processes, within two minutes
 quick:
-    ruff check && ruff format --check && lint-imports && python -m pytest -q tests/test_*.py
+    ruff check && ruff format --check && lint-imports && python -m pytest -q -n 2 -m quick
 
-# set-up, then every check and every test
+# set-up, then every check, and every test that is not slow
 test *arguments:
     bash installer/test.sh {{arguments}}
+
+# every test, the slow ones too
+test-all:
+    bash installer/test.sh -m ""
 
 # the documentation site, in results/site
 docs:
