@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -21,7 +22,7 @@ PAPERS: dict[Paper, tuple[float, float]] = {
     "letter": (0.2159, 0.2794),
     "tabloid": (0.2794, 0.4318),
 }
-_POINTS_PER_M = 72 / 0.0254
+_INCH_M = 0.0254
 _EDGE_M = 0.005  # what printers cannot reach
 _RULER_M, _CAPTION_M = 0.1, 0.012
 
@@ -39,7 +40,7 @@ def write_page(
     rectangles_m : (N, 4) float64
         What is black: left, top, right, bottom, from its upper left corner.
     caption : str
-        ASCII without parentheses: PDF's plain text.
+        One line of text.
     paper : Paper
         Turned if need be.
 
@@ -51,14 +52,24 @@ def write_page(
         If `path` does not end in ``.pdf``, or cannot be written.
     """
     require_suffix(path, ".pdf")
+    # Imported late: matplotlib is slow to import, and the commands' options need only PAPERS.
+    from matplotlib.collections import PatchCollection
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
+
     page_m = _page(size_m, paper)
     origin_m = (page_m - size_m - [0.0, _CAPTION_M]) / 2
     black_m = [*(rectangles_m + np.tile(origin_m, 2)), *_ruler(page_m)]
-    drawn = "\n".join(_pdf_rectangle(rectangle, page_m[1]) for rectangle in black_m)
-    x, y = _points(np.array([_EDGE_M + _RULER_M + 0.005, _EDGE_M]))
+    figure = Figure(figsize=tuple(page_m / _INCH_M))
+    axes = figure.add_axes((0, 0, 1, 1), xlim=(0, page_m[0]), ylim=(page_m[1], 0))
+    axes.set_axis_off()
+    patches = [Rectangle((x0, y0), x1 - x0, y1 - y0) for x0, y0, x1, y1 in black_m]
+    axes.add_collection(PatchCollection(patches, facecolor="black", linewidth=0))
     text = f"{caption}. Print at 100 %; the ruler is 100 mm long."
-    words = f"BT /F1 8 Tf {x:.3f} {y:.3f} Td ({text}) Tj ET"
-    write_atomic(path, _pdf(_points(page_m), f"{drawn}\n{words}\n".encode("ascii")))
+    axes.text(_EDGE_M + _RULER_M + 0.005, page_m[1] - _EDGE_M, text, fontsize=8, parse_math=False)
+    data = BytesIO()
+    figure.savefig(data, format="pdf", metadata={"CreationDate": None})
+    write_atomic(path, data.getvalue())
 
 
 def _page(size_m: Float64, paper: Paper) -> Float64:
@@ -83,36 +94,3 @@ def _ruler(page_m: Float64) -> Float64:
     places = np.linspace(_EDGE_M, _EDGE_M + _RULER_M - 0.0002, 11)
     ticks = [[place, bottom - 0.004, place + 0.0002, bottom] for place in places]
     return np.array([line, *ticks])
-
-
-def _points(lengths_m: Float64) -> Float64:
-    return lengths_m * _POINTS_PER_M
-
-
-def _pdf_rectangle(rectangle_m: Float64, page_height_m: float) -> str:
-    """Return PDF's words for a filled rectangle; its y axis points up."""
-    left, top, right, bottom = rectangle_m
-    x, y = _points(np.array([left, page_height_m - bottom]))
-    width, height = _points(np.array([right - left, bottom - top]))
-    return f"{x:.4f} {y:.4f} {width:.4f} {height:.4f} re f"
-
-
-def _pdf(size_points: Float64, content: bytes) -> bytes:
-    """Return a PDF file of one page (ISO 32000-1, 7.5)."""
-    width, height = size_points
-    objects = [
-        b"<< /Type /Catalog /Pages 2 0 R >>",
-        b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-        b"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 %.4f %.4f] /Contents 5 0 R "
-        b"/Resources << /Font << /F1 4 0 R >> >> >>" % (width, height),
-        b"<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>",
-        b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
-    ]
-    data, offsets = b"%PDF-1.4\n", []
-    for number, text in enumerate(objects, 1):
-        offsets.append(len(data))
-        data += b"%d 0 obj\n%s\nendobj\n" % (number, text)
-    table = b"".join(b"%010d 00000 n \n" % offset for offset in offsets)
-    head = b"xref\n0 %d\n0000000000 65535 f \n%s" % (len(objects) + 1, table)
-    trailer = b"trailer << /Size %d /Root 1 0 R >>\n" % (len(objects) + 1)
-    return data + head + trailer + b"startxref\n%d\n%%%%EOF\n" % len(data)
