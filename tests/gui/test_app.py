@@ -72,7 +72,9 @@ def test_without_a_display(
         monkeypatch.delenv(name, raising=False)
     assert "handcal demo" in complaint(capsys, monkeypatch, code=1)
     monkeypatch.setenv("DISPLAY", ":4711")
-    assert "no X server answers at DISPLAY=:4711" in complaint(capsys, monkeypatch, code=1)
+    assert "cannot connect to the X server at DISPLAY=:4711" in complaint(
+        capsys, monkeypatch, code=1
+    )
 
 
 def test_help_tells_every_option(

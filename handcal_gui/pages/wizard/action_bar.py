@@ -26,8 +26,7 @@ _KEYS = (_KEY, _TEXT_KEY, "Ctrl+Enter")
 _LONGEST_LABEL = "Confirm for the wearer"
 _MOST_OTHERS = 3
 _ARMING_MS = 700
-"""Delay until a new button that discards data is enabled: a click meant for the previous button has
-no effect."""
+"""Delay before a new button can discard data: a click on its predecessor must not trigger it."""
 
 
 class ActionBar(QWidget):
