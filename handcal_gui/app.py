@@ -1,6 +1,6 @@
-"""The command ``handcal-gui``: its arguments, and a window at once.
+"""The command ``handcal-gui``: reads its arguments and shows a window immediately.
 
-Everything heavy is imported behind that window, which the program then takes over.
+Heavy imports follow while that window is shown; the main window then replaces it.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ def main() -> NoReturn:
 
 
 def keep_window_quick() -> None:
-    """Let the window's thread wait for the engine's by half a millisecond instead of five."""
+    """Make the window's thread wait at most 0.5 ms for the engine's thread instead of 5 ms."""
     sys.setswitchinterval(0.0005)
 
 
 def first_window(size: QSize | None) -> QLabel:
-    """Show at once that the program starts, where it will appear."""
+    """Show a message that the program is starting, where the main window will appear."""
     window = QLabel("Starting handcal…", alignment=Qt.AlignmentFlag.AlignCenter)
     window.setWindowTitle("Starting…")
     screen = QApplication.primaryScreen().availableSize()
@@ -66,35 +66,40 @@ def _parser() -> argparse.ArgumentParser:
         prog="handcal-gui",
         description="Calibrate an optical see-through headset with the wearer's bare hand.",
     )
-    parser.add_argument("session", nargs="?", type=Path, help="a stored session to look at")
+    parser.add_argument("session", nargs="?", type=Path, help="a stored session to open")
     parser.add_argument(
         "--source",
         metavar="SOURCE",
         help="simulator, realsense, or a recording: a .db3 or .bag file, or a folder",
     )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig file")
-    parser.add_argument("--seed", type=_seed, metavar="N", help="of the simulated wearer")
+    parser.add_argument("--seed", type=_seed, metavar="N", help="seed of the simulated wearer")
     parser.add_argument(
-        "--autopilot", action="store_true", help="calibrate the simulated wearer by itself, and end"
+        "--autopilot",
+        action="store_true",
+        help="calibrate the simulated wearer automatically, then exit",
     )
     parser.add_argument(
         "--output",
         type=Path,
         default=Path("handcal-demonstration"),
         metavar="DIR",
-        help="where the autopilot's session and export go (default: %(default)s)",
+        help="folder for the autopilot's session and export (default: %(default)s)",
     )
     parser.add_argument(
         "--screenshots",
         type=Path,
         metavar="DIR",
-        help="save a picture of every step, panel and dialog on the way, as the autopilot goes",
+        help="run the autopilot and save screenshots of every step, panel and dialog",
     )
     parser.add_argument(
-        "--size", type=_size, metavar="WxH", help="of the window at first, such as 1280x800"
+        "--size", type=_size, metavar="WxH", help="initial size of the window, such as 1280x800"
     )
     parser.add_argument(
-        "--preferences", type=Path, metavar="FILE", help="remember things in FILE, not for the user"
+        "--preferences",
+        type=Path,
+        metavar="FILE",
+        help="preferences file to use instead of the user's",
     )
     return parser
 
@@ -113,23 +118,23 @@ def _size(text: str) -> QSize:
 
 
 def _require_display() -> None:
-    """End with one line where Qt would abort."""
+    """Exit with a one-line message where Qt would abort."""
     others = {"WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}
     if not sys.platform.startswith("linux") or others & set(os.environ):
         return
     display = os.environ.get("DISPLAY")
     if not display:
-        _fail("there is no display; `handcal demo` does the same without one", 1)
+        _fail("no display found; `handcal demo` runs the same calibration without one", 1)
     if not _answers(display):
         _fail(
-            f"no X server answers at DISPLAY={display}; start one, or let DISPLAY name one that "
-            "lets you in, or use `handcal demo`, which needs none",
+            f"cannot connect to the X server at DISPLAY={display}; start it, or set DISPLAY to "
+            "one that accepts you, or use `handcal demo`, which needs none",
             1,
         )
 
 
 def _answers(display: str) -> bool:
-    """Tell whether an X server lets this user in, asking as Qt will."""
+    """Return whether an X server accepts a connection by this user, made as Qt will make it."""
     try:
         xcb = ctypes.CDLL("libxcb.so.1")
     except OSError:

@@ -1,8 +1,8 @@
-"""How quick the window is: ``python -m handcal_gui.benchmark``, which ``handcal bench --gui`` runs.
+"""Benchmark of the window: ``python -m handcal_gui.benchmark``, run by ``handcal bench --gui``.
 
-A camera of rendered frames streams 1280x720 at 30 a second through a real station. A process of
-its own tells poses in a headset's place, and never confirms, so that every frame is segmented,
-guarded and shown in all panels.
+A camera of rendered frames streams 1280x720 at 30 Hz through a real station. A separate process
+sends poses in place of a headset and never confirms, so that every frame is segmented, checked by
+the guard and shown in all panels.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class _FilmCamera(Closable):
 
 
 class _Film:
-    """The hand as the cursor's, and turned, with noise of its own in every frame."""
+    """Frames of the hand in the cursor's pose and rotated, each with its own noise."""
 
     def __init__(self) -> None:
         self.is_turned = False
@@ -125,7 +125,7 @@ def _shoot(world: World, T_D_hand: Float64) -> list[Frame]:
 
 
 class _FilmStation(Station):
-    """A station that films instead of opening a camera."""
+    """A station that plays a film instead of opening a camera."""
 
     def __init__(self, film: _Film, settings: StationSettings) -> None:
         self._film = film
@@ -136,13 +136,13 @@ class _FilmStation(Station):
 
 
 class _Measurement(QObject):
-    """Watches the window for so many frames, then ends the program.
+    """Measures the window for a number of frames, then ends the program.
 
     Attributes
     ----------
     delays_ms, ages_ms, memory_mb : list of float
-        Of every heartbeat beyond its period, of every frame when it is on the screen, and of the
-        process every hundred frames.
+        Delay of every heartbeat beyond its period, age of every frame when it is on the screen,
+        and memory of the process every hundred frames.
     """
 
     def __init__(self, program: Program, film: _Film, frames: int) -> None:
@@ -164,7 +164,7 @@ class _Measurement(QObject):
         self._heart.start()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Look at the clock when what the window paints now is painted."""
+        """Take the time when the window has painted the current frame."""
         if event.type() == QEvent.Type.UpdateRequest and self._shown_ns:
             shown_ns, self._shown_ns = self._shown_ns, 0
             QTimer.singleShot(0, lambda: self._painted(shown_ns))
@@ -199,7 +199,7 @@ class _Measurement(QObject):
 
 
 def measure(frames: int) -> list[Figure]:
-    """Return the figures of so many frames after a warm-up.
+    """Return the figures of a number of frames after a warm-up.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def measure(frames: int) -> list[Figure]:
         program = Program(PreferencesFile(folder / "preferences.json"))
         program.window.resize(1920, 1080)
         program.window.show()
-        # No camera is opened for a recording whose frames lie in memory.
+        # No camera is opened for a recording, and the frames are in memory.
         settings = StationSettings(
             source="recording",
             headset="network",
@@ -250,11 +250,11 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=20_000)
     arguments = parser.parse_args()
     figures: list[dict[str, Any]] = [figure.to_json() for figure in measure(arguments.frames)]
-    print(json.dumps({"figures": figures}))  # noqa: T201 (this is what it is for)
+    print(json.dumps({"figures": figures}))  # noqa: T201 (the output of this command)
 
 
 def _show_every_panel(program: Program) -> None:
-    """Give the panels behind others windows of their own."""
+    """Move the panels hidden behind others to windows of their own."""
     for i, name in enumerate(("fine_tune", "trials", "session", "link")):
         dock = program.window.docks[name]
         dock.setFloating(True)
@@ -264,7 +264,7 @@ def _show_every_panel(program: Program) -> None:
 
 @contextmanager
 def _headset(port: int) -> Iterator[None]:
-    """Run what stands for the headset, which really is another computer."""
+    """Run a process in place of the headset, which in reality is another computer."""
     command = [sys.executable, "-c", _HEADSET, str(port)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True)  # noqa: S603
     assert process.stdin is not None
@@ -282,7 +282,7 @@ def _free_port() -> int:
 
 
 def _start_s(code: str) -> float:
-    """Return the median time of a process that ends with its first window on the screen."""
+    """Return the median duration of a process that ends once its first window is shown."""
     took_s = []
     for _ in range(_STARTS):
         started_s = time.perf_counter()
@@ -299,7 +299,7 @@ def _resident_mb() -> float:
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmRSS:"):
             return int(line.split()[1]) / 1024
-    raise OSError("the memory in use is known on Linux only")
+    raise OSError("the memory in use can be measured on Linux only")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the command line asks for, once everything is imported."""
+"""Run the program as the command line requests, once everything is imported."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LOG_BYTES = 2**20
 
 
 class LaunchError(Exception):
-    """Why the program cannot begin or did not succeed, and the exit status."""
+    """The program could not start or did not succeed; carries the exit status."""
 
     def __init__(self, why: object, code: int) -> None:
         super().__init__(str(why))
@@ -42,14 +42,14 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     ----------
     app : QApplication
     arguments : Namespace
-        Of the command line.
+        Arguments of the command line.
     first : QWidget
-        The window that stands in its place until then.
+        The window shown until the main window replaces it.
 
     Raises
     ------
     LaunchError
-        If it cannot begin, or the autopilot fails.
+        If the program cannot start, or the autopilot fails.
     """
     app.setApplicationDisplayName("handcal")
     app.setWindowIcon(QIcon(str(resource_path("icons/handcal.svg"))))
@@ -61,9 +61,9 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
         raise LaunchError(error, 1) from error
     sys.excepthook = lambda *error: _tell(program, *error)
     for number in (signal.SIGINT, signal.SIGTERM):
-        # By the event loop, which may have yet to begin.
+        # From the event loop, which may not run yet.
         signal.signal(number, lambda *_: QTimer.singleShot(0, program.window.close))
-    awake = QTimer()  # lets Python see the signal
+    awake = QTimer()  # runs Python code regularly, so that signals are handled
     awake.start(200)
     if arguments.size:
         program.window.resize(arguments.size)
@@ -81,7 +81,7 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
 
 
 def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | None:
-    """Do at once what the arguments ask for."""
+    """Start what the arguments request."""
     settings = _station(program.preferences.station, arguments)
     if _is_demonstration(arguments):
         demonstration = Demonstration(program, arguments.output, arguments.screenshots)
@@ -95,7 +95,7 @@ def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | N
 
 
 def _station(settings: StationSettings, arguments: argparse.Namespace) -> StationSettings:
-    """Return the station that the arguments ask for."""
+    """Return the settings of the station, changed as the arguments request."""
     match arguments.source or ("simulator" if _is_demonstration(arguments) else None):
         case None:
             pass
@@ -104,7 +104,7 @@ def _station(settings: StationSettings, arguments: argparse.Namespace) -> Statio
         case "realsense":
             settings = replace(settings, source="realsense", headset="network")
         case path:
-            recording = str(Path(path).absolute())  # remembered, to be found from any folder
+            recording = str(Path(path).absolute())  # remembered, and valid from any folder
             settings = replace(settings, source="recording", recording=recording, headset="virtual")
     if arguments.rig:
         settings = replace(settings, rig=str(arguments.rig.absolute()))
@@ -130,9 +130,9 @@ def _log_to(path: Path) -> None:
 def _tell(
     program: Program, kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> None:
-    """Log an error that nobody expected, and say so; what was captured is on the disk already."""
-    logging.getLogger(__name__).error("broke down", exc_info=(kind, error, trace))
+    """Log and show an unexpected error; captured data is already on the disk."""
+    logging.getLogger(__name__).error("unexpected error", exc_info=(kind, error, trace))
     program.window.banner.show_message(
-        f"handcal broke down ({kind.__name__}: {error}). Everything captured is saved; "
-        "restart the program if it does not go on."
+        f"handcal hit an unexpected error ({kind.__name__}: {error}). Everything captured is "
+        "saved; restart the program if it no longer works."
     )

@@ -1,4 +1,4 @@
-"""What the program remembers from one start to the next, and the file that holds it."""
+"""Settings that the program remembers between runs, and the file that stores them."""
 
 from __future__ import annotations
 
@@ -30,42 +30,42 @@ def _default_station() -> StationSettings:
 
 @dataclass(frozen=True, slots=True)
 class Preferences:
-    """What the technician chose, to be chosen again."""
+    """The technician's choices, proposed again at the next start."""
 
     station: StationSettings = field(default_factory=_default_station)
     plan: EyePlan = "each"
-    """Which eyes are aligned when."""
+    """The order in which the eyes are aligned."""
     wearers: tuple[str, ...] = ()
     sessions: tuple[str, ...] = ()
-    """Names, and paths of session folders, the newest first."""
+    """Names of wearers, and paths of session folders; newest first."""
     export: ExportSettings = field(default_factory=ExportSettings)
     export_folder: str = ""
-    """Where the last export went; empty before the first."""
+    """Folder of the last export; empty before the first."""
     fine_tune_step_m: float = 5e-4
     evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
     theme: Theme = "system"
     geometry: str = ""
     live_layout: str = ""
     review_layout: str = ""
-    """Of the window and of its docks on either page, as Qt gives them, in base64."""
+    """Geometry of the window and layouts of its docks on either page: Qt's state in base64."""
 
     def with_wearer(self, name: str) -> Self:
-        """Return these with a wearer's name as the newest."""
+        """Return a copy with a wearer's name as the newest."""
         return replace(self, wearers=_newest_first(name, self.wearers, _MOST_WEARERS))
 
     def with_session(self, path: Path) -> Self:
-        """Return these with a session as the newest."""
+        """Return a copy with a session as the newest."""
         newest = str(path.absolute())
         return replace(self, sessions=_newest_first(newest, self.sessions, _MOST_SESSIONS))
 
 
 class PreferencesFile:
-    """Preferences as JSON, and the key shared with network headsets, which only the user can read.
+    """The file of the preferences (JSON), and the pairing key, which only the user can read.
 
     Parameters
     ----------
     path : Path, optional
-        By default in the user's configuration folder; the key lies beside it.
+        By default in the user's configuration folder; the key is stored beside it.
 
     Attributes
     ----------
@@ -77,9 +77,9 @@ class PreferencesFile:
         self._key_path = self.path.with_name("pairing.key")
 
     def load(self) -> tuple[Preferences, str]:
-        """Return the preferences, and what went wrong for a person to read; empty if nothing did.
+        """Return the preferences and a message for the user, empty if nothing went wrong.
 
-        A file that cannot be used is kept beside, ending in ``.bad``.
+        A file that cannot be read is renamed to end in ``.bad``.
         """
         if not self.path.exists():
             return Preferences(), ""
@@ -89,7 +89,10 @@ class PreferencesFile:
             bad = self.path.with_name(f"{self.path.name}.bad")
             with suppress(OSError):
                 self.path.replace(bad)
-            return Preferences(), f"The preferences start anew; the old are in {bad}: {error}"
+            return Preferences(), (
+                "The preferences could not be read and were reset; "
+                f"the old file was kept as {bad}: {error}"
+            )
 
     def save(self, preferences: Preferences) -> None:
         """Write the preferences, or raise FileError."""
@@ -97,24 +100,24 @@ class PreferencesFile:
         write_json(self.path, settings_json(preferences))
 
     def pairing_key(self) -> str:
-        """Return the key for network headsets; a fresh one where there is none that can be used.
+        """Return the key for network headsets; create one if there is none that can be read.
 
         Raises
         ------
         FileError
-            If a fresh one cannot be written.
+            If a new key cannot be written.
         """
         with suppress(HandcalError, UnicodeDecodeError):
             return read_pairing_key(self._key_path).decode()
         return self.renew_pairing_key()
 
     def renew_pairing_key(self) -> str:
-        """Replace the key; headsets that know the old one are no longer let in.
+        """Replace the key; headsets with the old key can no longer connect.
 
         Raises
         ------
         FileError
-            If it cannot be written.
+            If the key cannot be written.
         """
         return write_pairing_key(self._key_path)
 

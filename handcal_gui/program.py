@@ -1,4 +1,4 @@
-"""The program: window, pages and panels built, wired to each other, and closed again."""
+"""The program: builds window, pages and panels, connects them, and closes them."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ _KEYS = (
     ("Return", "Press the button, or open the list, that has the focus"),
     ("Alt and the underlined letter", "Press a button at the lower left"),
     ("Esc", "Close the message at the top"),
-    ("Tab", "Go to the next button or field"),
-    ("F", "Freeze the camera's picture"),
+    ("Tab", "Move to the next button or field"),
+    ("F", "Freeze the camera image"),
     ("T", "Record a trial"),
     ("1, 2, 3, R", "Hand cloud: front, side, top, reset"),
     ("Arrows, Page Up, Page Down", "Fine-tune: φ1, φ2, φ3 of the chosen eye"),
@@ -69,13 +69,13 @@ _KEYS = (
 
 
 class Program(QObject):
-    """Everything behind the window, which it owns.
+    """Owns the window, with its pages and panels, and the controllers behind it.
 
     Parameters
     ----------
     file : PreferencesFile
     remembers : bool
-        Whether what changes is written to the file.
+        Whether changes of the preferences are written to the file.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Program(QObject):
 
     @property
     def preferences(self) -> Preferences:
-        """What is remembered."""
+        """The current preferences."""
         return self._preferences
 
     def start_calibration(self, settings: StationSettings, wearer: str) -> None:
@@ -129,25 +129,25 @@ class Program(QObject):
         self._run(lambda: Station(settings, wearer, pairing_key=self._pairing_key))
 
     def resume_session(self, path: Path) -> None:
-        """Go on with a session, at the station that was used last."""
+        """Resume a session, at the station that was used last."""
         settings = self._preferences.station
         self._run(lambda: Station(settings, resume=path, pairing_key=self._pairing_key))
 
     def open_session(self, path: Path) -> None:
-        """Look at a stored session."""
+        """Open a stored session for review."""
         self.live.stop()
         self.window.banner.clear()
         self.review.open(path)
 
     def open_example(self, sessions: Path) -> None:
-        """Look at the example session, copied to a folder of sessions."""
+        """Open the example session, copied to a session folder."""
         try:
             self.open_session(copy_example(sessions))
         except FileError as error:
             self.window.banner.show_message(str(error))
 
     def show_start(self) -> None:
-        """End what runs, and show the start page."""
+        """End the calibration or review, and show the start page."""
         self.live.stop()
         self.review.close()
         self.start.set_opening(False)
@@ -155,12 +155,12 @@ class Program(QObject):
         self.window.show_page("start")
 
     def export(self, folder: Path | None = None) -> ExportDialog | None:
-        """Ask what to export of the session shown; None without an alignment.
+        """Open the export dialog for the session shown; return None if it has no alignment.
 
         Parameters
         ----------
         folder : Path, optional
-            Proposed for the files; by default where the last went.
+            Proposed folder; by default that of the last export.
         """
         record = self._record()
         if record is None or not record.alignments:
@@ -174,7 +174,7 @@ class Program(QObject):
         return dialog
 
     def calibrate_rig(self) -> RigWizard | None:
-        """Lead through the offline calibration; None if what is entered could not be kept."""
+        """Open the wizard of the offline calibration; return None if its folder cannot be used."""
         try:
             folder = ProjectFolder(self._file.path.parent / "rig")
         except FileError as error:
@@ -187,7 +187,7 @@ class Program(QObject):
         return wizard
 
     def evaluate(self) -> EvaluationWindow:
-        """Show the window of evaluations, which is opened once."""
+        """Show the evaluation window; there is at most one."""
         opened = [one for one in self.window.findChildren(EvaluationWindow) if one.isVisible()]
         if opened:
             opened[0].raise_()
@@ -204,7 +204,7 @@ class Program(QObject):
         return window
 
     def close(self) -> None:
-        """Remember the window, end what runs; safe to call twice."""
+        """Save the window's layout and end all running work; safe to call twice."""
         layouts = self.window.layouts()
         self._remember(
             replace(
@@ -301,7 +301,7 @@ class Program(QObject):
             self.resume_session(self.review.record.path)
 
     def _record(self) -> SessionRecord | None:
-        """Return the session shown, as it is on the disk."""
+        """Return the session shown, as stored on the disk."""
         if self.live.snapshot is not None:
             return self.live.snapshot.record
         return self.review.record
@@ -317,8 +317,8 @@ class Program(QObject):
         self._pairing_key = self._file.renew_pairing_key()
         self.start.set_pairing_key(self._pairing_key)
         self.window.banner.show_message(
-            "There is a new pairing key; it holds from the next calibration on, and the headset "
-            "must be given it."
+            "New pairing key created. Enter it in the headset; it takes effect at the next "
+            "calibration."
         )
 
     def _edit_preferences(self) -> None:
@@ -345,7 +345,7 @@ class Program(QObject):
             if self._remembers:
                 self._file.save(preferences)
         except FileError as error:
-            self.window.banner.show_message(f"The preferences cannot be saved: {error}")
+            self.window.banner.show_message(f"The preferences could not be saved: {error}")
 
     def _show_keys(self) -> None:
         rows = (

@@ -1,4 +1,4 @@
-"""How the program looks: spacing, colours for light and dark, icons; the one place for them."""
+"""Appearance of the program: spacing, colours for light and dark, fonts, icons."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QApplication, QHeaderView, QWidget
 from handcal.io.resources import resource_path
 
 SPACING_PX = 8
-"""The unit of all margins and gaps, in device-independent pixels; use 0.5, 1, 2 or 3 of it."""
+"""The unit of all margins and gaps, in device-independent pixels; use 0.5, 1, 2 or 3 times it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +31,9 @@ class Colors:
 
     live: str
     cursor: str
-    """The live hand while it may be confirmed, and the frozen one."""
+    """The frozen cursor, and the live hand while it can be confirmed."""
     red: str
-    """The live hand beyond the guard, and whatever is wrong."""
+    """The live hand beyond the guard's limit, and all errors."""
     good: str
     warning: str
     left: str
@@ -42,7 +42,7 @@ class Colors:
     muted: str
     """Less important text and grid lines."""
     canvas: str
-    """Background of pictures and plots."""
+    """Background of images and plots."""
 
 
 _LIGHT = Colors(
@@ -71,7 +71,7 @@ _DARK = Colors(
 
 @dataclass(frozen=True, slots=True)
 class _Shades:
-    """What a palette is made of; Fusion draws the edge of a box a little darker than `box_edge`."""
+    """The colours of a palette; Fusion draws the edge of a box a little darker than `box_edge`."""
 
     window: str
     base: str
@@ -110,7 +110,7 @@ _DARK_SHADES = _Shades(
     box_edge="#99a1ab",
 )
 _MAIN_BUTTON = "#0b3f8f"
-"""Fusion makes it lighter; white stands out against it nevertheless."""
+"""Fusion lightens it; white text still has enough contrast."""
 _BOXES = (
     "QAbstractSpinBox",
     "QCheckBox",
@@ -123,11 +123,11 @@ _BOXES = (
     "Card",
     "VerdictCard",
 )
-"""What has an edge that must be seen, in the dark, too."""
+"""Widgets whose edges must be visible in the dark theme, too."""
 
 
 def use_theme(theme: Literal["system", "light", "dark"]) -> None:
-    """Take the colours that the system asks for, or others; to be called when it changes, too."""
+    """Use the system's colours or the chosen ones; call again when the system's change."""
     schemes = {
         "system": Qt.ColorScheme.Unknown,
         "light": Qt.ColorScheme.Light,
@@ -135,7 +135,7 @@ def use_theme(theme: Literal["system", "light", "dark"]) -> None:
     }
     hints = QGuiApplication.styleHints()
     hints.setColorScheme(schemes[theme])
-    # A plain X display knows no schemes, so that the choice itself counts.
+    # A plain X display has no colour schemes, so the choice itself decides.
     scheme = hints.colorScheme() if theme == "system" else schemes[theme]
     shades = _DARK_SHADES if scheme is Qt.ColorScheme.Dark else _LIGHT_SHADES
     palette = _palette(shades)
@@ -151,17 +151,17 @@ def use_theme(theme: Literal["system", "light", "dark"]) -> None:
 
 
 def is_dark() -> bool:
-    """Whether the system, or the user, asks for dark."""
+    """Return whether the dark colours are in use."""
     return QGuiApplication.palette().window().color().lightness() < 128
 
 
 def colors() -> Colors:
-    """Return the colours of the present scheme; ask anew on ``QEvent.Type.PaletteChange``."""
+    """Return the colours of the current scheme; call again on ``QEvent.Type.PaletteChange``."""
     return _DARK if is_dark() else _LIGHT
 
 
 def quiet(header: QHeaderView) -> None:
-    """Let a table's header look like its cells, in less important text."""
+    """Make a table's header look like its cells, with muted text."""
     header.setStyleSheet(
         "QHeaderView { background: palette(base); }"
         "QHeaderView::section { background: transparent; border: 0; padding: 2px 4px;"
@@ -170,14 +170,14 @@ def quiet(header: QHeaderView) -> None:
 
 
 def number_font(scale: float = 1.0) -> QFont:
-    """Return a font whose digits are equally wide, so that changing numbers do not jump."""
+    """Return a font with digits of equal width, so that changing numbers do not jump."""
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
     font.setPointSizeF(scale * QGuiApplication.font().pointSizeF())
     return font
 
 
 def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:
-    """Set a widget's text larger or smaller than it is."""
+    """Scale the size of a widget's text."""
     font = widget.font()
     font.setPointSizeF(scale * font.pointSizeF())
     font.setBold(is_bold)

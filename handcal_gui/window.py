@@ -51,7 +51,7 @@ from handcal_gui.widgets.banner import Banner
 Page = Literal["start", "live", "review"]
 _LAYOUT_VERSION = 1
 _NARROWEST_PX, _WIDEST_PX = 360, 560
-"""A column of docks, at first."""
+"""Limits of the initial width of a column of docks."""
 _LEFT, _RIGHT, _BOTTOM = (
     Qt.DockWidgetArea.LeftDockWidgetArea,
     Qt.DockWidgetArea.RightDockWidgetArea,
@@ -71,7 +71,7 @@ _TITLES = {
     "link": "Link",
 }
 _TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
-"""Icons by the names that Qt gives a dock's buttons."""
+"""Icons of a dock's buttons, by the names that Qt gives the buttons."""
 _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
     "start": frozenset(),
     "live": frozenset(_TITLES),
@@ -80,15 +80,15 @@ _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
 
 
 class Panel(Protocol):
-    """What every panel can do."""
+    """The interface of every panel."""
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show what there is of it."""
+        """Show the panel's part of a snapshot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Panels:
-    """Every panel of the window."""
+    """All panels of the window."""
 
     camera: CameraPanel
     cloud: CloudPanel
@@ -101,12 +101,12 @@ class Panels:
     link: LinkPanel
 
     def all(self) -> Iterator[Panel]:
-        """Give every panel."""
+        """Return an iterator over all panels."""
         return (getattr(self, field.name) for field in fields(self))
 
 
 class MainWindow(QMainWindow):
-    """Holds pages and panels; knows nothing of what they show.
+    """Holds pages and panels and arranges them, whatever they show.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         self._bar = wizard.bar
         self.setStatusBar(_Strip(self._bar))
-        # Grouped: a dock without title is taken out by its tab.
+        # GroupedDragging: a dock without title can be undocked by its tab.
         options = QMainWindow.DockOption
         self.setDockOptions(
             options.AnimatedDocks
@@ -174,7 +174,7 @@ class MainWindow(QMainWindow):
         return self._page
 
     def show_page(self, page: Page) -> None:
-        """Show a page with the docks that belong to it, laid out as they were left."""
+        """Show a page with its docks, in the layout used last."""
         self._keep_layout()
         self._page = page
         self.statusBar().setVisible(page == "live")
@@ -193,7 +193,7 @@ class MainWindow(QMainWindow):
         self._leave_titles_to_tabs()
 
     def bring_up(self, name: str) -> None:
-        """Bring a panel before those that share its place, unless one of them has the keyboard."""
+        """Raise a panel above those tabbed with it, unless one of them has the keyboard focus."""
         dock, focus = self._docks.get(name), QApplication.focusWidget()
         if dock is not None:
             others = self.tabifiedDockWidgets(dock)
@@ -201,7 +201,7 @@ class MainWindow(QMainWindow):
                 dock.raise_()
 
     def go_to(self, name: str) -> None:
-        """Show a panel before the others and give it the keyboard, if it belongs to the page."""
+        """Raise a panel and give it the keyboard focus, if it belongs to the page."""
         if name in _DOCKS_OF_PAGE[self._page]:
             dock = self._docks[name]
             dock.show()
@@ -209,9 +209,9 @@ class MainWindow(QMainWindow):
             dock.widget().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def reset_layout(self) -> None:
-        """Put the docks of the page back to where they were at the first start."""
+        """Restore the default layout of the page's docks."""
         self._layouts.pop(self._page, None)
-        page, self._page = self._page, "start"  # so that the present layout is not kept
+        page, self._page = self._page, "start"  # so that the current layout is not saved
         self.show_page(page)
 
     def layouts(self) -> dict[Page, str]:
@@ -222,7 +222,7 @@ class MainWindow(QMainWindow):
         }
 
     def restore_layouts(self, layouts: Mapping[Page, str]) -> None:
-        """Take layouts of an earlier run; what does not fit is left out."""
+        """Restore the layouts of an earlier run; those that do not fit are ignored."""
         for page, text in layouts.items():
             state = QByteArray.fromBase64(text.encode())
             if page in _DOCKS_OF_PAGE and self.restoreState(state, _LAYOUT_VERSION):
@@ -243,7 +243,7 @@ class MainWindow(QMainWindow):
         return action
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Let Return press what has the focus, as Space does not, and Esc close the message."""
+        """Make Return press the focused button, as Space does not, and Esc close the message."""
         if event.key() == Qt.Key.Key_Escape:
             self.banner.clear()
         elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._page == "live":
@@ -253,13 +253,13 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Let the bar see whether a key is only held down."""
+        """Pass key events to the bar, which detects keys that are held down."""
         if isinstance(event, QKeyEvent):
             self._bar.notice_key(event)
         return super().event(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Take the keys that a floating dock has no use for, as from one in its place."""
+        """Handle the keys that a floating dock ignores, as if it were docked."""
         is_apart = isinstance(watched, QDockWidget) and watched.window() is not self
         if is_apart and isinstance(event, QKeyEvent):
             self._bar.notice_key(event)
@@ -275,7 +275,7 @@ class MainWindow(QMainWindow):
             self._draw_title_buttons()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Say so before closing."""
+        """Emit `closing` before the window closes."""
         self.closing.emit()
         super().closeEvent(event)
 
@@ -310,14 +310,14 @@ class MainWindow(QMainWindow):
         self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
 
     def _share_room(self) -> None:
-        """Give the docks of a page that has not been laid out by hand what suits the window."""
+        """Divide the window among the docks of a page whose layout the user has not changed."""
         docks = self._docks
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
         width, height = self.width(), self.height()
         left, right = (
             min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (28, 32)
         )
-        if self._page == "review":  # which needs little room itself
+        if self._page == "review":  # the page itself needs little space
             page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
             left = right = (width - page) // 2
         wizard = self._pages["live"].sizeHint().height() + 14 * SPACING_PX  # with the banner
@@ -329,7 +329,7 @@ class MainWindow(QMainWindow):
         self.resizeDocks([docks["wearer_view"]], [height - wizard - self._bar.height()], down)
 
     def _draw_title_buttons(self) -> None:
-        """Draw the buttons of docks as other icons are: Qt's own are dark in the dark, too."""
+        """Draw the buttons of docks like other icons: Qt's own are dark in the dark theme, too."""
         for dock in self._docks.values():
             for name, drawing in _TITLE_BUTTONS.items():
                 button = dock.findChild(QAbstractButton, name)
@@ -337,7 +337,7 @@ class MainWindow(QMainWindow):
                     button.setIcon(icon(drawing))
 
     def _leave_titles_to_tabs(self) -> None:
-        """Take away the titles of docks that share a place, whose tabs say the same."""
+        """Hide the titles of docks that are tabbed together; their tabs show the same text."""
         for dock in self._docks.values():
             shared = any(not other.isHidden() for other in self.tabifiedDockWidgets(dock))
             title = dock.titleBarWidget()
@@ -346,7 +346,7 @@ class MainWindow(QMainWindow):
             elif not shared and title is not None:
                 dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
                 title.deleteLater()
-        self._draw_title_buttons()  # which Qt draws anew with the titles
+        self._draw_title_buttons()  # Qt recreates them with the titles
 
     def _make_menus(self) -> None:
         self._menus = {
@@ -361,7 +361,7 @@ class MainWindow(QMainWindow):
             view.addAction(dock.toggleViewAction())
 
     def _keep_focus_off_clicked_buttons(self) -> None:
-        """Leave the keyboard to what has it when a button is clicked."""
+        """Keep the keyboard focus where it is when a button is clicked."""
         for button in self.findChildren(QAbstractButton):
             if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
                 button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
@@ -372,7 +372,7 @@ class _Strip(QStatusBar):
 
     def __init__(self, bar: QWidget) -> None:
         super().__init__()
-        self.setSizeGripEnabled(False)  # which comes and goes, and moves the bar
+        self.setSizeGripEnabled(False)  # it appears and disappears, and moves the bar
         self.setContentsMargins(0, 0, 0, 0)
         self.addPermanentWidget(bar, 1)
 
@@ -385,7 +385,7 @@ class _Strip(QStatusBar):
 
 
 def _press(widget: QWidget | None) -> None:
-    """Press a button, or open a list, that has the focus."""
+    """Press a button, or open a list."""
     if isinstance(widget, QAbstractButton):
         widget.click()
     elif isinstance(widget, QComboBox) and not widget.isEditable():

@@ -1,1 +1,1 @@
-"""The program operating itself, for demonstrations and screenshots."""
+"""Automatic operation of the program, for demonstrations and screenshots."""

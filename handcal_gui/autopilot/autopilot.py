@@ -1,4 +1,4 @@
-"""The technician's part, played by the program: for demonstrations, tests and screenshots."""
+"""Operates the wizard in place of the technician: for demonstrations, tests and screenshots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from handcal_gui.pages.wizard.wizard import WizardPanel
 _LOOK_S = 0.7
 _PATIENCE_S = 120.0
 _PATIENCE_STEPS = 600
-"""Steps of the engine, at least five a second on an idle machine: a starved one gets longer."""
+"""Engine steps to wait for as well, for a busy machine; an idle one makes five a second or more."""
 
 
 class Autopilot(QObject):
@@ -29,14 +29,14 @@ class Autopilot(QObject):
     wizard_panel : WizardPanel
     look : callable, optional
         Called with every view before its button is pressed, and while the wearer aligns; may
-        take its time, or pause.
+        block, or pause the autopilot.
 
     Attributes
     ----------
     finished : Signal()
         The session is finished.
     stuck : Signal(str)
-        It does not go on, and where.
+        The wizard makes no progress; the step and the reason.
     """
 
     finished = Signal()
@@ -58,11 +58,11 @@ class Autopilot(QObject):
         live.polled.connect(self._watch)
 
     def pause(self) -> None:
-        """Press nothing until `go_on`."""
+        """Press no button until `go_on`."""
         self._is_paused = True
 
     def go_on(self) -> None:
-        """Go on after a pause."""
+        """Continue after a pause."""
         self._is_paused = False
         self._view = None
 

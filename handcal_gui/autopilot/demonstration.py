@@ -1,4 +1,4 @@
-"""A calibration of a simulated wearer that operates itself, from the start page to the export."""
+"""An automatic calibration of a simulated wearer, from the start page to the export."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Demonstration(QObject):
     ----------
     program : Program
     output : Path
-        Where the session, and beside it the export, go.
+        Folder for the session and, beside it, the export.
     screenshots : Path or None
-        Where a picture of every step, panel and dialog goes.
+        Folder for screenshots of every step, panel and dialog; None to save none.
 
     Attributes
     ----------
     complaint : str or None
-        Why it did not succeed; None once it has.
+        The reason for a failure; None after success.
     """
 
     def __init__(self, program: Program, output: Path, screenshots: Path | None) -> None:
@@ -51,7 +51,7 @@ class Demonstration(QObject):
         program.live.ended.connect(self._give_up)
 
     def start(self, settings: StationSettings) -> None:
-        """Begin."""
+        """Start the demonstration."""
         station = replace(settings, sessions=str(self._output))
 
         def calibrate() -> None:
@@ -75,7 +75,7 @@ class Demonstration(QObject):
             self._tour.begin(self._tour.panels(), self._autopilot.go_on)
 
     def _export(self) -> None:
-        self._program.live.ended.disconnect(self._give_up)  # from now on it may
+        self._program.live.ended.disconnect(self._give_up)  # from now on the engine may end
         dialog = self._program.export(self._output)
         if dialog is None:
             self._give_up("there was nothing to export")

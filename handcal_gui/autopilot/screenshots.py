@@ -1,4 +1,4 @@
-"""Pictures of the window and its panels, for the guide and for looking at what has changed."""
+"""Screenshots of the window and its panels, for the guide and for checking changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal_gui.pages.wizard.steps import STEPS, Action, Step, View
 
 
 class Screenshots:
-    """Saves PNGs into a folder.
+    """Saves screenshots as PNG files in a folder.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Screenshots:
         self._seen: dict[Step, set[Action]] = {}
 
     def save_step(self, view: View) -> None:
-        """Save the window the first time that a step offers something."""
+        """Save the window the first time that a step shows a main action."""
         seen = self._seen.setdefault(view.step, set())
         action = view.main.action
         if action in seen:
@@ -43,7 +43,7 @@ class Screenshots:
         self.save(name.lower().replace(" ", "-"))
 
     def save(self, name: str, widget: QWidget | None = None) -> None:
-        """Save a widget, by default the window; FileError if it cannot be written."""
+        """Save a widget, by default the window; raise FileError if it cannot be written."""
         path = self._folder / f"{name}.png"
         if not (widget or self._window).grab().save(str(path)):
             raise FileError(f"cannot write {path}")

@@ -1,4 +1,4 @@
-"""A walk through what the wizard does not show, one picture after the other."""
+"""A tour of the pages, panels and dialogs outside the wizard, saved as screenshots."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from handcal_gui.panels.camera.panel import Mode
 from handcal_gui.program import Program
 
 _LOOK_MS = 600
-"""Until what was done is seen, also on a busy computer."""
+"""Time until a change is visible, on a busy computer, too."""
 _TURN_MS = 50
 _PATIENCE_MS = 20_000
 _STEPS = 6
 
 Walk = Iterator[int]
-"""What to do in pieces; each gives the milliseconds to wait before the next."""
+"""Actions in pieces; each yields the milliseconds to wait before the next."""
 
 
 class Tour(QObject):
-    """Walks, and saves pictures on the way.
+    """Operates the window and saves screenshots.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Tour(QObject):
     Attributes
     ----------
     failed : Signal(str)
-        A picture could not be saved, and why.
+        A screenshot could not be saved; the reason.
     """
 
     failed = Signal(str)
@@ -47,7 +47,7 @@ class Tour(QObject):
         self._save = screenshots.save
 
     def begin(self, walk: Walk, then: Callable[[], object]) -> None:
-        """Walk, and then do something else."""
+        """Run a walk, then call `then`."""
         try:
             wait_ms = next(walk)
         except StopIteration:
@@ -58,12 +58,12 @@ class Tour(QObject):
             QTimer.singleShot(wait_ms, self, lambda: self.begin(walk, then))
 
     def start_page(self) -> Walk:
-        """Show the start page once it has looked at the station."""
+        """Save the start page once it has checked the station."""
         yield 2 * _LOOK_MS
         self._save("start")
 
     def panels(self) -> Walk:
-        """Fine-tune φ, record trials, and show every panel and tab."""
+        """Fine-tune φ, record trials, and save every panel and tab."""
         window = self._program.window
         yield from self._fine_tune()
         for name, dock in window.docks.items():
@@ -84,7 +84,7 @@ class Tour(QObject):
         window.panels.camera.set_mode(Mode.COLOR)
 
     def export(self, dialog: ExportDialog) -> Walk:
-        """Export, and show how that goes; the dialog says how it ended."""
+        """Start the export and save its progress; the dialog emits the result."""
         yield _LOOK_MS
         self._save("export", dialog)
         dialog.start()
@@ -92,7 +92,7 @@ class Tour(QObject):
         self._save("export-runs", dialog)
 
     def afterwards(self, dialog: ExportDialog) -> Walk:
-        """Show the export done, the session as it is found again, and the preferences."""
+        """Save the completed export, the session opened for review, and the preferences."""
         program = self._program
         self._save("export-done", dialog)
         dialog.stop()
@@ -111,7 +111,7 @@ class Tour(QObject):
         self._save("start-next-wearer")
 
     def _fine_tune(self) -> Walk:
-        """Move φ, record trials of that, and put it back."""
+        """Change φ, record trials with it, and reset it."""
         window, panel = self._program.window, self._program.window.panels.fine_tune
         window.docks["fine_tune"].raise_()
         yield _LOOK_MS
@@ -124,7 +124,7 @@ class Tour(QObject):
         self._save("window-fine-tune")
         yield from self._record_trial()
         yield _LOOK_MS
-        self._record()  # the other eye's, whose φ has not been touched: to be asked for again
+        self._record()  # for the other eye, whose φ is unchanged: the panel asks first
         self._save("window-trial-doubt")
         yield from self._record_trial()
         panel.reset_action.trigger()
@@ -145,7 +145,7 @@ class Tour(QObject):
 
 
 def _until(holds: Callable[[], bool]) -> Walk:
-    """Wait for something, but not forever: a picture will show that it is missing."""
+    """Wait for a condition, but not forever: a screenshot will show that it did not hold."""
     for _ in range(_PATIENCE_MS // _TURN_MS):
         if holds():
             return

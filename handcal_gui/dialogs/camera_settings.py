@@ -1,4 +1,4 @@
-"""How a RealSense is to be run."""
+"""The dialog with the settings of a RealSense."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import beside, choice, named, paragraph, whole_number
 
-_AS_IT_IS = "As the camera has it"
+_AS_IT_IS = "Keep the camera's setting"
 _PROFILES: dict[Profile, str] = {
-    "auto": "Largest on offer",
+    "auto": "Largest available",
     "1280x720": "1280 × 720 px",
     "848x480": "848 × 480 px",
 }
@@ -41,7 +41,7 @@ class CameraSettingsDialog(QDialog):
     Parameters
     ----------
     settings : RealSenseSettings
-        As they are now; the serial number is not shown, and stays.
+        The current settings; the serial number is not shown and does not change.
     """
 
     def __init__(self, settings: RealSenseSettings, parent: QWidget | None = None) -> None:
@@ -50,29 +50,31 @@ class CameraSettingsDialog(QDialog):
         self.setWindowTitle("Camera settings")
         self._serial = settings.serial
         self._profile = choice(
-            "profile", "Image size", _PROFILES, "Of depth and colour alike, at 30 Hz."
+            "profile", "Image size", _PROFILES, "Size of both depth and colour images, at 30 Hz."
         )
         self._preset = choice(
             "preset",
             "Depth preset",
             _PRESETS,
-            "The RealSense SDK's visual preset, but for what is set below.",
+            "The RealSense SDK's visual preset; the settings below take precedence.",
         )
         self._exposure = _OwnNumber(
             "Exposure",
-            _number("exposure", 1, 200_000, 500, " µs", "Of the depth; a frame lasts 33,333 µs."),
+            _number(
+                "exposure", 1, 200_000, 500, " µs", "Of the depth image; a frame lasts 33,333 µs."
+            ),
             "Automatic",
             8_500,
         )
         self._laser = _OwnNumber(
             "Laser power",
-            _number("laser", 0, 360, 30, " mW", "Of the projector; 0 mW switches it off."),
+            _number("laser", 0, 360, 30, " mW", "Power of the projector; 0 mW switches it off."),
             _AS_IT_IS,
             150,
         )
         self._spatial = _filter("spatial", "Spatial", "Smooths each depth image, keeping edges.")
         self._temporal = _filter("temporal", "Temporal", "Averages over the last depth images.")
-        self._holes = _filter("holes", "Hole filling", "Makes up depth where none was measured.")
+        self._holes = _filter("holes", "Hole filling", "Fills in depth where none was measured.")
         self._lay_out()
         self._show(settings)
 
@@ -108,11 +110,11 @@ class CameraSettingsDialog(QDialog):
         form.addRow("Exposure", self._exposure)
         form.addRow("Laser power", self._laser)
         form.addRow("Depth filters", filters)
-        form.addRow("", paragraph(text="Filters smooth and invent: calibrate without them."))
+        form.addRow("", paragraph(text="Filters smooth and invent depth: calibrate without them."))
         standard = QDialogButtonBox.StandardButton
         buttons = QDialogButtonBox(standard.Ok | standard.Cancel | standard.RestoreDefaults)
         for one in buttons.buttons():
-            one.setIcon(QIcon())  # as all other buttons
+            one.setIcon(QIcon())  # like all other buttons
         restore = named(buttons.button(standard.RestoreDefaults), "restore", "Restore defaults")
         restore.setText("Restore defaults")
         restore.clicked.connect(lambda: self._show(RealSenseSettings()))
@@ -126,17 +128,17 @@ class CameraSettingsDialog(QDialog):
 
 
 class _OwnNumber(QWidget):
-    """A number, unless that is left to the camera.
+    """A number, or a checked box that leaves it to the camera.
 
     Parameters
     ----------
     label : str
-        Said to those who do not see the form.
+        Accessible name, for screen readers.
     number : QSpinBox
     left : str
-        What to call leaving it to the camera.
+        Label of the box that leaves it to the camera.
     usual : int
-        To begin with, once it is not.
+        Number to start from when the box is unchecked.
     """
 
     def __init__(self, label: str, number: QSpinBox, left: str, usual: int) -> None:
@@ -155,7 +157,7 @@ class _OwnNumber(QWidget):
         return None if self._left.isChecked() else float(self._number.value())
 
     def show_value(self, value: float | None) -> None:
-        """Show a number, or that it is left to the camera."""
+        """Show a number; None leaves it to the camera."""
         self._left.setChecked(value is None)
         self._number.setValue(round(self._usual if value is None else value))
 

@@ -49,8 +49,8 @@ class ExportChoices(QWidget):
         super().__init__(parent)
         self._settings, self._name = settings, name
         self._boxes = {kind: named(QCheckBox(info.title), kind) for kind, info in FORMATS.items()}
-        self._near = number("near", 0.01, 1.0, 0.05, " m", "Nothing nearer is drawn.")
-        self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Nothing farther is drawn.")
+        self._near = number("near", 0.01, 1.0, 0.05, " m", "Anything nearer is not drawn.")
+        self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Anything farther is not drawn.")
         self._near.setValue(settings.near_m)
         self._far.setValue(settings.far_m)
         self._folder = PathField("Export folder", "folder")
@@ -108,8 +108,8 @@ class ExportChoices(QWidget):
         form.setVerticalSpacing(SPACING_PX)
         form.addRow("Near plane (OpenGL, Unity)", self._near)
         form.addRow("Far plane (OpenGL, Unity)", self._far)
-        form.addRow("Into", self._folder)
-        form.addRow("", QLabel(f"A folder {self._name} is created there."))
+        form.addRow("Export to", self._folder)
+        form.addRow("", QLabel(f"The folder {self._name} is created there."))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(3 * SPACING_PX)

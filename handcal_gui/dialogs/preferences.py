@@ -1,4 +1,4 @@
-"""What has no better place to be changed."""
+"""The dialog with the preferences."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.path_field import PathField
 
-_THEMES: dict[Theme, str] = {"system": "As the system", "light": "Light", "dark": "Dark"}
+_THEMES: dict[Theme, str] = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
 
 
 class PreferencesDialog(QDialog):
-    """Theme, session folder, and how calibrations run from the next on.
+    """Theme, session folder, and the settings of future calibrations.
 
     Parameters
     ----------
     preferences : Preferences
-        As they are now.
+        The current preferences.
     """
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
@@ -43,7 +43,7 @@ class PreferencesDialog(QDialog):
             QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
         )
         for one in buttons.buttons():
-            one.setIcon(QIcon())  # as all other buttons
+            one.setIcon(QIcon())  # like all other buttons
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         layout = QVBoxLayout(self)
@@ -53,7 +53,7 @@ class PreferencesDialog(QDialog):
         layout.addWidget(buttons)
 
     def preferences(self) -> Preferences:
-        """Return the preferences with what is shown."""
+        """Return the preferences with the values shown."""
         station = self._preferences.station
         return replace(
             self._preferences,

@@ -1,4 +1,4 @@
-"""The page of a finished session: what it is, and what may be done with it."""
+"""The page of a stored session: a summary, and buttons to export or resume it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from handcal_gui.widgets.times import local_time
 
 
 class ReviewPage(QWidget):
-    """Says what a session holds; the panels show it.
+    """A summary of a session; the panels show its contents.
 
     Attributes
     ----------
@@ -37,8 +37,8 @@ class ReviewPage(QWidget):
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
         self._export = main_button("reviewExport", "&Export…")
-        self._resume = button("reviewResume", "&Go on with this session")
-        self._resume.setToolTip("Open camera and headset, and add alignments, φ or trials to it")
+        self._resume = button("reviewResume", "&Resume this session")
+        self._resume.setToolTip("Open camera and headset to add alignments, fine-tuning or trials")
         close = button("reviewClose", "&Close session")
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)
@@ -57,15 +57,15 @@ class ReviewPage(QWidget):
         layout.addStretch()
 
     def show_session(self, record: SessionRecord, results: Results | None, note: str = "") -> None:
-        """Show a session, solved again if it can be.
+        """Show a session and, if it has been solved, its results.
 
         Parameters
         ----------
         record : SessionRecord
         results : Results or None
-            None while it is being solved, or if it cannot be.
+            None while it is being solved, or if it cannot be solved.
         note : str
-            What goes on, or why there are no results.
+            The current activity, or the reason why there are no results.
         """
         self._title.setText(record.wearer or "Session without a name")
         self._export.setEnabled(bool(record.alignments))
@@ -78,16 +78,16 @@ class ReviewPage(QWidget):
 
 
 def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
-    """Give what is to be known of a session, by name."""
+    """Yield the name and the text of each fact about a session."""
     yield "Started", local_time(record.events[0].time)
     yield "Rig", record.rig.name
     state = "finished" if record.is_finished else "not finished"
     counts = counted(len(record.alignments), "alignment"), counted(len(record.trials), "trial")
-    yield "Holds", f"{', '.join(counts)}; {state}"
+    yield "Contents", f"{', '.join(counts)}; {state}"
     yield "Folder", str(record.path)
     for eye, verdict in results.verdicts.items() if results else ():
         yield EYE_NAMES[eye], f"{VERDICT_WORDS[verdict.name]}: {verdict.reason}"
     if note:
         yield "Note", note
     if record.torn_bytes:
-        yield "Journal", "The last line is unfinished, as after a crash."
+        yield "Journal", "The last line is incomplete, as after a crash."

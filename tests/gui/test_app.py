@@ -72,7 +72,9 @@ def test_without_a_display(
         monkeypatch.delenv(name, raising=False)
     assert "handcal demo" in complaint(capsys, monkeypatch, code=1)
     monkeypatch.setenv("DISPLAY", ":4711")
-    assert "no X server answers at DISPLAY=:4711" in complaint(capsys, monkeypatch, code=1)
+    assert "cannot connect to the X server at DISPLAY=:4711" in complaint(
+        capsys, monkeypatch, code=1
+    )
 
 
 def test_help_tells_every_option(
@@ -127,7 +129,7 @@ def test_it_ends_well_when_told_to(tmp_path: Path) -> None:
 
 
 def is_listening(pid: int) -> bool:
-    """Tell whether a process has said what to do on SIGTERM."""
+    """Return whether a process has set its handler of SIGTERM."""
     status = Path(f"/proc/{pid}/status").read_text()
     (caught,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
     return bool(int(caught, 16) & 1 << signal.SIGTERM - 1)

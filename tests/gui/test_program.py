@@ -124,7 +124,7 @@ def live(technician: Technician, studio: Any) -> Technician:
 
 
 def can_start(technician: Technician) -> bool:
-    """Tell whether the start page offers to start a calibration."""
+    """Return whether the start page allows starting a calibration."""
     return bool(technician.child(QPushButton, "start").isEnabled())
 
 
@@ -139,7 +139,7 @@ def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT
 
 
 def is_turned(technician: Technician) -> bool:
-    """Tell whether the hand is seen that is not the cursor's."""
+    """Return whether the visible hand is not the cursor's."""
     seen = technician.snapshot.observation
     if seen is None or seen.rotation_rad is None:
         return False
@@ -529,12 +529,12 @@ def test_the_window_can_be_closed_at_any_moment(
         Session(path).close()  # free, and not damaged
 
 
-def test_an_error_that_nobody_expected_is_logged_and_told(
+def test_an_unexpected_error_is_logged_and_shown(
     technician: Technician, caplog: pytest.LogCaptureFixture
 ) -> None:
     error = ZeroDivisionError("oh")
     launch._tell(technician.program, type(error), error, error.__traceback__)
     assert "ZeroDivisionError: oh" in technician.banner
-    assert "broke down" in caplog.text
+    assert "unexpected error" in caplog.text
     technician.program.show_start()
     technician.wait(lambda: can_start(technician))

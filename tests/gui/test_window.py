@@ -26,7 +26,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import Action, Offer, Step, View, Wizard
+from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, View, Wizard
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
@@ -60,7 +60,7 @@ def main_button(window: MainWindow) -> QPushButton:
 def offer_solve(window: MainWindow) -> None:
     bar = window.findChild(ActionBar)
     assert isinstance(bar, ActionBar)
-    bar.show_view(View(Step.SOLVE, "Solve.", (), Offer(Action.SOLVE, "Solve")))
+    bar.show_view(View(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
 
 
 def shown(window: MainWindow) -> set[str]:
@@ -315,9 +315,13 @@ def offer(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[obj
     window.panels.fine_tune.set_rig(snapshot.record.rig)
     for panel in window.panels.all():
         panel.show_snapshot(snapshot)
-    discard = Offer(Action.REDO, "&Discard and repeat", discards="Deletes the last alignment")
-    others = (discard, Offer(Action.ANOTHER, "&Add alignment"), Offer(Action.BACK, "&Back"))
-    main = Offer(Action.SOLVE, "Solve", is_enabled)
+    discard = ButtonSpec(Action.REDO, "&Discard and repeat", discards="Deletes the last alignment")
+    others = (
+        discard,
+        ButtonSpec(Action.ANOTHER, "&Add alignment"),
+        ButtonSpec(Action.BACK, "&Back"),
+    )
+    main = ButtonSpec(Action.SOLVE, "Solve", is_enabled)
     say(program, snapshot, View(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
     program.wizard_panel.asked.connect(asked.append)

@@ -1,4 +1,4 @@
-"""What hardly anyone changes: how calibration and recordings run, what the simulator simulates."""
+"""Rarely changed settings of calibration, recordings and simulator."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from handcal_gui.widgets.fields import beside, named, number, whole_number
 
 
 class AdvancedFields(QWidget):
-    """Folded until asked for.
+    """The advanced settings, collapsed at first.
 
     Attributes
     ----------
@@ -34,19 +34,17 @@ class AdvancedFields(QWidget):
         self._real_time = named(
             QCheckBox("Real time"),
             "realTime",
-            help_text="At the pace it was recorded at; otherwise every frame, as fast as possible.",
+            help_text="Plays at the recorded rate; otherwise every frame, as fast as possible.",
         )
-        self._loop = named(QCheckBox("Loop"), "loop", help_text="Begin again at its end.")
+        self._loop = named(QCheckBox("Loop"), "loop", help_text="Starts again at the end.")
         playback = QWidget()
         beside(playback, self._real_time, self._loop, grows=self._loop)
         self._calibration.add_row("Recordings", playback)
         self._seed = whole_number(
-            "seed", 0, 999_999, "Another number is another simulated wearer, hand and room."
+            "seed", 0, 999_999, "Seed of the simulated wearer, hand and room."
         )
-        self._loss = number("loss", 0.0, 50.0, 1.0, " %", "Datagrams lost on purpose, each way.")
-        self._reorder = number(
-            "reorder", 0.0, 50.0, 1.0, " %", "Datagrams that overtake others on purpose."
-        )
+        self._loss = number("loss", 0.0, 50.0, 1.0, " %", "Datagrams dropped in each direction.")
+        self._reorder = number("reorder", 0.0, 50.0, 1.0, " %", "Datagrams delivered out of order.")
         for label, field in (
             ("Simulated wearer", self._seed),
             ("Simulated loss", self._loss),
@@ -66,7 +64,7 @@ class AdvancedFields(QWidget):
         self._unfold(False)
 
     def show_settings(self, settings: StationSettings) -> None:
-        """Show settings of a station."""
+        """Show the settings of a station."""
         self._calibration.show_settings(settings.calibration)
         self._real_time.setChecked(settings.playback.real_time)
         self._loop.setChecked(settings.playback.loop)
@@ -75,7 +73,7 @@ class AdvancedFields(QWidget):
         self._reorder.setValue(100 * settings.reorder)
 
     def take(self, settings: StationSettings) -> StationSettings:
-        """Return settings with what is shown."""
+        """Return settings with the values shown."""
         return replace(
             settings,
             calibration=self._calibration.take(settings.calibration),

@@ -75,7 +75,7 @@ class CameraField(QWidget):
         )
 
     def edit_realsense(self) -> None:
-        """Ask how the RealSense is to be run."""
+        """Open the dialog with the settings of the RealSense."""
         dialog = CameraSettingsDialog(self._realsense, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.accepted.connect(lambda: self._take_realsense(dialog.settings()))

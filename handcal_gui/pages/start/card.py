@@ -10,7 +10,7 @@ from handcal_gui.widgets.fields import paragraph
 
 
 class Card(QFrame):
-    """Says what can be done here; `body` holds the means.
+    """A frame with an icon, a title and a hint; `body` holds the controls.
 
     Attributes
     ----------

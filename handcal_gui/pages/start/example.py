@@ -1,4 +1,4 @@
-"""The session that ships with handcal, for those who have none yet."""
+"""The example session that ships with handcal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NAME = "example-session"
 
 
 def copy_example(sessions: Path) -> Path:
-    """Return the example among a user's sessions, where it may be changed; a copy if need be.
+    """Return the folder of the example in the session folder; copy it there if it is missing.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The choice of the headset, and what a network headset must be told."""
+"""The choice of the headset, with the address and pairing key of a network headset."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "N
 
 
 class HeadsetField(QWidget):
-    """The virtual headset, or one in the network with address, port and pairing key.
+    """The virtual headset, or a network headset with address, port and pairing key.
 
     Parameters
     ----------
     pairing_key : str
-        Hidden until asked for.
+        Masked until the user reveals it.
 
     Attributes
     ----------
@@ -36,8 +36,8 @@ class HeadsetField(QWidget):
         self._host = named(
             QLineEdit(),
             "host",
-            "Address to listen at",
-            "Address of this computer at which the headset is waited for; 0.0.0.0 is any of them.",
+            "Address to listen on",
+            "Address of this computer on which to listen for the headset; 0.0.0.0 for all.",
         )
         self._port = whole_number("port", 1, 65535, "UDP port that the headset connects to.")
         self._address = QWidget()

@@ -1,4 +1,4 @@
-"""Everything that a calibration needs before it starts."""
+"""The form that starts a calibration."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ class NewCalibration(Card):
     preferences : Preferences
     pairing_key : str
     check : callable
-        Given settings and pairing key, returns what was found of each part; called in a job.
+        Given settings and pairing key, returns the finding about each part; called in a job.
 
     Attributes
     ----------
     start_requested : Signal(StationSettings, str)
-        A station that has just been found ready, and the wearer.
+        The settings of a station that has just passed its checks, and the wearer.
     changed : Signal()
-        Other settings are shown.
+        The settings shown have changed.
     rig_wanted : Signal()
-        A rig is to be calibrated.
+        The user wants to calibrate a rig.
     cancel_requested : Signal()
-        The station need not be opened after all.
+        The user cancels the opening of the station.
     """
 
     start_requested = Signal(object, str)
@@ -54,7 +54,7 @@ class NewCalibration(Card):
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
             "Start a calibration",
-            "Everything below stays as it is for the next wearer.",
+            "These settings are kept for the next wearer.",
             "hand",
         )
         self.setObjectName("newCalibration")
@@ -71,8 +71,8 @@ class NewCalibration(Card):
         self._problem = paragraph("startProblem")
         self._button = main_button("start", "Start calibration")
         self._button.setEnabled(False)
-        self._cancel = button("cancelOpening", "Cancel", help_text="Do not start after all (Esc)")
-        # Lest a second press of what started it cancels.
+        self._cancel = button("cancelOpening", "Cancel", help_text="Cancel the start (Esc)")
+        # Without focus, a second press of the key that started it does not cancel.
         self._cancel.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._cancel.hide()
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -97,7 +97,7 @@ class NewCalibration(Card):
         return self._form.settings
 
     def show_preferences(self, preferences: Preferences) -> None:
-        """Show what is remembered, for the next wearer."""
+        """Show the preferences, for the next wearer."""
         self._form.show_settings(preferences.station)
         self._wearer.clear()
         self._wearer.addItems(list(preferences.wearers))
@@ -109,18 +109,18 @@ class NewCalibration(Card):
         self._form.set_rig(path)
 
     def set_pairing_key(self, pairing_key: str) -> None:
-        """Take another key for network headsets."""
+        """Use another key for network headsets."""
         self._key = pairing_key
         self._form.set_pairing_key(pairing_key)
         self.check()
 
     def check(self) -> None:
-        """Look at the station as it is set up now, unless it may be in use or being opened."""
+        """Check the station with the settings shown, unless it may be in use or being opened."""
         if self.isVisible() and not self._is_opening:
             self._check.ask(self._question())
 
     def start(self) -> None:
-        """Look once more, and start if all is well."""
+        """Check the station again, and start if it is ready."""
         try:
             self._starting = clean_wearer(self._wearer.currentText())
         except ValueError as error:
@@ -130,7 +130,7 @@ class NewCalibration(Card):
         self.check()
 
     def set_opening(self, is_opening: bool) -> None:
-        """Let nothing be changed while a station is being opened, and offer to cancel that."""
+        """Disable the fields while a station is being opened, and show a Cancel button."""
         self._is_opening = is_opening
         self._form.setEnabled(not is_opening)
         self._cancel.setVisible(is_opening)
@@ -144,13 +144,13 @@ class NewCalibration(Card):
             self.check()
 
     def stop(self) -> None:
-        """Wait for the end of what runs in the background; before the program ends."""
+        """Wait for background work to end; called before the program ends."""
         self._settle.stop()
         self._again.stop()
         self._check.stop()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Start on Enter; while a station is being opened, cancel that on Esc."""
+        """Start on Enter; cancel the opening of a station on Esc."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self._button.click()
         elif event.key() == Qt.Key.Key_Escape and self._is_opening:
@@ -159,14 +159,14 @@ class NewCalibration(Card):
             super().keyPressEvent(event)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Look at the station from now on, and ask for the wearer."""
+        """Check the station regularly while the form is shown, and focus the wearer's field."""
         super().showEvent(event)
         self._wearer.setFocus()
         self.check()
         self._again.start()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Leave the station alone."""
+        """Stop checking the station."""
         super().hideEvent(event)
         self._settle.stop()
         self._again.stop()
@@ -176,10 +176,10 @@ class NewCalibration(Card):
 
     def _take_findings(self, question: object, findings: Mapping[Part, Finding]) -> None:
         if self._is_opening or question != self._question():
-            return  # or the answer to what is shown now is on its way
+            return  # outdated: an answer to the settings now shown will follow
         self._form.show_findings(findings)
         broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
-        self._problem.setText(f"To be mended first: {', '.join(broken)}." if broken else "")
+        self._problem.setText(f"Fix first: {', '.join(broken)}." if broken else "")
         self._button.setEnabled(is_ready(findings))
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
@@ -187,7 +187,7 @@ class NewCalibration(Card):
 
     def _give_up_opening(self) -> None:
         self._cancel.setEnabled(False)
-        self._problem.setText("Cancelling, once camera and headset are open…")
+        self._problem.setText("Cancelling once camera and headset are open…")
         self.cancel_requested.emit()
 
     def _give_up(self, why: str) -> None:

@@ -1,4 +1,4 @@
-"""Which sessions the start page offers, and what it says of each."""
+"""The sessions listed on the start page, and the text of each."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from handcal_gui.widgets.times import local_time
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One session."""
+    """A listed session."""
 
     path: Path
     text: str
     is_enabled: bool = True
-    """Whether it may be chosen; otherwise `text` says why not."""
+    """True if it can be chosen; otherwise `text` contains the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Offers:
-    """What may be resumed, and what may be opened again."""
+    """Sessions that can be resumed, and recent sessions that can be opened."""
 
     unfinished: tuple[Entry, ...]
     recent: tuple[Entry, ...]
 
 
 def find_offers(folder: Path, recent: Sequence[Path]) -> Offers:
-    """Look through the folder of the sessions, and at those opened last; takes a while.
+    """Return the unfinished sessions in a folder, and the recent ones; may take a while.
 
-    A session that holds nothing is not worth either.
+    Empty sessions are left out.
     """
     offered = (_recent(path) for path in recent if path.exists())
     return Offers(

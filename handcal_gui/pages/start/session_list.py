@@ -1,4 +1,4 @@
-"""A list of sessions to choose one from."""
+"""A list from which one session is chosen."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class SessionList(QWidget):
     name : str
         For screen readers, such as "Unfinished sessions".
     verb : str
-        What the button says.
+        Label of the button.
     empty : str
-        What to say when there is nothing to list.
+        Text shown if the list is empty.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class SessionList(QWidget):
         super().__init__(parent)
         self._list = named(QListWidget(), "sessions", name)
         self._list.setWordWrap(True)
-        # As tall as there is room for, not as the items would like.
+        # As tall as the available space, not as the items need.
         self._list.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._list.setMinimumHeight(9 * SPACING_PX)
         self._list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -68,7 +68,7 @@ class SessionList(QWidget):
         self.show_entries(())
 
     def show_entries(self, entries: Sequence[Entry]) -> None:
-        """Replace what is listed, keeping the choice where it is still there."""
+        """Replace the entries, keeping the selection if it is still listed."""
         kept = self._list.currentItem()
         kept_path = kept.data(Qt.ItemDataRole.UserRole) if kept is not None else None
         self._list.clear()
@@ -87,7 +87,7 @@ class SessionList(QWidget):
         self._refresh()
 
     def add_button(self, added: QPushButton) -> None:
-        """Put another button before the list's own."""
+        """Add a button before the list's own."""
         self._buttons.insertWidget(1, added)
 
     def _choose(self) -> None:

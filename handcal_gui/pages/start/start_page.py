@@ -1,4 +1,4 @@
-"""The first thing a technician sees: start a calibration, resume one, or open a session."""
+"""The start page: start a calibration, resume one, open a session, or evaluate."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FindOffers = Callable[[Path, Sequence[Path]], Offers]
 
 
 class StartPage(QWidget):
-    """Offers the ways to begin.
+    """The first page: new calibration, unfinished and recent sessions, evaluation.
 
     Parameters
     ----------
@@ -31,20 +31,20 @@ class StartPage(QWidget):
     pairing_key : str
         For network headsets.
     check, find_offers : callable
-        What looks at a station, and for sessions; called in jobs.
+        Functions that check a station and find sessions; called in jobs.
 
     Attributes
     ----------
     start_requested : Signal(StationSettings, str)
-        A station that has just been found ready, and the wearer.
+        The settings of a station that has just passed its checks, and the wearer.
     open_requested, resume_requested : Signal(Path)
-        A session's folder.
+        The session's folder.
     rig_wanted, evaluation_wanted : Signal()
-        A rig is to be calibrated; studies and tests are to be made.
+        The user wants to calibrate a rig, or to run studies and tests.
     cancel_requested : Signal()
-        The station need not be opened after all.
+        The user cancels the opening of the station.
     example_requested : Signal(Path)
-        The example session is to be opened, from this folder of sessions.
+        The user wants to open the example; the session folder to copy it to.
     """
 
     start_requested = Signal(object, str)
@@ -69,16 +69,16 @@ class StartPage(QWidget):
         self._folder = Path()
         self.new = NewCalibration(preferences, pairing_key, check)
         self._resume = Card(
-            "Resume", "These calibrations were broken off; they can be gone on with.", "resume"
+            "Resume", "These calibrations were interrupted. You can resume them.", "resume"
         )
         self._resume.setObjectName("resume")
         self._resume.hide()
         self._unfinished = SessionList("Unfinished sessions", "Resume")
         self._resume.body.addWidget(self._unfinished)
-        self._open = Card("Open a session", "Look at it, solve it again, export it.", "folder")
+        self._open = Card("Open a session", "Review it, solve it again, export it.", "folder")
         self._open.setObjectName("open")
         self._opened = SessionList(
-            "Recent sessions", "Open", "The sessions worked on last will be listed here."
+            "Recent sessions", "Open", "Recent sessions will be listed here."
         )
         example = button("example", "Example", "Open the example session")
         example.setToolTip("A simulated wearer's session, copied to the session folder")
@@ -89,7 +89,7 @@ class StartPage(QWidget):
         self._evaluate = Card(
             "Evaluate", "Simulated studies, the cube test, and the user test.", "check"
         )
-        evaluate = button("evaluate", "Evaluate…", help_text="How good calibrations are")
+        evaluate = button("evaluate", "Evaluate…", help_text="Measure the accuracy of calibrations")
         self._evaluate.body.addWidget(evaluate, 0, Qt.AlignmentFlag.AlignRight)
         self._lay_out()
         self._find = LatestJob(lambda question: find_offers(*question), self)
@@ -106,38 +106,38 @@ class StartPage(QWidget):
         self.show_preferences(preferences)
 
     def show_preferences(self, preferences: Preferences) -> None:
-        """Show what is remembered, for the next wearer."""
+        """Show the preferences, for the next wearer."""
         self._recent = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
         self._look_for_sessions()
 
     def set_rig(self, path: Path) -> None:
-        """Show another rig file, whatever else is being entered."""
+        """Show another rig file; other entries stay as they are."""
         self.new.set_rig(str(path))
 
     def set_pairing_key(self, pairing_key: str) -> None:
-        """Take another key for network headsets."""
+        """Use another key for network headsets."""
         self.new.set_pairing_key(pairing_key)
 
     def set_opening(self, is_opening: bool) -> None:
-        """Offer nothing but to cancel while a station is being opened."""
+        """Allow only cancelling while a station is being opened."""
         self.new.set_opening(is_opening)
         for card in (self._resume, self._open):
             card.setEnabled(not is_opening)
 
     def browse(self) -> None:
-        """Ask for a session's folder, to be opened."""
+        """Let the user choose the folder of a session to open."""
         folder = QFileDialog.getExistingDirectory(self, "Session folder", str(self._folder))
         if folder:
             self.open_requested.emit(Path(folder))
 
     def stop(self) -> None:
-        """Wait for the end of what runs in the background; before the program ends."""
+        """Wait for background work to end; called before the program ends."""
         self.new.stop()
         self._find.stop()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Look for sessions anew."""
+        """Search for sessions again."""
         super().showEvent(event)
         self._look_for_sessions()
 

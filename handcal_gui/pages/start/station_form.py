@@ -1,4 +1,4 @@
-"""The choice of camera, headset, rig and folder, with what was found of each beside it."""
+"""The choice of camera, headset, rig and folder, each with the finding about it."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from handcal_gui.widgets.path_field import PathField
 
 
 class StationForm(QWidget):
-    """Shows a station's settings to be changed.
+    """A form for the settings of a station.
 
     Parameters
     ----------
     wearer : QWidget
-        The first field, which is not the station's.
+        The field in the first row; not one of the station's settings.
     settings : StationSettings
     pairing_key : str
         For network headsets.
@@ -37,7 +37,7 @@ class StationForm(QWidget):
     ----------
     changed : Signal()
     rig_wanted : Signal()
-        A rig is to be calibrated.
+        The user wants to calibrate a rig.
     """
 
     changed = Signal()
@@ -57,12 +57,12 @@ class StationForm(QWidget):
         self._headset = HeadsetField(pairing_key)
         self._rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "Example rig")
         self._rig.setToolTip(
-            "The offline calibration of headset and camera; the virtual headset wears any."
+            "The offline calibration of headset and camera; the virtual headset accepts any."
         )
         self._calibrate_rig = button("calibrateRig", "Calibrate…", "Calibrate a rig")
         self._calibrate_rig.clicked.connect(self.rig_wanted)
         self._sessions = PathField("Session folder", "folder")
-        self._sessions.setToolTip("Every calibration gets a folder of its own in here.")
+        self._sessions.setToolTip("Each calibration gets its own folder in this folder.")
         self._advanced = AdvancedFields()
         self._findings = {part: FindingLine(part) for part in PARTS}
         self._lay_out(wearer)
@@ -95,7 +95,7 @@ class StationForm(QWidget):
         self._headset.set_pairing_key(pairing_key)
 
     def show_findings(self, findings: Mapping[Part, Finding]) -> None:
-        """Show what was found of each part, with a button where one click mends it."""
+        """Show the finding about each part, with a button if one click can fix it."""
         for part, finding in findings.items():
             fix, changes = _fix(part, finding, self.settings)
             self._findings[part].show_finding(finding, fix, partial(self._change, changes))
@@ -126,7 +126,7 @@ class StationForm(QWidget):
 
 
 def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:
-    """Add a field with its title at the height of the field's first line."""
+    """Add a field, with its title aligned with the field's first line."""
     label = QLabel(title)
     label.setMinimumHeight(QComboBox().sizeHint().height())
     label.setBuddy(field)
@@ -136,7 +136,7 @@ def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:
 
 
 def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, dict[str, str]]:
-    """Return what would mend a part: a button's label and changed settings; empty if nothing."""
+    """Return a fix for a part: a button's label and changed settings; empty if there is none."""
     is_broken = finding.health is Health.BROKEN
     is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
     if part == "camera" and is_broken:

@@ -1,1 +1,1 @@
-"""The wizard: what comes next, said in one sentence, and the button that does it."""
+"""The wizard: the next instruction in one sentence, and the button that carries it out."""

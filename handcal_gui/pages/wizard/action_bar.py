@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.pages.wizard.steps import Offer, View
+from handcal_gui.pages.wizard.steps import ButtonSpec, View
 from handcal_gui.theme import SPACING_PX, colors, scale_font
 from handcal_gui.widgets.fields import main_button, named
 
@@ -26,15 +26,15 @@ _KEYS = (_KEY, _TEXT_KEY, "Ctrl+Enter")
 _LONGEST_LABEL = "Confirm for the wearer"
 _MOST_OTHERS = 3
 _ARMING_MS = 700
-"""Wait before a new button can discard anything: a click meant for its predecessor is lost."""
+"""Delay before a new button can discard data: a click on its predecessor must not trigger it."""
 
 
 class ActionBar(QWidget):
-    """Shows the buttons of a `View`; its height and the main button's place never change.
+    """The buttons of a `View`; its height and the main button's position never change.
 
-    The space bar presses the main button from every focus but a text field, where Ctrl+Return
-    does. The main button never has the focus: a button that is disabled would pass it on.
-    Buttons that discard something have no focus either, only a letter with Alt.
+    The space bar presses the main button, except while a text field has the focus; Ctrl+Return
+    always does. The main button never has the focus, because a disabled button would pass it on.
+    Buttons that discard data have no focus either; a click or Alt and a letter presses them.
 
     Attributes
     ----------
@@ -60,10 +60,10 @@ class ActionBar(QWidget):
         self._lay_out()
         self._main.clicked.connect(lambda: self._ask(self._view.main if self._view else None))
         for i, other in enumerate(self._others):
-            other.clicked.connect(lambda _checked=False, i=i: self._ask(self._offer(i)))
+            other.clicked.connect(lambda _checked=False, i=i: self._ask(self._spec(i)))
         self._arming.timeout.connect(self._arm)
         for keys in _KEYS:
-            # Always enabled: the key of a disabled shortcut would go to what has the focus.
+            # Always enabled: the key of a disabled shortcut would go to the focused widget.
             shortcut = QShortcut(QKeySequence(keys), self, autoRepeat=False)
             shortcut.activated.connect(self._take_key)
         app = QApplication.instance()
@@ -71,28 +71,28 @@ class ActionBar(QWidget):
         app.focusChanged.connect(self._show_key)
 
     def show_view(self, view: View | None) -> None:
-        """Show the buttons of a view; none can be pressed without a view."""
+        """Show the buttons of a view; if it is None, no button can be pressed."""
         before, self._view = self._view, view
         self._main.setEnabled(view is not None and view.main.is_enabled)
         if view is not None:
             self._main.setText(view.main.label)
         for i, button in enumerate(self._others):
             was = before.others[i] if before and i < len(before.others) else None
-            offer = self._offer(i)
-            if offer != was:
-                button.clearFocus()  # which was given to what the button was before
-                self._show_offer(button, offer)
+            spec = self._spec(i)
+            if spec != was:
+                button.clearFocus()  # which the button had with its previous action
+                self._show_spec(button, spec)
 
     @property
     def is_repeat(self) -> bool:
-        """Whether the newest key is only held down."""
+        """True if the newest key event repeats a key that is held down."""
         return self._is_repeat
 
     def notice_key(self, event: QKeyEvent) -> None:
-        """Look at a key that the window gets, before it has an effect.
+        """Examine a key event of the window before it takes effect.
 
-        An X server repeats a held key as a release and a press at the same instant, which Qt does
-        not always recognise.
+        While a key is held down, an X server sends releases and presses with equal timestamps,
+        which Qt does not always recognise as repeats.
         """
         key = (event.key(), event.timestamp())
         if event.type() == QEvent.Type.KeyRelease:
@@ -101,7 +101,7 @@ class ActionBar(QWidget):
             self._is_repeat = event.isAutoRepeat() or (key[1] > 0 and key == self._released)
 
     def press_main(self) -> None:
-        """Do what the main button does."""
+        """Press the main button."""
         self._main.click()
 
     def changeEvent(self, event: QEvent) -> None:
@@ -131,21 +131,21 @@ class ActionBar(QWidget):
         layout.addWidget(self._main)
         self.setFixedHeight(7 * SPACING_PX)
 
-    def _show_offer(self, button: QPushButton, offer: Offer | None) -> None:
-        button.setVisible(offer is not None)
-        if offer is None:
+    def _show_spec(self, button: QPushButton, spec: ButtonSpec | None) -> None:
+        button.setVisible(spec is not None)
+        if spec is None:
             return
-        button.setText(offer.label)
-        letter = _native(f"Alt+{offer.label.partition('&')[2][:1].upper()}")
-        if offer.discards:
+        button.setText(spec.label)
+        letter = _native(f"Alt+{spec.label.partition('&')[2][:1].upper()}")
+        if spec.discards:
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            button.setToolTip(f"{offer.discards} ({letter})")
+            button.setToolTip(f"{spec.discards} ({letter})")
             button.setEnabled(False)
             self._arming.start()
         else:
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
             button.setToolTip(f"{letter}, or Return while this button has the focus")
-            button.setEnabled(offer.is_enabled)
+            button.setEnabled(spec.is_enabled)
 
     def _take_key(self) -> None:
         if not self._is_repeat:
@@ -153,16 +153,16 @@ class ActionBar(QWidget):
 
     def _arm(self) -> None:
         for i, button in enumerate(self._others):
-            offer = self._offer(i)
-            button.setEnabled(offer is not None and offer.is_enabled)
+            spec = self._spec(i)
+            button.setEnabled(spec is not None and spec.is_enabled)
 
-    def _offer(self, i: int) -> Offer | None:
+    def _spec(self, i: int) -> ButtonSpec | None:
         others = self._view.others if self._view is not None else ()
         return others[i] if i < len(others) else None
 
-    def _ask(self, offer: Offer | None) -> None:
-        if offer is not None and offer.is_enabled:
-            self.asked.emit(offer.action)
+    def _ask(self, spec: ButtonSpec | None) -> None:
+        if spec is not None and spec.is_enabled:
+            self.asked.emit(spec.action)
 
     def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
         self._key.setText(_native(_TEXT_KEY if _takes_text(new) else _KEY))
@@ -176,7 +176,7 @@ class ActionBar(QWidget):
 
 
 def _takes_text(widget: QWidget | None) -> bool:
-    """Return whether a widget takes the space bar as a letter."""
+    """Return whether the space bar enters text in a widget."""
     if isinstance(widget, QComboBox):
         return widget.isEditable()
     if isinstance(widget, (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)):

@@ -1,4 +1,4 @@
-"""What the wizard says and offers at each moment; no Qt, so that every case can be tested."""
+"""Texts and buttons of the wizard at each step; without Qt, so that every case can be tested."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ STEPS = tuple(Step)
 
 
 class Action(StrEnum):
-    """What the buttons ask for; the value is the engine's command, or the wizard's own move."""
+    """Actions of the buttons; the value is the engine's command, or a move within the wizard."""
 
     NEXT = "next"
     MAKE_CURSOR = "make cursor"
@@ -59,37 +59,37 @@ class Action(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One precondition, and whether it holds."""
+    """A precondition, and whether it holds."""
 
     text: str
     holds: bool
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
-    """One button."""
+class ButtonSpec:
+    """A button: its action and its label."""
 
     action: Action
     label: str
-    """Of a button other than the main one, with & before the letter that presses it with Alt."""
+    """On buttons other than the main one, & precedes the letter that presses it with Alt."""
     is_enabled: bool = True
     discards: str = ""
-    """What is lost, if anything is: then only a click or the letter presses the button."""
+    """The loss that the button causes, if any: then only a click or the letter presses it."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the wizard shows."""
+    """Everything that the wizard shows at one moment."""
 
     step: Step
     sentence: str
-    """What the wearer, or the technician, must do."""
+    """The instruction to the wearer or the technician."""
     checks: tuple[Check, ...]
-    main: Offer
-    """What the space bar does."""
-    others: tuple[Offer, ...] = ()
+    main: ButtonSpec
+    """The button that the space bar presses."""
+    others: tuple[ButtonSpec, ...] = ()
     note: str = ""
-    """What just happened or goes on, such as a refusal; empty if nothing."""
+    """The last event or current activity, such as a refusal; empty if none."""
 
 
 def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ...]:
@@ -103,13 +103,13 @@ def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ..
 
 
 def is_complete(plan: EyePlan, alignments: Collection[Alignment]) -> bool:
-    """Tell whether every eye of the plan has been aligned."""
+    """Return whether every eye of the plan has been aligned."""
     eyes = (plan,) if plan in EYES else EYES
     return all(any(eye in alignment.eyes for alignment in alignments) for eye in eyes)
 
 
 class Wizard:
-    """Knows where the technician is: the engine's state, and the moves that only the wizard has.
+    """The current step: from the engine's state, and from moves that concern only the wizard.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Wizard:
         self._free = Step.CONNECT
 
     def step(self, snapshot: Snapshot) -> Step:
-        """Return the present step."""
+        """Return the current step."""
         match snapshot.procedure.state:
             case State.ALIGN:
                 self._free = Step.VERIFY
@@ -139,7 +139,7 @@ class Wizard:
         return self._free
 
     def move(self, action: Action, snapshot: Snapshot) -> None:
-        """Make a move that the engine has no part in."""
+        """Make a move that does not involve the engine."""
         place = STEPS.index(self._free)
         match action:
             case Action.NEXT:
@@ -153,10 +153,10 @@ class Wizard:
                 self._repeat = _REPEATS.get(action)
                 self._free = Step.SHOW_HAND
             case _:
-                raise ValueError(f"{action} is the engine's")
+                raise ValueError(f"{action} is an action of the engine")
 
     def view(self, snapshot: Snapshot) -> View:
-        """Return what to show."""
+        """Return the view of a snapshot."""
         return _VIEWS[self.step(snapshot)](self, snapshot)
 
     def eyes(self, snapshot: Snapshot) -> tuple[Eye, ...]:
@@ -169,12 +169,12 @@ class Wizard:
         camera, link = snapshot.camera, snapshot.link
         checks = (
             Check(
-                "No picture from the camera" if camera.problem else f"Camera: {camera.name}",
+                "No image from the camera" if camera.problem else f"Camera: {camera.name}",
                 not camera.problem and camera.rate_hz > 0,
             ),
             Check(sentence(snapshot.link_problem) or "Headset connected", link.connected),
             Check(
-                f"Headset tells its pose {link.pose_rate_hz:.0f} times a second"
+                f"Headset pose: {link.pose_rate_hz:.0f} Hz"
                 if link.pose_rate_hz
                 else "No pose from the headset yet",
                 link.pose_rate_hz > 0,
@@ -182,20 +182,20 @@ class Wizard:
         )
         return View(
             Step.CONNECT,
-            "Put the headset on the wearer and wait until camera and headset answer.",
+            "Put the headset on the wearer and wait until camera and headset are connected.",
             checks,
-            Offer(Action.NEXT, "Next", all(check.holds for check in checks)),
+            ButtonSpec(Action.NEXT, "Next", all(check.holds for check in checks)),
         )
 
     def _show_hand(self, snapshot: Snapshot) -> View:
-        back = Offer(Action.BACK, "&Back")
+        back = ButtonSpec(Action.BACK, "&Back")
         if snapshot.procedure.state is State.SHOW_HAND and snapshot.procedure.alignments:
-            back = Offer(Action.SOLVE, "Keep the alignments &so far")
+            back = ButtonSpec(Action.SOLVE, "Keep the alignments &so far")
         return View(
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
             (_hand_check(snapshot),),
-            Offer(Action.NEXT, "Next", _hand_check(snapshot).holds),
+            ButtonSpec(Action.NEXT, "Next", _hand_check(snapshot).holds),
             (back,),
         )
 
@@ -206,8 +206,8 @@ class Wizard:
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
             (_hand_check(snapshot), Check("Hand held still", is_steady)),
-            Offer(Action.MAKE_CURSOR, "Make cursor", is_steady),
-            (Offer(Action.BACK, "&Back"),),
+            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady),
+            (ButtonSpec(Action.BACK, "&Back"),),
         )
 
     def _align(self, snapshot: Snapshot) -> View:
@@ -216,7 +216,7 @@ class Wizard:
         is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
         limit_deg = np.degrees(procedure.guard_limit_rad)
         cursor = procedure.cursor
-        # A second press of what made the cursor must not confirm a hand that has not moved.
+        # A second press of the key that made the cursor must not confirm a hand that has not moved.
         is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_ALIGN_NS
         close = ""
         if len(procedure.eyes) == 1:
@@ -224,9 +224,9 @@ class Wizard:
         return View(
             Step.ALIGN,
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
-            (hand, Check(f"Hand turned by less than {limit_deg:.0f}°", is_straight)),
-            Offer(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
-            (Offer(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
+            (hand, Check(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
+            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
+            (ButtonSpec(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
             procedure.refusal,
         )
 
@@ -234,7 +234,7 @@ class Wizard:
         procedure = snapshot.procedure
         count = len(snapshot.procedure.alignments)
         aligned = Check(f"{counted(count, 'alignment')} confirmed", True)
-        redo = Offer(
+        redo = ButtonSpec(
             Action.REDO,
             "&Discard and repeat",
             discards="Deletes the last alignment; the session panel can restore it",
@@ -242,22 +242,22 @@ class Wizard:
         if procedure.state is State.ALIGNED or procedure.results is None:
             return View(
                 Step.SOLVE,
-                "The wearer may lower the hand. Solve where the eyes are.",
+                "The wearer may lower the hand. Solve for the positions of the eyes.",
                 (aligned,),
-                Offer(Action.SOLVE, "Solve"),
+                ButtonSpec(Action.SOLVE, "Solve"),
                 (redo,),
             )
         verdicts = _verdict_checks(snapshot)
         if procedure.state is State.APPLYING:
             wait = "Waiting for the headset to acknowledge its projections."
             return View(
-                Step.SOLVE, wait, (aligned, *verdicts), Offer(Action.APPLY, "Sending…", False)
+                Step.SOLVE, wait, (aligned, *verdicts), ButtonSpec(Action.APPLY, "Sending…", False)
             )
         return View(
             Step.SOLVE,
             "Send the corrected projections to the headset.",
             (aligned, *verdicts),
-            Offer(Action.APPLY, "Send to the headset"),
+            ButtonSpec(Action.APPLY, "Send to the headset"),
             (redo,),
             snapshot.problem,
         )
@@ -269,47 +269,47 @@ class Wizard:
                 Step.VERIFY,
                 "The alignments have changed. Solve again.",
                 checks,
-                Offer(Action.SOLVE, "Solve"),
-                (Offer(Action.ANOTHER, "&Add alignment"),),
+                ButtonSpec(Action.SOLVE, "Solve"),
+                (ButtonSpec(Action.ANOTHER, "&Add alignment"),),
             )
         if not is_complete(self.plan, snapshot.procedure.alignments.values()):
             eyes = _names(self.eyes(snapshot))
             return View(
                 Step.VERIFY,
-                f"Now the same with {eyes}.",
+                f"Now repeat this with {eyes}.",
                 checks,
-                Offer(Action.ANOTHER, f"Align {eyes}"),
-                (Offer(Action.NEXT, "Leave it at &one eye"),),
+                ButtonSpec(Action.ANOTHER, f"Align {eyes}"),
+                (ButtonSpec(Action.NEXT, "Finish with &one eye"),),
             )
         return View(
             Step.VERIFY,
-            "The wearer looks at the raised hand: the outline should lie on it. Add an alignment, "
-            "or fine-tune φ, if it does not.",
+            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
+            "add an alignment or fine-tune φ.",
             checks,
-            Offer(Action.NEXT, "It fits"),
+            ButtonSpec(Action.NEXT, "It fits"),
             (
-                Offer(Action.ANOTHER, "&Add alignment"),
-                Offer(Action.REPEAT_LEFT, "Add l&eft eye"),
-                Offer(Action.REPEAT_RIGHT, "Add &right eye"),
+                ButtonSpec(Action.ANOTHER, "&Add alignment"),
+                ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
+                ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
             ),
         )
 
     def _save(self, snapshot: Snapshot) -> View:
         where = snapshot.session_path
-        others = (Offer(Action.EXPORT, "E&xport…"), Offer(Action.BACK, "&Back"))
+        others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
         if snapshot.record.is_finished:
             return View(
                 Step.SAVE,
-                "The session is complete. Take the headset off, or go on with the next wearer.",
+                "The session is complete. Take the headset off, or continue with the next wearer.",
                 (Check(f"Saved in {where}", True),),
-                Offer(Action.NEXT_WEARER, "Next wearer"),
+                ButtonSpec(Action.NEXT_WEARER, "Next wearer"),
                 others,
             )
         return View(
             Step.SAVE,
-            "Everything is saved already; finish the session when nothing more is to be done.",
+            "Everything is already saved. Finish the session when you are done.",
             (Check(f"Saved in {where}", not snapshot.problem),),
-            Offer(Action.FINISH, "Finish session"),
+            ButtonSpec(Action.FINISH, "Finish session"),
             others,
             snapshot.problem,
         )

@@ -1,4 +1,4 @@
-"""The wizard's face: the steps, one sentence, what is still missing; its buttons are in a bar."""
+"""The wizard's page: the steps, one sentence, the preconditions; its buttons are in a bar."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_CHECKS = 3
 
 
 class WizardPanel(QWidget):
-    """Shows a `Wizard` and asks for what it offers.
+    """Shows a `Wizard` and emits the actions of its buttons.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class WizardPanel(QWidget):
     bar : ActionBar
         Its buttons, for the window's bottom strip.
     shown : View or None
-        What it says now; None before the first snapshot.
+        The view shown; None before the first snapshot.
     asked : Signal(Action)
         A button was pressed.
     plan_changed : Signal(str)
@@ -61,14 +61,14 @@ class WizardPanel(QWidget):
         self._plan.currentIndexChanged.connect(self._choose_plan)
 
     def start(self, wizard: Wizard) -> None:
-        """Show another wizard from now on."""
+        """Switch to another wizard."""
         self.wizard = wizard
         self._plan.setCurrentText(PLANS[wizard.plan])
         self.shown = None
         self.bar.show_view(None)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show what the wizard says of a snapshot."""
+        """Show the wizard's view of a snapshot."""
         view = self.wizard.view(snapshot)
         if view != self.shown:
             before, self.shown = self.shown, view
@@ -77,7 +77,7 @@ class WizardPanel(QWidget):
                 self.step_changed.emit(view.step)
 
     def press_main(self) -> None:
-        """Do what the main button does."""
+        """Press the main button."""
         self.bar.press_main()
 
     def changeEvent(self, event: QEvent) -> None:
@@ -90,15 +90,15 @@ class WizardPanel(QWidget):
         scale_font(self._title, 1.6, is_bold=True)
         scale_font(self._sentence, 1.2)
         self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
-        # Two lines always, so that what is below stays where it is.
+        # Always two lines, so that the widgets below do not move.
         self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
         self._note.setMinimumHeight(2 * self._note.fontMetrics().lineSpacing() + 2)
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._plan.addItems(list(PLANS.values()))
         self._plan.setToolTip(
-            "One eye after the other tells each eye's place, and takes two alignments.\n"
-            "Both eyes at once is quicker, but cannot tell an eye distance that differs from the "
-            "rig's."
+            "One eye after the other measures the position of each eye and takes two alignments.\n"
+            "Both eyes at once is quicker, but cannot measure an eye distance that differs from "
+            "the rig's."
         )
         plan_label = QLabel("E&yes")
         plan_label.setBuddy(self._plan)
@@ -131,7 +131,7 @@ class WizardPanel(QWidget):
         self.bar.show_view(view)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:
-            self._plan.clearFocus()  # which Qt would pass on
+            self._plan.clearFocus()  # otherwise Qt would pass the focus on
         self._plan.setEnabled(can_choose)
 
     def _choose_plan(self, index: int) -> None:
@@ -141,7 +141,7 @@ class WizardPanel(QWidget):
 
 
 class _Rail(QWidget):
-    """The steps in a row, the present one emphasised."""
+    """The steps in a row, the current one emphasised."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
-from handcal_gui.pages.wizard.steps import Action, Offer, Step, View
+from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, View
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def label(qtbot: QtBot) -> QLabel:
 
 
 def view(step: Step, action: Action) -> View:
-    return View(step, "Do it.", (), Offer(action, "Go"))
+    return View(step, "Do it.", (), ButtonSpec(action, "Go"))
 
 
 def test_each_offer_of_a_step_is_pictured_once(label: QLabel, tmp_path: Path) -> None:

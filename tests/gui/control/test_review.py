@@ -62,7 +62,7 @@ def test_the_example_is_opened_from_the_start_page(
 ) -> None:
     program.start.example_requested.emit(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
-    assert child(program, QLabel, "reviewHolds").text().startswith("2 alignments, 6 trials")
+    assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
     program.show_start()
     program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
     assert "preferences.json" in program.window.banner.text
@@ -73,7 +73,7 @@ def test_a_session_is_shown_and_closed_again(
 ) -> None:
     program.open_session(record.path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
-    assert child(program, QLabel, "reviewHolds").text().startswith("2 alignments, 0 trials")
+    assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 0 trials")
     assert child(program, QLabel, "reviewLefteye").text()
     assert program.preferences.sessions == (str(record.path),)
     child(program, QPushButton, "reviewClose").click()
@@ -141,7 +141,7 @@ def test_a_session_whose_last_line_was_cut_off_is_opened_without_it(
     tear(record.path)
     program.open_session(record.path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
-    assert "unfinished, as after a crash" in child(program, QLabel, "reviewJournal").text()
+    assert "incomplete, as after a crash" in child(program, QLabel, "reviewJournal").text()
 
 
 def test_opening_can_be_cancelled(

@@ -143,13 +143,13 @@ def test_the_next_wearer_finds_everything_as_it_was(
     assert [wearer(page).itemText(i) for i in range(2)] == ["Ada", "Bea"]
 
 
-def test_a_part_that_is_broken_prevents_the_start_until_it_is_mended(
+def test_a_part_that_is_broken_prevents_the_start_until_it_is_fixed(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
 ) -> None:
     inspector.healths["camera"] = Health.BROKEN
     page = open_page(source="realsense", headset="network")
     assert not button(page, "start").isEnabled()
-    assert text(page, "startProblem") == "To be mended first: Camera."
+    assert text(page, "startProblem") == "Fix first: Camera."
     assert text(page, "cameraFound") == "Found realsense. Do this."
     inspector.healths["camera"] = Health.GOOD
     button(page, "cameraFix").click()

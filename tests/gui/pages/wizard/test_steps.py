@@ -109,7 +109,7 @@ def test_the_whole_way_of_one_eye_after_the_other(
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"camera": {"problem": "no camera is connected; plug one in"}}, "No picture"),
+        ({"camera": {"problem": "no camera is connected; plug one in"}}, "No image"),
         ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "No headset"),
         ({"link": {"pose_rate_hz": 0.0}}, "No pose"),
     ],
