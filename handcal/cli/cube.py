@@ -160,7 +160,7 @@ def capture(arguments: argparse.Namespace) -> None:
         raise HandcalError(str(error)) from error
     cube, grid = cube_and_grid(_settings(arguments), arguments.folder)
     if not missing_captures(arguments.folder, plan):
-        console.print("All captures are there.")
+        console.print("All captures have been taken.")
         return
     which = _only_camera() if arguments.camera is None else arguments.camera
     with open_viewpoint(which, arguments.size) as camera:

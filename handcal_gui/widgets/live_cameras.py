@@ -1,4 +1,4 @@
-"""What cameras of this computer see, or recordings and videos in their place, as chosen."""
+"""Live images of chosen cameras, recordings or videos."""
 
 from __future__ import annotations
 
@@ -26,25 +26,26 @@ _POLL_MS = 50
 
 
 class LiveCameras(QWidget):
-    """Has each camera chosen, and shows what all of them see at the same moment.
+    """Offers a choice for each camera, and shows simultaneous images of all of them.
 
     Parameters
     ----------
     titles : sequence of str
-        What each camera is.
+        Name of each camera.
     realsense : RealSenseSettings, optional
     tell : callable
-        Given a title, and the first frame of a camera that has depth, too; in another thread.
+        Called in another thread with a camera's title and its first frame, if the camera also has
+        depth.
     open_source : callable
-        As `open_view_source`.
+        Like `open_view_source`.
 
     Attributes
     ----------
     images : tuple of (H, W, 3) uint8, or None
-        What is seen now; None while no camera is shown.
+        The present images; None while no camera is shown.
     images_changed : Signal()
     failed : Signal(str)
-        No camera is shown, and why.
+        Reason why no camera is shown.
     """
 
     images_changed = Signal()
@@ -80,7 +81,7 @@ class LiveCameras(QWidget):
         self._say("No image yet")
 
     def offer(self, numbers: Iterable[int]) -> None:
-        """Offer cameras of this computer, too, by their numbers."""
+        """Add cameras of this computer to the choices, by their numbers."""
         for place, source in enumerate(self._sources.values()):
             for number in sorted(numbers, reverse=True):
                 source.insertItem(0, f"Camera {number}", str(number))
@@ -88,14 +89,14 @@ class LiveCameras(QWidget):
                 source.setCurrentIndex(place)
 
     def start(self) -> None:
-        """Show what the chosen cameras see."""
+        """Show images of the chosen cameras."""
         self.stop()
         sources = {title: self._source(title) for title in self._sources}
         if "" in sources.values():
             self.failed.emit("choose the recording or video")
             return
         if len(set(sources.values())) < len(sources):
-            self.failed.emit("one camera cannot be both: choose another")
+            self.failed.emit("both are the same camera: choose another for one of them")
             return
         self._live = LiveImages(
             [
@@ -122,7 +123,7 @@ class LiveCameras(QWidget):
         self.images_changed.emit()
 
     def _source(self, title: str) -> str:
-        """Return what a camera is called by `open_view_source`; empty for no recording."""
+        """Return a camera's source for `open_view_source`; empty if no recording is chosen."""
         chosen = str(self._sources[title].currentData())
         return self._recorded[title].path if chosen == _RECORDED else chosen
 

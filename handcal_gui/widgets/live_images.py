@@ -1,4 +1,4 @@
-"""Cameras of this computer, read in a thread; whoever polls gets the newest images."""
+"""Cameras of this computer, read in a thread; the newest images are polled."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ OpenCamera = Callable[[], ViewpointCamera]
 
 
 class LiveImages(Worker):
-    """Reads cameras in a thread until stopped; the newest images wait in a place for one.
+    """Reads cameras in a thread until stopped, and keeps only the newest images.
 
     Parameters
     ----------
     cameras : sequence of callable
-        Open them, in the thread.
+        Functions that open the cameras, called in the thread.
 
     Attributes
     ----------
     newest : tuple of (H, W, 3) uint8, or None
-        One image of each camera, read one right after the other; None before the first.
+        One image of each camera, read immediately one after the other; None before the first.
     failed : Signal(str)
-        A camera could not be opened or broke down, and why.
+        Reason why a camera could not be opened or failed.
     """
 
     failed = Signal(str)
@@ -45,7 +45,7 @@ class LiveImages(Worker):
         self._stopped = threading.Event()
 
     def stop(self) -> None:
-        """Close the cameras, and wait for that; nothing more is heard."""
+        """Close the cameras and wait until they are closed; pending signals are discarded."""
         self._stopped.set()
         self.wait()
         self._discard_pending()
@@ -62,7 +62,8 @@ class LiveImages(Worker):
         except HandcalError as error:
             self._emit_later(self.failed.emit, str(error))
         except Exception as error:
-            _LOG.exception("live images broke down")
+            _LOG.exception("unexpected error in live images")
             self._emit_later(
-                self.failed.emit, f"handcal broke down ({type(error).__name__}: {error})"
+                self.failed.emit,
+                f"handcal hit an unexpected error ({type(error).__name__}: {error})",
             )

@@ -1,4 +1,4 @@
-"""What keeps a panel empty."""
+"""The reason why a panel shows no image or hand."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from handcal_gui.widgets.sentence import sentence
 
 
 def what_is_missing(snapshot: Snapshot) -> str:
-    """Return what there is not to be seen, and in short why not; empty if the hand is there.
+    """Return in short what is missing and why; empty if the hand is there.
 
-    The banner says at length what is wrong with the camera; the wizard and the camera panel, why
-    no hand is found.
+    The banner describes problems of the camera in full; the wizard and the camera panel describe
+    why no hand is found.
     """
     if snapshot.camera.problem:
         return "No image"

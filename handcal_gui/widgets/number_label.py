@@ -1,4 +1,4 @@
-"""A label for a changing number that does not move what is beside it."""
+"""A label for a changing number that does not shift its neighbours."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ UNKNOWN = "–"
 
 
 class NumberLabel(QLabel):
-    """Right-aligned, in digits of one width, as wide as its widest text; a dash at first.
+    """A right-aligned number in tabular digits, as wide as its widest text; a dash at first.
 
-    With every text a QLabel has all layouts around it computed anew, up to the window's, which
-    takes as long as painting a picture; this one only where its text is wider than any before.
+    A QLabel recomputes all enclosing layouts, up to the window's, with every new text, which takes
+    as long as painting an image. This label does so only if its text is wider than any before.
 
     Parameters
     ----------
     name : str
         Object name.
     widest : str
-        The widest text it is made for, with its unit.
+        The widest expected text, with its unit.
     tooltip : str
-        What the number means.
+        Meaning of the number.
     scale : float
-        Size of the digits, relative to text.
+        Size of the digits relative to other text.
     """
 
     def __init__(self, name: str, widest: str, tooltip: str, scale: float = 1.0) -> None:
@@ -39,7 +39,7 @@ class NumberLabel(QLabel):
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 
     def text(self) -> str:
-        """Return what is shown."""
+        """Return the text shown."""
         return self._text
 
     def setText(self, text: str) -> None:
@@ -52,7 +52,7 @@ class NumberLabel(QLabel):
         self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw the text as a QLabel would."""
+        """Draw the text like a QLabel."""
         self.style().drawItemText(
             QPainter(self),
             self.contentsRect(),

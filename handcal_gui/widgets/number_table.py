@@ -1,4 +1,4 @@
-"""A table of numbers to read and to copy."""
+"""A read-only table of numbers that can be copied as text."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from handcal_gui.theme import number_font, quiet
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row: what it is, a cell for each column (the last reaches on to the end), its meaning."""
+    """A row: label, cells and explanation; if cells are missing, the last one spans the rest."""
 
     label: str
     cells: tuple[str, ...]
@@ -58,7 +58,7 @@ class NumberTable(QTableWidget):
         self._rows: tuple[Row, ...] = ()
 
     def show_rows(self, columns: Sequence[str], rows: Sequence[Row]) -> None:
-        """Replace what is shown."""
+        """Replace the contents."""
         self._columns, self._rows = tuple(columns), tuple(rows)
         self.clearSpans()
         self.setColumnCount(len(columns))
@@ -79,12 +79,12 @@ class NumberTable(QTableWidget):
         return rows_as_text(self._columns, self._rows)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Share what room there is."""
+        """Distribute the available width."""
         super().resizeEvent(event)
         self._fit_columns()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Let the headers follow when the colours change."""
+        """Update the headers when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._take_colors()
@@ -98,7 +98,7 @@ class NumberTable(QTableWidget):
             )
 
     def _fit_columns(self) -> None:
-        """Give each column what is in it needs, and an equal share of what is left."""
+        """Give each column the width of its contents, and an equal share of the rest."""
         header = self.horizontalHeader()
         needed_px = [
             max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
@@ -110,7 +110,7 @@ class NumberTable(QTableWidget):
 
 
 def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:
-    """Return rows as tab-separated lines below a line of headings."""
+    """Return rows as tab-separated lines, with a line of headings first."""
     lines = [("", *columns), *((row.label, *row.cells) for row in rows)]
     return "\n".join("\t".join(line) for line in lines)
 

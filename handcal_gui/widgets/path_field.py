@@ -1,4 +1,4 @@
-"""A path to type, or to choose in a dialog."""
+"""A field for a path, typed or chosen in a dialog."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 from handcal_gui.widgets.fields import beside, button
 
 INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
-"""Pattern of the files that hold a camera's intrinsics."""
+"""File filter for a camera's intrinsics."""
 
 
 class PathField(QWidget):
-    """A line with a button beside it, or two where file and folder will both do.
+    """A line edit with a button, or two buttons if both a file and a folder are accepted.
 
     Parameters
     ----------
     name : str
-        What is chosen, as the dialog's title says: "Rig file".
+        Title of the dialog, such as "Rig file".
     kind : {"file", "folder", "either"}
     pattern : str
-        Of the files offered, as `QFileDialog` takes it: ``"Recordings (*.db3 *.bag)"``.
+        File filter of `QFileDialog`, such as ``"Recordings (*.db3 *.bag)"``.
     empty : str
-        What no path means; shown in place of it.
+        Placeholder that explains the meaning of an empty path.
 
     Attributes
     ----------
@@ -59,20 +59,20 @@ class PathField(QWidget):
 
     @property
     def path(self) -> str:
-        """What the line says, without blanks around it."""
+        """The entered path, without surrounding blanks."""
         return str(self._line.text()).strip()
 
     def set_path(self, path: str) -> None:
-        """Show a path, with its end in view."""
+        """Show a path, scrolled to its end."""
         if path != self.path:
             self._line.setText(path)
 
     def choose_file(self) -> None:
-        """Ask for a file in the system's dialog."""
+        """Choose a file in the system's dialog."""
         chosen, _ = QFileDialog.getOpenFileName(self, self.name, self.path, self._pattern)
         self.set_path(chosen or self.path)
 
     def choose_folder(self) -> None:
-        """Ask for a folder in the system's dialog."""
+        """Choose a folder in the system's dialog."""
         chosen = QFileDialog.getExistingDirectory(self, self.name, self.path)
         self.set_path(chosen or self.path)

@@ -1,4 +1,4 @@
-"""Plots: the one place that sets up pyqtgraph."""
+"""Plots; the only module that configures pyqtgraph."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SYMBOL_PX = 6
 
 
 class Plot(QWidget):
-    """Axes in the program's colours, to be looked at: neither mouse nor menu changes them.
+    """A non-interactive plot in the program's colours.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Plot(QWidget):
     Attributes
     ----------
     item : pyqtgraph.PlotItem
-        For ranges, and for what is not a line.
+        Plot item, for ranges and for items other than lines.
     """
 
     def __init__(
@@ -58,29 +58,30 @@ class Plot(QWidget):
         self._recolor()
 
     def sizeHint(self) -> QSize:
-        """Prefer a size that leaves the axes room."""
+        """Prefer a size with space for the axes."""
         return QSize(300, 200)
 
     def show_legend(self) -> None:
-        """Name the lines, each name once, in the upper right corner."""
+        """Show a legend in the upper right corner, with each name once."""
         self.item.addLegend(offset=(-1, 1))
         self._recolor()
 
     def add_line(
         self, role: str, *, name: str | None = None, dashed: bool = False, symbol: str | None = None
     ) -> Any:
-        """Add a line without data yet, and return pyqtgraph's `PlotDataItem`.
+        """Add an empty line and return its pyqtgraph `PlotDataItem`.
 
         Parameters
         ----------
         role : str
             A field of `handcal_gui.theme.Colors`.
         name : str or None
-            In the legend.
+            Name in the legend.
         dashed : bool
-            With larger hollow symbols: told from another line without colour, and before it.
+            Also draws larger, hollow symbols, so that the line differs from others not only by
+            colour and is visible in front of them.
         symbol : str or None
-            pyqtgraph's sign at each point, such as ``"o"``.
+            pyqtgraph's symbol at each point, such as ``"o"``.
         """
         named = {line.name() for line, _, _ in self._lines}
         line = self.item.plot(
@@ -94,7 +95,7 @@ class Plot(QWidget):
         return line
 
     def add_text(self, text: str, x: float, y: float) -> None:
-        """Write to the right of a point."""
+        """Add a text to the right of a point."""
         written = pg.TextItem(text, self.palette().windowText().color(), anchor=(-0.5, 0.5))
         written.setPos(x, y)
         self.item.addItem(written)
@@ -122,7 +123,7 @@ class Plot(QWidget):
         if self.item.legend is not None:
             self.item.legend.setLabelTextColor(text)
             for _, label in self.item.legend.items:
-                label.setText(label.text)  # pyqtgraph writes it in its new colour only then
+                label.setText(label.text)  # pyqtgraph applies the new colour only here
         for written in self._texts:
             written.setColor(text)
         for line in self._lines:

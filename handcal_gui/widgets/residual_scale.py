@@ -1,4 +1,4 @@
-"""Residuals as colours, and the scale that says which is which."""
+"""Colours of residuals, and their scale."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from handcal_gui.theme import SPACING_PX, colors, is_dark
 from handcal_gui.widgets.splat import rgb
 
 LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
-"""The colours end where the verdict would refuse such an rms, so that pictures compare."""
+"""End of the colour scale: the RMS that the verdict rejects. Fixed, so that views compare."""
 _VIRIDIS = ("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b")
-"""Matplotlib's map without its ends, which are too faint on a dark or a light canvas."""
+"""Matplotlib's map without its ends, which have too little contrast with the canvas."""
 _BAR_PX = 12
 
 
 def residual_ramp() -> UInt8:
-    """Return (8, 3) RGB from none to `LARGEST_MM`, from faint to strong before the canvas."""
+    """Return (8, 3) RGB from 0 to `LARGEST_MM`, in increasing contrast with the canvas."""
     ramp = np.array([rgb(stop) for stop in _VIRIDIS], np.uint8)
     return ramp if is_dark() else ramp[::-1]
 
 
 def residual_colors(residuals_m: Float64) -> UInt8:
-    """Return (N, 3) RGB of distances; those of no partner, NaN, are red."""
+    """Return (N, 3) RGB of distances; NaN, for points without a partner, is red."""
     ramp = residual_ramp()
     place = np.clip(1e3 * residuals_m / LARGEST_MM, 0.0, 1.0) * (len(ramp) - 1)
     shades = np.stack([np.interp(place, np.arange(len(ramp)), c) for c in ramp.T], axis=1)
@@ -35,21 +35,21 @@ def residual_colors(residuals_m: Float64) -> UInt8:
 
 
 class ResidualScale(QWidget):
-    """The scale from zero to `LARGEST_MM`, and the colour of points without a partner."""
+    """A colour scale from 0 to `LARGEST_MM`, and the colour of points without a partner."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("residual-scale")
         self.setAccessibleName("Scale of residuals")
         self.setToolTip(
-            "How far each point of the hand lies from its partner on the cursor after "
+            "Distance of each point of the hand from its partner on the cursor after "
             "registration, in millimetres; outliers have no partner"
         )
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(max(_BAR_PX, self.fontMetrics().height()))
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw the bar between its ends' numbers, and the outliers' colour behind it."""
+        """Draw the bar between its limits, and then the colour of outliers."""
         painter = QPainter(self)
         width_of = painter.fontMetrics().horizontalAdvance
         low, high, outlier = "Residual 0", f"{LARGEST_MM:.0f} mm", "Outlier"

@@ -1,4 +1,4 @@
-"""The numbers of results as people read them, in rows of text."""
+"""Results as table rows of formatted text."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Quantity:
     name: str
     suffix: str
     meaning: str
-    """The unit is in one of the first two."""
+    """Explanation for a tooltip. The unit is in the name or the suffix."""
     value: Callable[[EyeShift, EyeDisplay], float]
-    """From the shift and the eye's display to the number in its unit."""
+    """Computes the number in its unit from the shift and the eye's display."""
     decimals: int
     sigma: Callable[[EyeShift], float] | None = None
-    """From the shift to the number's standard deviation."""
+    """Computes the number's standard deviation from the shift."""
 
     def text(self, shift: EyeShift, display: EyeDisplay) -> str:
         """Return the number, with its standard deviation if it has one."""
@@ -44,7 +44,7 @@ class Quantity:
         )
 
     def difference(self, shift: EyeShift, other: EyeShift, display: EyeDisplay) -> str:
-        """Return by how much the other's number is larger."""
+        """Return the other's number minus this one."""
         apart = self.value(other, display) - self.value(shift, display)
         return f"{signed(apart, self.decimals)}{self.suffix}"
 
@@ -53,7 +53,7 @@ def _phi(index: int, direction: str) -> Quantity:
     return Quantity(
         f"φ{index + 1} (mm)",
         "",
-        f"How far the eye lies {direction} the rig's viewpoint,\n± one standard deviation (σ)",
+        f"Distance of the eye {direction} the rig's viewpoint,\n± one standard deviation (σ)",
         lambda shift, _: 1e3 * float(shift.shift_m[index]),
         2,
         lambda shift: 1e3 * float(shift.covariance_m2[index, index]) ** 0.5,
@@ -64,8 +64,8 @@ PHI = (_phi(0, "to the right of"), _phi(1, "below"), _phi(2, "in front of"))
 EXPECTED_ERROR = Quantity(
     "Expected error",
     "′",
-    "Between real and drawn, at 0.5 m, as far as φ's uncertainty makes it, in arcminutes.\n"
-    "1′ is 0.15 mm at 0.5 m.",
+    "Expected angle between real and drawn points at 0.5 m due to the uncertainty of φ,\n"
+    "in arcminutes. 1′ is 0.15 mm at 0.5 m.",
     lambda shift, display: expected_error_arcmin(display, shift),
     1,
 )
@@ -82,19 +82,19 @@ QUANTITIES = (
     Quantity(
         "Inliers",
         " %",
-        "Points of the hand that found a partner on the cursor",
+        "Share of the hand's points with a partner on the cursor",
         lambda shift, _: 100 * shift.inlier_ratio,
         0,
     ),
-    Quantity("Iterations", "", "Of all alignments together", lambda s, _: float(s.iterations), 0),
+    Quantity("Iterations", "", "Sum over all alignments", lambda s, _: float(s.iterations), 0),
 )
-_ANOTHER = "The error to expect if one more alignment like these were added"
+_ANOTHER = "Expected error after one more alignment like these"
 _EYE_DISTANCE = "Eye distance"
-_EYE_DISTANCE_MEANING = "Between the two solved eyes"
+_EYE_DISTANCE_MEANING = "Distance between the two solved eye positions"
 
 
 def result_rows(results: Results, rig: Rig) -> list[Row]:
-    """Return what is known of each eye, in a column each, and then of both together."""
+    """Return the numbers of each eye, one column per eye, and those of both eyes."""
     rows = [
         Row(q.name, tuple(_cell(q, results.eyes.get(eye), rig, eye) for eye in EYES), q.meaning)
         for q in QUANTITIES
@@ -119,7 +119,7 @@ def verdict_rows(results: Results) -> list[Row]:
 
 
 def another_text(results: Results, rig: Rig) -> str:
-    """Return what one more alignment would buy."""
+    """Return the expected benefit of one more alignment."""
     gains = ", ".join(
         f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.eyes[eye], rig.eyes[eye])}"
         f" → {_arcmin(arcmin)}"
@@ -129,13 +129,13 @@ def another_text(results: Results, rig: Rig) -> str:
 
 
 def eye_distance_text(results: Results) -> str:
-    """Return the implied distance between the eyes."""
+    """Return the distance between the solved eyes."""
     distance_m = results.eye_distance_m
     return NOTHING if distance_m is None else f"{1e3 * distance_m:.1f} mm"
 
 
 def alignment_rows(results: Results, rig: Rig) -> list[Row]:
-    """Return each alignment's φ by itself, one row for each eye."""
+    """Return φ from each alignment alone, one row per eye."""
     return [
         Row(f"{number} {eye}", tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
         for number, shifts in results.alignments.items()
@@ -144,7 +144,7 @@ def alignment_rows(results: Results, rig: Rig) -> list[Row]:
 
 
 def comparison_rows(results: Results, other: Results, rig: Rig) -> list[Row]:
-    """Return both results and how far the other's numbers are larger, eye after eye."""
+    """Return both results and their differences, eye by eye."""
     rows = []
     for eye in EYES:
         if eye in results.eyes and eye in other.eyes:

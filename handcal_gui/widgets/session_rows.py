@@ -20,17 +20,17 @@ from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
 
 _PHI = (
-    "φ1, φ2 and φ3 of the {} from this alignment alone: how far the eye lies to the right of,\n"
+    "φ1, φ2 and φ3 of the {} from this alignment alone: distance of the eye to the right of,\n"
     "below and in front of the rig's viewpoint, in millimetres"
 )
 ALIGNMENT_COLUMNS = (
     Column("No.", "Number of the alignment"),
     Column("Eyes", "Eyes open during the alignment", is_number=False),
-    Column("Turned °", "Angle between hand and cursor at the confirmation, in degrees"),
+    Column("Rotation °", "Angle between hand and cursor at the confirmation, in degrees"),
     Column("Left φ mm", _PHI.format("left eye")),
     Column("Right φ mm", _PHI.format("right eye")),
     Column("RMS mm", "Distance between hand and cursor after registration, in millimetres"),
-    Column("Inliers %", "Points of the hand with a partner on the cursor, in percent"),
+    Column("Inliers %", "Share of the hand's points with a partner on the cursor, in percent"),
     Column("Time", "Time of the confirmation"),
 )
 TRIAL_COLUMNS = (
@@ -80,7 +80,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
     ----------
     record : SessionRecord
     results : Results or None
-        Results of all the record's alignments; ignored if they are those of others.
+        Results of all the record's alignments; ignored if they are for a different set.
     """
     solved = results.alignments if results else {}
     if set(solved) != set(record.alignments):
@@ -107,7 +107,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
 
 
 def trials_id(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
-    """Return an identity of a session's trials: a number is never given twice."""
+    """Return a key that identifies a session's set of trials; numbers are never reused."""
     return record.path, tuple(record.trials)
 
 

@@ -1,4 +1,4 @@
-"""Points drawn by plain numpy with a depth buffer: on every platform, and without OpenGL."""
+"""Point rendering in plain NumPy, on every platform and without OpenGL."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from PySide6.QtGui import QColor, QImage
 from handcal.types import Float64, UInt8, UInt16
 
 _FARTHEST = 65535
-"""Level of the depth buffer's farthest point; the nearest has 0."""
+"""Depth level of the farthest point; the nearest has 0."""
 _FARTHEST_SHADE = 0.6
-"""The farthest point keeps this share of its colour; the rest is the background's."""
+"""Share of its own colour that the farthest point keeps; the rest is background."""
 
 
 def splat(
@@ -21,25 +21,25 @@ def splat(
     size_px: tuple[int, int],
     point_px: int,
 ) -> QImage:
-    """Draw points as small squares, nearer ones over farther ones, fading into the distance.
+    """Draw points as small squares, nearer over farther ones, faded with distance.
 
     Parameters
     ----------
     points_px : (N, 3) float64
-        Right, down and away, in device pixels; only the order of the third matters and its range.
+        Right, down and away, in device pixels; only relative distances matter for the third.
     colors : (N, 3) uint8
         RGB.
     background : (3,) int
-        RGB that distant points fade into; it is not drawn.
+        RGB that distant points fade to; the background itself is not drawn.
     size_px : (int, int)
         Width and height of the image.
     point_px : int
-        Side of a point.
+        Side of a point's square.
 
     Returns
     -------
     QImage
-        Transparent where there is no point.
+        Transparent except at the points.
     """
     width, height = size_px
     image = QImage(width, height, QImage.Format.Format_ARGB32_Premultiplied)
@@ -51,7 +51,7 @@ def splat(
     if not len(away):
         return image
     level = (_FARTHEST * (away - away.min()) / max(float(np.ptp(away)), 1e-9)).astype(np.uint16)
-    far_to_near = np.argsort(_FARTHEST - level, kind="stable")  # of 16 bits: by radix, the fastest
+    far_to_near = np.argsort(_FARTHEST - level, kind="stable")  # 16 bits: radix sort, the fastest
     argb = _argb(colors[is_inside], background, level)[far_to_near]
     first = (y * width + x)[is_inside][far_to_near]
     square = np.add.outer(np.arange(point_px) * width, np.arange(point_px)).ravel()
@@ -71,6 +71,6 @@ def _argb(colors: UInt8, background: tuple[int, int, int], level: UInt16) -> NDA
 
 
 def rgb(color: str) -> tuple[int, int, int]:
-    """Return red, green and blue of a named colour, 0 to 255."""
+    """Return red, green and blue of a colour given by name or ``#rrggbb``, 0 to 255."""
     named = QColor(color)
     return named.red(), named.green(), named.blue()

@@ -1,4 +1,4 @@
-"""Times as the clock on the wall shows them."""
+"""Formatting of times in the local time zone."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from datetime import datetime
 
 
 def local_time(utc: str, form: str = "%d %b %Y, %H:%M") -> str:
-    """Return a time in ISO 8601 as local time; as it is if it is no time."""
+    """Return an ISO 8601 time as local time; other texts unchanged."""
     try:
         return f"{datetime.fromisoformat(utc).astimezone():{form}}"
-    except (ValueError, OverflowError):  # overflow: the year 1, somewhere else
+    except (ValueError, OverflowError):  # overflow: year 1 in another time zone
         return utc

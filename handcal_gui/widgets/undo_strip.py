@@ -1,4 +1,4 @@
-"""One line that says what was deleted last, and takes it back."""
+"""A line that names the last deleted item, with a button to restore it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from handcal_gui.widgets.session_rows import Deletion
 
 
 class UndoStrip(QWidget):
-    """Keeps its room while there is nothing to undo, so that nothing jumps.
+    """Shows the last deletion; keeps its space while there is nothing to undo.
 
     Parameters
     ----------
     parent : QWidget
-        Within it, Ctrl+Z undoes.
+        Widget in which Ctrl+Z undoes the deletion.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class UndoStrip(QWidget):
         self._text = ElidedLabel()
         self._text.setObjectName("undoText")
         self._undo = QAction("Undo", self)
-        self._undo.setToolTip("Restore what was deleted (Ctrl+Z)")
+        self._undo.setToolTip("Restore the deleted item (Ctrl+Z)")
         self._undo.setShortcut(QKeySequence.StandardKey.Undo)
         self._undo.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         self._undo.triggered.connect(self._restore)
@@ -53,7 +53,7 @@ class UndoStrip(QWidget):
         self.show_deletions([])
 
     def show_deletions(self, deletions: Sequence[Deletion]) -> None:
-        """Offer to restore the last of them."""
+        """Offer to restore the last of the deletions."""
         self._deletions = list(deletions)
         self._undo.setEnabled(bool(deletions))
         self._button.setVisible(bool(deletions))

@@ -261,5 +261,5 @@ def _age(age_ms: float | None) -> str:
 def _caption(seen: Observation) -> str:
     """Return a caption for the hand."""
     if seen.is_over_limit and seen.rotation_rad is not None:
-        return f"Turned by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
+        return f"Rotated by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
     return sentence(seen.problem)

@@ -1,1 +1,1 @@
-"""The hand cloud panel: a 3D view without OpenGL."""
+"""The hand cloud panel: a 3D view drawn without OpenGL."""

@@ -1,4 +1,4 @@
-"""A box around a scene with ticks in millimetres, and a scale."""
+"""A bounding box with ticks in millimetres, and a scale bar."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ NAMES = ("right", "down", "away")
 _GRID_MM = 50.0
 _STEPS_MM = (5, 10, 20, 50, 100, 200, 500)
 _TICK_GAP_EMS = 3.5
-"""Least distance between ticks, so that their numbers do not touch."""
+"""Minimum distance between ticks, so that their labels do not touch."""
 _LEAST_AXIS_PX = 40.0
-"""An axis that points at the onlooker is too short to be read."""
+"""Minimum length of an axis with ticks; axes along the line of sight are shorter."""
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """An upright box with its sides at multiples of 50 mm."""
+    """An axis-aligned box with faces at multiples of 50 mm."""
 
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]
 
     @classmethod
     def around(cls, points_mm: Float64) -> Box:
-        """Return the smallest around (N, 3) points, N ≥ 1."""
-        # By columns: ten times as fast as along the first axis.
+        """Return the smallest box that contains (N, 3) points, N ≥ 1."""
+        # Column by column: ten times as fast as a reduction along the first axis.
         low = [_GRID_MM * math.floor(column.min() / _GRID_MM) for column in points_mm.T]
         high = [_GRID_MM * math.floor(column.max() / _GRID_MM + 1.0) for column in points_mm.T]
         return cls((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
     def still_fits(self, smallest: Box) -> bool:
-        """Tell whether it holds the smallest box and is at most one step wider on each side."""
+        """Return whether it contains the smallest box and is at most 50 mm larger on each side."""
         below = np.subtract(smallest.low_mm, self.low_mm)
         above = np.subtract(self.high_mm, smallest.high_mm)
         slack = np.concatenate([below, above])
@@ -47,22 +47,22 @@ class Box:
 
     @property
     def sides_mm(self) -> Float64:
-        """(2, 3): its low and its high sides."""
+        """(2, 3): lower and upper bounds."""
         return np.array([self.low_mm, self.high_mm])
 
     @property
     def corners_mm(self) -> Float64:
-        """(8, 3)."""
+        """(8, 3): the corners."""
         return np.array(list(product(*self.sides_mm.T)))
 
 
 def draw_box(painter: QPainter, box: Box, orbit: Orbit) -> None:
-    """Draw the box's far faces and, along its outline, ticks with their millimetres.
+    """Draw the box's far faces, and ticks labelled in millimetres along its outline.
 
     Parameters
     ----------
     painter : QPainter
-        With its origin in the middle of the picture.
+        With its origin in the centre of the view.
     box : Box
     orbit : Orbit
     """
@@ -80,7 +80,7 @@ def draw_box(painter: QPainter, box: Box, orbit: Orbit) -> None:
 
 
 def draw_scale(painter: QPainter, orbit: Orbit, corner: QPointF) -> None:
-    """Draw a bar of a round length to the left of a lower right corner, and its length."""
+    """Draw a labelled scale bar of a round length, which ends at a lower right corner."""
     step_mm = _step_mm(painter, orbit.px_per_mm) or _STEPS_MM[-1]
     length_px = step_mm * orbit.px_per_mm
     bar = QLineF(corner.x() - length_px, corner.y(), corner.x(), corner.y())
@@ -96,31 +96,31 @@ def draw_scale(painter: QPainter, orbit: Orbit, corner: QPointF) -> None:
 
 
 def _lengths(orbit: Orbit) -> Float64:
-    """Return how long a millimetre along each of the scene's axes is in the picture, px."""
+    """Return the projected length of a millimetre along each axis of the scene, in px."""
     lengths: Float64 = orbit.px_per_mm * np.linalg.norm(orbit.rotation[:2], axis=0)
     return lengths
 
 
 def _step_mm(painter: QPainter, px_per_mm: float) -> int | None:
-    """Return the smallest step whose ticks lie far enough apart, or None if none does."""
+    """Return the smallest step with enough space between ticks; None if there is none."""
     gap_px = _TICK_GAP_EMS * painter.fontMetrics().height()
     return next((step for step in _STEPS_MM if step * px_per_mm >= gap_px), None)
 
 
 def _ticks_mm(box: Box, axis: int, step_mm: int) -> list[int]:
-    """Return the multiples of a step that lie on an axis but not at its ends."""
+    """Return the multiples of a step on an axis, without its ends."""
     first = math.floor(box.low_mm[axis] / step_mm) + 1
     last = math.ceil(box.high_mm[axis] / step_mm)
     return [step_mm * i for i in range(first, last)]
 
 
 def _far_side(orbit: Orbit, axis: int) -> int:
-    """Return 0 if the low side across an axis is the farther one, or 1."""
+    """Return 0 if the low side of an axis is the farther one, otherwise 1."""
     return int(orbit.rotation[2, axis] > 0.0)
 
 
 def _far_lines(box: Box, orbit: Orbit, steps: list[int | None]) -> Float64:
-    """Return both ends, (N, 2, 3), of the lines of a grid on the three far faces."""
+    """Return the ends, (N, 2, 3), of the grid lines on the three far faces."""
     sides_mm = box.sides_mm
     lines = []
     for across in range(3):
@@ -138,7 +138,7 @@ def _far_lines(box: Box, orbit: Orbit, steps: list[int | None]) -> Float64:
 def _draw_ticks(
     painter: QPainter, box: Box, orbit: Orbit, axis: int, step_mm: int, middle: Float64
 ) -> None:
-    """Write the numbers along one edge of the outline, and where they grow to at its end."""
+    """Label the ticks along one edge of the outline, and its end with the axis' direction."""
     start, end = _outline_edge(box, orbit, axis)
     along = (orbit.project(end[None]) - orbit.project(start[None]))[0, :2]
     if np.linalg.norm(along) < _LEAST_AXIS_PX:
@@ -154,9 +154,9 @@ def _draw_ticks(
 
 
 def _outline_edge(box: Box, orbit: Orbit, axis: int) -> tuple[Float64, Float64]:
-    """Return both ends of the edge along an axis that is lowest, or leftmost, in the outline.
+    """Return both ends of the lowest outline edge along an axis; of the leftmost for "down".
 
-    An edge belongs to the outline if one of its two faces is a far one and the other a near one.
+    An edge belongs to the outline if one of its two faces is far and the other near.
     """
     sides_mm = box.sides_mm
     edges = []
@@ -176,7 +176,7 @@ def _outline_edge(box: Box, orbit: Orbit, axis: int) -> tuple[Float64, Float64]:
 
 
 def _write_beside(painter: QPainter, at_px: Float64, outward: Float64, label: str) -> None:
-    """Write a label so that it touches a point from the outside."""
+    """Write a label next to a point, on its outer side."""
     box = QRectF(painter.fontMetrics().boundingRect(label))
     reach = SPACING_PX / 2 + 0.5 * (abs(outward[0]) * box.width() + abs(outward[1]) * box.height())
     box.moveCenter(QPointF(*(at_px + reach * outward)))

@@ -1,7 +1,7 @@
-"""Points in space, to be turned, zoomed and moved with the mouse or keys.
+"""A 3D view of points that can be rotated, zoomed and panned with the mouse or keys.
 
-Drawn by `handcal_gui.widgets.splat`: no OpenGL, which software rendering, remote desktops and
-virtual machines lack or emulate slowly.
+Drawn by `handcal_gui.widgets.splat` instead of OpenGL, which is missing or slow with software
+rendering, on remote desktops and in virtual machines.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ _RAD_PER_PX = 0.01
 _ZOOM_PER_NOTCH = 1.2
 _KEY_TURN_RAD = math.radians(10.0)
 _POINT_MM = 1.5
-"""So large are points, about as far as they lie apart on a hand, within limits."""
+"""Size of a point, about the distance between neighbours on a hand; limited in pixels."""
 _LEAST_POINT_PX, _MOST_POINT_PX = 2.0, 6.0
 _LABELS_EMS = (7.0, 4.5)
-"""Room beside, and above and below, for the box' labels."""
+"""Space for the box's labels: left and right together, and above and below together."""
 _NONE = np.empty((0, 3))
 
 
 class CloudView(QWidget):
-    """Shows coloured points within a box of millimetres, seen from any side."""
+    """Shows coloured points in a box with millimetre axes, from any direction."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("cloud-view")
-        self.setAccessibleName("Hand cloud in space")
+        self.setAccessibleName("3D view of the hand cloud")
         self.setToolTip(
-            "Drag to turn, drag with the right or middle button to move, wheel to zoom, "
-            "double-click to see all again. Keys: arrows, +, −, 1, 2, 3 and R."
+            "Drag to rotate, drag with the right or middle button to move, scroll to zoom, "
+            "double-click to reset the view. Keys: arrows, +, −, 1, 2, 3 and R."
         )
         self.setMinimumSize(160, 120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -65,11 +65,11 @@ class CloudView(QWidget):
 
     @property
     def orbit(self) -> Orbit:
-        """How the points are looked at."""
+        """The present view of the points."""
         return self._orbit
 
     def show_points(self, points_mm: Float64, point_colors: UInt8, text: str) -> None:
-        """Show points with a caption, or a message where there are none.
+        """Show points with a caption, or a message if there are none.
 
         Parameters
         ----------
@@ -88,18 +88,18 @@ class CloudView(QWidget):
         self.update()
 
     def show_lines(self, from_mm: Float64, to_mm: Float64) -> None:
-        """Show lines over the points, from (M, 3) to (M, 3)."""
+        """Show lines over the points, between (M, 3) start points and (M, 3) end points."""
         self._from_mm, self._to_mm = from_mm, to_mm
         self.update()
 
     def look(self, direction: Direction) -> None:
-        """Look at all of it from one of the given directions."""
+        """Show the whole scene from one of the given directions."""
         self._orbit = self._orbit.looking(direction)
         self._is_fitted = True
         self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw box, points, lines, scale and caption; or the message."""
+        """Draw box, points, lines, scale and caption, or the message."""
         painter = QPainter(self)
         painter.setPen(self.palette().windowText().color())
         if not len(self._points_mm) or self._box is None:
@@ -122,11 +122,11 @@ class CloudView(QWidget):
         painter.drawText(QPointF(SPACING_PX, self.height() - SPACING_PX), self._text)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Begin to drag."""
+        """Start dragging."""
         self._dragged_from = event.position()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Turn with the left button, move with another."""
+        """Rotate with the left button, move with any other."""
         moved = event.position() - self._dragged_from
         self._dragged_from = event.position()
         if event.buttons() & Qt.MouseButton.LeftButton:
@@ -135,7 +135,7 @@ class CloudView(QWidget):
             self._change(self._orbit.panned(moved.x(), moved.y()))
 
     def mouseDoubleClickEvent(self, _: QMouseEvent) -> None:
-        """See all of it again."""
+        """Reset the view."""
         self.look(Direction.ASLANT)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -143,7 +143,7 @@ class CloudView(QWidget):
         self._change(self._orbit.zoomed(_ZOOM_PER_NOTCH ** (event.angleDelta().y() / 120)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Turn with the arrows, zoom with + and −."""
+        """Rotate by arrow keys, zoom by + and −, select a direction by 1, 2, 3 and R."""
         key, turn = Qt.Key, _KEY_TURN_RAD
         turns = {
             key.Key_Left: (turn, 0.0),
@@ -173,7 +173,7 @@ class CloudView(QWidget):
         self.update()
 
     def _change(self, orbit: Orbit) -> None:
-        """Take over a size or place that the person chose: from now on it stays."""
+        """Set a zoom or position chosen by the user; the view is no longer fitted."""
         self._orbit = orbit
         self._is_fitted = False
         self.update()
@@ -198,7 +198,7 @@ class CloudView(QWidget):
         painter.restore()
 
     def _draw_backdrop(self, box: Box) -> QPixmap:
-        """Return the canvas with box and scale, drawn anew only if one of them has changed."""
+        """Return the canvas with box and scale; redrawn only if one of them has changed."""
         ratio = self.devicePixelRatio()
         key = box, self._orbit, self.size(), ratio, colors(), self.palette().cacheKey()
         if key != self._backdrop_key:

@@ -1,4 +1,4 @@
-"""The hand cloud panel: the frozen cursor and the live hand in space."""
+"""The hand cloud panel: the frozen cursor and the live hand in 3D."""
 
 from __future__ import annotations
 
@@ -23,39 +23,39 @@ from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
 
-_EMPTY = "The hand's cloud will appear here. Hold a hand up before the depth camera."
+_EMPTY = "The hand cloud will appear here. Hold a hand in front of the depth camera."
 _FROM_CAMERA = "mm from the depth camera"
-_FROM_CURSOR = "mm from the cursor's middle"
-_TURNED = "The live hand is turned too far"
+_FROM_CURSOR = "mm from the centre of the cursor"
+_TURNED = "The live hand is rotated too far"
 _DIRECTIONS = {
     "Front": (Direction.FRONT, "As the wearer sees it (1)"),
     "Side": (Direction.SIDE, "From the wearer's right (2)"),
     "Top": (Direction.TOP, "From above (3)"),
-    "Reset": (Direction.ASLANT, "All of it, seen aslant (R, or double-click)"),
+    "Reset": (Direction.ASLANT, "Oblique view of the whole scene (R, or double-click)"),
 }
 _MOST_POINTS = 6000
-"""Drawn of each cloud, to stay within the time of a frame."""
+"""Maximum number of points drawn of each cloud, to keep up with the frame rate."""
 _PAIRS_PERIOD_S = 0.5
 _NONE = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Axes:
-    """Axes that clouds are shown along, where their zero lies, and how that is called."""
+    """Axes in which clouds are shown, with their origin and its name."""
 
     T_axes_W: Float64
     zero_m: Float64
     name: str
 
     def mm(self, points_W_m: Float64) -> Float64:
-        """Return (N, 3) points of W in millimetres along the axes."""
+        """Return (N, 3) points of W in millimetres in these axes."""
         mm: Float64 = 1e3 * (transform(self.T_axes_W, points_W_m) - self.zero_m)
         return mm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cloud:
-    """A cloud with its colour's meaning, or coloured by residuals."""
+    """A cloud, coloured by its role or by its residuals."""
 
     name: str
     role: str
@@ -63,7 +63,7 @@ class _Cloud:
     residuals_m: Float64 | None = None
 
     def drawn(self) -> tuple[Float64, UInt8]:
-        """Return points, no more than can be drawn in time, and their colours."""
+        """Return at most `_MOST_POINTS` points, and their colours."""
         every = slice(None, None, max(1, -(-len(self.points_mm) // _MOST_POINTS)))
         points_mm = self.points_mm[every]
         if self.residuals_m is not None:
@@ -73,7 +73,7 @@ class _Cloud:
 
 
 class CloudPanel(QWidget):
-    """Cursor and live hand in the depth camera's axes, which are nearly the wearer's.
+    """Shows cursor and live hand in the depth camera's axes, which are nearly the wearer's.
 
     A finished alignment is shown in the axes of its first eye.
     """
@@ -86,14 +86,14 @@ class CloudPanel(QWidget):
         self._next_pairs_s = 0.0
         self._view = CloudView()
         widest = "99,999"
-        self._cursor = LegendEntry("Cursor", "cursor", "The frozen hand; points", widest=widest)
-        self._hand = LegendEntry("Live hand", "live", "The hand now; points", widest=widest)
+        self._cursor = LegendEntry("Cursor", "cursor", "Points of the frozen hand", widest=widest)
+        self._hand = LegendEntry("Live hand", "live", "Points of the present hand", widest=widest)
         self._scale = ResidualScale()
         self._pairs = QCheckBox("Pairs")
         self._pairs.setObjectName("cloud-pairs")
         self._pairs.setToolTip(
-            "Matched pairs: while aligning, join points of the live hand with those of the cursor "
-            "that they lie on once the hand is laid over it; found anew twice a second"
+            "While aligning, join points of the live hand with the nearest points of the cursor "
+            "once the hand is laid over it; updated twice a second"
         )
         self._pairs.toggled.connect(self._forget_pairs)
         self.setFocusProxy(self._view)
@@ -101,11 +101,11 @@ class CloudPanel(QWidget):
         self.clear()
 
     def clear(self, message: str = _EMPTY) -> None:
-        """Show nothing but a message."""
+        """Clear the panel and show a message."""
         self._show(None, None, message)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show the cursor, while there is one, and the live hand."""
+        """Show the cursor, if there is one, and the live hand."""
         seen, cursor = snapshot.observation, snapshot.procedure.cursor
         problem = what_is_missing(snapshot)
         if seen is None and not problem:
@@ -130,7 +130,7 @@ class CloudPanel(QWidget):
             self._forget_pairs()
 
     def show_alignment(self, alignment: Alignment, residuals_m: Float64 | None = None) -> None:
-        """Show a finished alignment, its hand coloured by residuals, (M,), NaN for outliers."""
+        """Show a finished alignment, its hand coloured by (M,) residuals; NaN for outliers."""
         T_E_W = alignment.T_E_W[alignment.eyes[0]]
         middle_m = np.median(transform(T_E_W, alignment.cursor_m), axis=0)
         axes = _Axes(T_E_W, middle_m, _FROM_CURSOR)

@@ -42,8 +42,7 @@ _MOVES: dict[int, tuple[int, int]] = {
     Qt.Key.Key_PageUp: (2, 1),
 }
 _KEYS = (
-    "The eye moves by arrow keys: ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3. "
-    "Click here first; E changes the eye."
+    "Arrow keys move the eye: ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3. Click here first; E changes the eye."
 )
 _WHY_NOT = {
     State.ALIGN: "Confirm the alignment, solve and apply it first.",

@@ -52,7 +52,7 @@ REJECTIONS = {
     Rejection.WRONG_VERSION: "The headset's program uses another protocol version: update it",
     Rejection.WRONG_SESSION: "Sent before the headset reconnected; a few are normal",
 }
-"""What each reason means, and what to do."""
+"""Explanation of each reason, and the remedy."""
 
 
 class LinkTable(QWidget):

@@ -25,13 +25,13 @@ from handcal_gui.widgets.result_rows import comparison_rows
 _MEANINGS: Mapping[Method, str] = {
     "paper": "as published by Hu et al. 2021; slow.",
     "linear": "the paper's model, solved with all three rows of each pair.",
-    "consistent": "exact model, robust to cuts and a turned hand; the default.",
+    "consistent": "exact model; robust to cut edges and a rotated hand; the default.",
     "icp": "rigid registration, the paper's baseline.",
 }
 
 
 class CompareTab(QWidget):
-    """Requests the results of another method and shows them beside the present ones.
+    """Requests the results of another method, and shows them beside the present ones.
 
     Attributes
     ----------
@@ -95,8 +95,9 @@ class CompareTab(QWidget):
         self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
         self.table.show()
         self._status.setText(
-            f"Difference: {other.method} less {self._results.method}. "
-            "σ and expected error are realistic only for “consistent”; others are too small."
+            f"Difference: {other.method} minus {self._results.method}. "
+            "σ and expected error are realistic only for “consistent”; the other methods' are too "
+            "small."
         )
 
     def show_failure(self, text: str) -> None:

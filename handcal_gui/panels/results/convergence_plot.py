@@ -19,10 +19,10 @@ class ConvergencePlot(Plot):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Convergence", "Iteration", "RMS distance (mm)", parent)
         self.setToolTip(
-            "Distance of the pairs of hand and cursor at each iteration \n"
+            "RMS distance between matched points of hand and cursor at each iteration\n"
             "of each alignment (1, 2, …).\n"
-            "The last steps of “consistent” measure it to the nearest point, not to the surface, "
-            "which is farther."
+            "The last iterations of “consistent” measure it to the nearest point instead of the "
+            "surface,\nwhich makes it larger."
         )
         self.show_legend()
 
@@ -41,4 +41,4 @@ class ConvergencePlot(Plot):
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
                 self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))
         lengths = [len(s.history_m2) for eyes in results.alignments.values() for s in eyes.values()]
-        self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with space for the names
+        self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with space for the numbers

@@ -27,8 +27,8 @@ from handcal_gui.widgets.result_rows import (
 )
 
 _EMPTY = (
-    "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve: then each eye's "
-    "position, its uncertainty and the verdict appear here."
+    "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve. Each eye's "
+    "position, its uncertainty and the verdict then appear here."
 )
 
 
@@ -80,8 +80,8 @@ class ResultsPanel(QWidget):
         ----------
         results : Results or None
         alignments : mapping of int to Alignment
-            By number. No residual map is shown of a solved alignment that is missing here, such as
-            one that could not be written to a full disk.
+            By number. A solved alignment that is missing here has no residual map, such as one
+            that could not be written to a full disk.
         rig : Rig
         """
         self._results = results

@@ -56,7 +56,7 @@ class ResidualMap(Plot):
         self._redraw()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Redraw in the colours of a new theme."""
+        """Redraw when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._redraw()

@@ -17,7 +17,7 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 
 class ResidualsTab(QWidget):
-    """Shows the residual map of one alignment and eye; drawn only while it is visible."""
+    """Shows the residual map of one alignment and eye; drawn only while visible."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -37,7 +37,7 @@ class ResidualsTab(QWidget):
         layout.addWidget(note)
 
     def show_results(self, results: Results, alignments: Mapping[int, Alignment]) -> None:
-        """Show the first alignment's map, and offer all whose clouds are available."""
+        """Show the first alignment's map, and offer all alignments with available clouds."""
         self._solved = {
             number: (alignments[number], shifts)
             for number, shifts in results.alignments.items()

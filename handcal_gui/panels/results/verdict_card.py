@@ -39,7 +39,7 @@ class VerdictCard(QFrame):
         self.show_verdict(None)
 
     def show_verdict(self, verdict: Verdict | None) -> None:
-        """Show a verdict, or that the eye is in no alignment."""
+        """Show a verdict; None if the eye is in no alignment."""
         self._verdict = verdict
         if verdict is None:
             self._word.setText(f"{NOTHING} Not solved")
@@ -51,7 +51,7 @@ class VerdictCard(QFrame):
         self._recolor()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Redraw in the colours of a new theme."""
+        """Redraw when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._recolor()

@@ -11,21 +11,21 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from handcal_gui.theme import colors, number_font
 
 _FROM_DEG, _SPAN_DEG = 210.0, 240.0
-"""Where the scale begins, counter-clockwise from three o'clock, and how far it goes clockwise."""
+"""Start of the scale, counter-clockwise from three o'clock, and its extent clockwise."""
 _SCALE_LIMITS = 2.0
-"""The scale ends at so many limits, which puts the limit at its top."""
+"""End of the scale in multiples of the limit, which is thus at the top."""
 _WIDEST = 190
-"""Of a line of text, in units of which the dial is 200 wide."""
+"""Maximum width of a line of text; the dial is 200 wide."""
 
 
 class RotationDial(QWidget):
-    """Big digits within an arc that fills towards the limit, and a sign and word below them."""
+    """Large digits within an arc that fills towards the limit, and a symbol and word below."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("rotation-dial")
         self.setAccessibleName("Rotation of the hand")
-        self.setToolTip("How far the hand is turned against the cursor, and the limit")
+        self.setToolTip("Rotation of the hand from the cursor, and its limit")
         self.setMinimumSize(100, 72)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._angle_deg: float | None = None
@@ -33,16 +33,16 @@ class RotationDial(QWidget):
         self._word = ""
 
     def sizeHint(self) -> QSize:
-        """Prefer a square that can be read from across the room."""
+        """Prefer a square that is readable from across the room."""
         return QSize(220, 220)
 
     @property
     def is_over(self) -> bool:
-        """Whether the angle shown is beyond the limit."""
+        """True if the angle shown exceeds the limit."""
         return self._angle_deg is not None and self._angle_deg > self._limit_deg
 
     def show_angle(self, angle_rad: float | None, limit_rad: float, word: str) -> None:
-        """Show an angle, or that there is none, with its meaning in a word or two."""
+        """Show an angle and its meaning in a word or two; None if there is no angle."""
         self._angle_deg = None if angle_rad is None else math.degrees(angle_rad)
         self._limit_deg = math.degrees(limit_rad)
         if word != self._word:
@@ -92,7 +92,7 @@ def _arc(painter: QPainter, box: QRectF, from_deg: float, span_deg: float, pen: 
 
 
 def _write(painter: QPainter, font: QFont, text: str, y: float, size: int, color: QColor) -> None:
-    """Write one line centred at a height, smaller where it would be wider than the dial."""
+    """Write one line centred at a height; smaller if it would be wider than the dial."""
     font.setWeight(QFont.Weight.Bold if size > 20 else QFont.Weight.Normal)
     font.setPixelSize(size)
     painter.setFont(font)

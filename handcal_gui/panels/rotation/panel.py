@@ -1,4 +1,4 @@
-"""The rotation panel: how far the hand is turned against the cursor, and which way to turn it."""
+"""The rotation panel: the hand's rotation from the cursor, and advice to correct it."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from handcal_gui.widgets.sentence import sentence
 
 _HISTORY_S = 10.0
 _HISTORY_PERIOD_S = 0.2
-"""Time between two drawings of it."""
+"""Interval of redrawing the history."""
 _HISTORY_LIMITS = 2.0
-"""The history's scale ends at so many limits, as the dial's does."""
+"""End of the history's scale in multiples of the limit, as for the dial."""
 _STRAIGHT_RAD = np.radians(2.0)
-"""Hardly more than the guard's own error: nothing to turn."""
-_NO_CURSOR = "Make a cursor: then this shows how far the hand is turned against it."
-_TAKEN = "The alignment is taken."
+"""Rotations below this need no correction: hardly more than the guard's own error."""
+_NO_CURSOR = "Make a cursor; the hand's rotation from it is then shown here."
+_TAKEN = "The alignment is confirmed."
 _NO_HAND = "Hold the hand in view of the camera."
-_STRAIGHT = "Turned as the cursor is."
+_STRAIGHT = "The hand is rotated like the cursor."
 
 
 class RotationPanel(QWidget):
-    """A dial with the angle against its limit, the way to turn, the last seconds, the refusals."""
+    """Shows the angle and its limit, the way to turn, the recent history, and refusals."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -56,7 +56,7 @@ class RotationPanel(QWidget):
         self._lay_out()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show the rotation seen in a snapshot; one without a new frame changes no angle."""
+        """Show the rotation of a snapshot; without a new frame the angle stays."""
         procedure, observation = snapshot.procedure, snapshot.observation
         self._show_refusals(procedure)
         self._show_limit(procedure.guard_limit_rad)
@@ -68,7 +68,7 @@ class RotationPanel(QWidget):
         if procedure.cursor is None or procedure.state is not State.ALIGN:
             self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
         elif snapshot.camera.problem:
-            self._show_nothing("? No picture", _NO_HAND)
+            self._show_nothing("? No image", _NO_HAND)
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
@@ -83,7 +83,7 @@ class RotationPanel(QWidget):
             self._hand.show_turn("")
             self._advice.setText(_STRAIGHT)
             return
-        word = "▲ Turn back" if observation.is_over_limit else "✓ Near enough"
+        word = "▲ Turn back" if observation.is_over_limit else "✓ Within limit"
         advice = turn_advice(observation.rotation_rad)
         self._dial.show_angle(angle_rad, self._limit_rad, word)
         self._hand.show_turn(advice.axis, positive=advice.angle_rad > 0)
@@ -135,7 +135,7 @@ class RotationPanel(QWidget):
 
 
 def _text_label(name: str, scale: float = 1.0) -> QLabel:
-    """Return a label that takes the room of two lines however much of it is filled."""
+    """Return a label with the height of at least two lines."""
     label = QLabel()
     label.setObjectName(name)
     label.setTextFormat(Qt.TextFormat.PlainText)

@@ -1,4 +1,4 @@
-"""A picture of a hand, as its wearer sees it, with an arrow that says which way to turn it."""
+"""A drawing of a hand as its wearer sees it, with an arrow for the direction to turn it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from handcal.types import Float64
 from handcal_gui.theme import colors
 
-# The picture is 200 units wide and high, its middle in the hand's.
+# The drawing is 200 units wide and high; its origin is the centre of the hand.
 _FINGERS = ((-16, 10, -50, -14), (-21, 0, -33, -52), (-7, -4, -11, -68), (7, -4, 10, -64),
             (20, 2, 29, -44))  # fmt: skip
 _PALM = QRectF(-27, -14, 54, 54)
@@ -31,13 +31,13 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 class TurningHand(QWidget):
-    """Shows a hand; `show_turn` adds the axis and the arrow."""
+    """Shows a hand; `show_turn` adds an axis and an arrow."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("turning-hand")
-        self.setAccessibleName("Which way to turn the hand")
-        self.setToolTip("Which way to turn the hand, as the wearer sees it")
+        self.setAccessibleName("Direction to turn the hand")
+        self.setToolTip("Direction to turn the hand, as the wearer sees it")
         self.setMinimumSize(80, 72)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._turn = ("", False)
@@ -47,7 +47,7 @@ class TurningHand(QWidget):
         return QSize(150, 150)
 
     def show_turn(self, axis: str, *, positive: bool = True) -> None:
-        """Show a turn about an axis of the depth camera, or none.
+        """Show a rotation about an axis of the depth camera, or none.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class TurningHand(QWidget):
             self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw the far half of the circle, the hand, then the arrow before it."""
+        """Draw circle and axis, the hand over them, and the arrow on top."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         side = min(self.width(), self.height())
@@ -98,7 +98,7 @@ def _paint_arrow(painter: QPainter, axis: str, positive: bool, color: QColor) ->
 
 
 def _circle(axis: str, from_deg: float, to_deg: float) -> Float64:
-    """Return a circle about an axis, (49, 3); 0° is nearest the wearer, or at the top."""
+    """Return an arc about an axis, (49, 3); 0° is nearest the wearer, or at the top for z."""
     start = np.array([0.0, -1.0, 0.0] if axis == "z" else [0.0, 0.0, -1.0])
     quarter_on = np.cross(_AXES[axis], start)
     angles = np.radians(np.linspace(from_deg, to_deg, 49))[:, None]
@@ -106,13 +106,13 @@ def _circle(axis: str, from_deg: float, to_deg: float) -> Float64:
 
 
 def _on_screen(points: Float64) -> list[QPointF]:
-    """Draw obliquely: what is farther from the wearer lies higher and to the right."""
+    """Project obliquely: points farther from the wearer are higher and more to the right."""
     return [QPointF(x + 0.3 * z, y - 0.25 * z) for x, y, z in points.tolist()]
 
 
 @cache
 def _hand() -> QPainterPath:
-    """Return the outline of a right hand from behind."""
+    """Return the outline of a right hand, seen from its back."""
     bones = QPainterPath()
     for x0, y0, x1, y1 in _FINGERS:
         bones.moveTo(x0, y0)

@@ -14,7 +14,7 @@ SAVE_MS = 800
 
 
 class NotesEditor(QWidget):
-    """Edits the notes on a session, and shows if they are saved.
+    """Edits the notes on a session, and shows whether they are saved.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class NotesEditor(QWidget):
         layout.addWidget(self._state)
 
     def show_saved(self, session: Path, notes: str) -> None:
-        """Set the saved notes; the text being edited is replaced only if the session is another."""
+        """Set the saved notes; the text being edited is replaced only for another session."""
         self._saved = notes
         if session != self._session:
             self._session = session
@@ -63,7 +63,7 @@ class NotesEditor(QWidget):
         self._refresh()
 
     def flush(self) -> None:
-        """Request pending saving now."""
+        """Save pending changes now."""
         if self._timer.isActive():
             self._timer.stop()
             self._save()

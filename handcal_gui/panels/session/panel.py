@@ -110,7 +110,7 @@ class SessionPanel(QWidget):
         self._refresh()
 
     def flush(self) -> None:
-        """Request pending saving of the notes now."""
+        """Save pending changes of the notes now."""
         self._notes.flush()
 
     def _refresh(self) -> None:

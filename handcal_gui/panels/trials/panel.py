@@ -41,11 +41,14 @@ from handcal_gui.widgets.session_rows import (
 from handcal_gui.widgets.undo_strip import UndoStrip
 
 _HOW = (
-    "Fine-tune φ until the drawn target covers the real one, then record: a trial is the error of "
-    "the solved φ against that."
+    "Fine-tune φ until the drawn target covers the real one, then record. A trial is the error of "
+    "the solved φ relative to the fine-tuned one."
 )
 
-_ZERO = "φ of the {} is as solved: the error would be 0 px. Press T again if the wearer sees none."
+_ZERO = (
+    "φ of the {} is still the solved one: the error would be 0 px. "
+    "Press T again if the wearer sees no error."
+)
 
 
 class TrialsPanel(QWidget):
@@ -81,7 +84,7 @@ class TrialsPanel(QWidget):
         self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox("Show the target in the headset")
-        self._target: tuple[Eye, float] | None = None  # asked for
+        self._target: tuple[Eye, float] | None = None  # requested
         self._fill_choices()
         self._make_record_action()
         self._message = QLabel()
@@ -120,7 +123,7 @@ class TrialsPanel(QWidget):
         self._show_deletions()
 
     def set_read_only(self, is_read_only: bool) -> None:
-        """Prepare for another session, which is read-only or running."""
+        """Prepare for another session, read-only or running."""
         self._is_read_only = is_read_only
         self._snapshot = None
         self._table.set_read_only(is_read_only)
@@ -185,7 +188,7 @@ class TrialsPanel(QWidget):
         self._strip.show_deletions([deletion for deletion in found if deletion.kind == "trial"])
 
     def _ask(self) -> None:
-        """Request a trial; one of 0 px, which may be a mistake, only at the second time."""
+        """Request a trial; a trial of 0 px may be a mistake and must be requested twice."""
         self._is_doubtful = self._is_zero() and not self._is_doubtful
         if self._is_doubtful:
             self.doubted.emit(_ZERO.format(EYE_NAMES[self._next_eye()].lower()))
@@ -218,7 +221,7 @@ class TrialsPanel(QWidget):
     def _make_record_action(self) -> None:
         self.record_action = QAction("Record trial", self)
         self.record_action.setToolTip(
-            "Record the error of the solved φ against the φ set by hand (T)"
+            "Record the error of the solved φ relative to the φ set by hand (T)"
         )
         self.record_action.setShortcut(Qt.Key.Key_T)
         # Also available from the fine-tune panel, where the study leader works.

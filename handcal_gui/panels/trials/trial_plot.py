@@ -1,4 +1,4 @@
-"""The errors of trials over the target's distance."""
+"""A plot of trial errors over the target's distance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A dialog that takes the captures of a cube test with a camera, one by one."""
+"""A dialog for taking the captures of a cube test with a camera, one by one."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ MOST_POSES = 100
 
 
 class CaptureDialog(PreparationDialog):
-    """Shows what the camera sees and what to do; keeps an image if it shows what it should.
+    """Shows the live image and the next instruction; keeps only images with the expected content.
 
     Parameters
     ----------
     entries : CubeEntries
-        Name the folder of captures, which may hold part of them.
+        With the folder of captures, which may already contain some of them.
     open_source : callable
-        As `open_view_source`.
+        Like `open_view_source`.
     list_cameras : callable
-        As `list_viewpoints`.
+        Like `list_viewpoints`.
 
     Attributes
     ----------
     form : EntriesForm
-        Of the plan.
+        Fields of the capture plan.
     """
 
     def __init__(
@@ -97,17 +97,17 @@ class CaptureDialog(PreparationDialog):
         self._bar.run("Looking for cameras", lambda *_: self._prepare(), self._begin)
 
     def start(self) -> None:
-        """Show what the chosen camera sees."""
+        """Show images of the chosen camera."""
         self._camera.start()
-        self._list.setFocus()  # which leaves the space bar alone, as a line of text does not
+        self._list.setFocus()  # unlike a text field, it does not consume the space bar
 
     def take(self) -> None:
-        """Keep the image shown as the chosen one, if it shows what it should."""
+        """Keep the present image as the selected capture, if it has the expected content."""
         images, chosen, looked_for = self._camera.images, self._list.chosen, self._looked_for
         if images is None or chosen is None or looked_for is None or self._bar.is_busy:
             return
         self._bar.run(
-            "Looking at the image",
+            "Checking the image",
             lambda *_: keep_capture(images[0], self._folder, chosen, *looked_for),
             lambda seen: self._show_taken(chosen, seen),
         )
@@ -150,7 +150,7 @@ class CaptureDialog(PreparationDialog):
         self._ask()
 
     def _show_not_done(self, why: str) -> None:
-        """Say that an image was not taken; or why none can be."""
+        """Show why an image was not taken, or why none can be taken."""
         if self._looked_for is None:
             self._show_failure(why)
         else:
@@ -165,14 +165,14 @@ class CaptureDialog(PreparationDialog):
         self._start.setEnabled(self._looked_for is not None)
         self._take.setEnabled(is_ready and is_seen)
         self._take.setText("Take again" if self._list.chosen_is_taken else "Take")
-        self._take.setShortcut(Qt.Key.Key_Space)  # which a new text takes away
+        self._take.setShortcut(Qt.Key.Key_Space)  # setText removes the shortcut
         self._instruction.setText(self._what_to_do())
 
     def _what_to_do(self) -> str:
         if self._plan_problem:
             return f"{sentence(self._plan_problem)}."
         if self._list.is_complete and self._list.chosen is None:
-            return "All captures are there."
+            return "All captures have been taken."
         if self._looked_for is None or self._list.chosen is None:
             return ""
         return f"{instruction(self._list.chosen)}."
@@ -206,26 +206,26 @@ def _plan_form() -> EntriesForm:
         QLineEdit(),
         "positions",
         "Positions",
-        "Of the camera in the eye box: the folders' names, with commas between them.",
+        "Positions of the camera in the eye box: names of folders, separated by commas.",
     )
-    poses = whole_number("poses", 1, MOST_POSES, "Of the cube, at each position of the camera.")
+    poses = whole_number("poses", 1, MOST_POSES, "Poses of the cube at each position.")
     drawn = named(
         QLineEdit(placeholderText="One", clearButtonEnabled=True),
         "drawn",
-        "Ways of drawing",
-        "That are compared, as: before, after.",
+        "Renderings",
+        "Names of the renderings to compare, such as: before, after.",
     )
     with_grid = named(
         QCheckBox("At &each position"),
         "withGrid",
         "Display's grid",
-        "Without it, errors are along the camera's axes instead of the display's.",
+        "Without the grid, errors are measured along the camera's axes instead of the display's.",
     )
     return EntriesForm(
         {
             "positions": ("Positions", positions),
             "poses": ("Poses at each", poses),
-            "drawn": ("Ways of drawing", drawn),
+            "drawn": ("Renderings", drawn),
             "with_grid": ("Display's grid", with_grid),
         }
     )

@@ -1,4 +1,4 @@
-"""The planned captures of a cube test in a list: which are taken, and which is next."""
+"""A list of the planned captures of a cube test, with the state of each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _IMAGE, _STATE = range(2)
 
 
 class CaptureList(QTreeWidget):
-    """Lists images in the order to take them, each with its state.
+    """Lists images in the order in which to take them, each with its state.
 
     Attributes
     ----------
@@ -46,24 +46,24 @@ class CaptureList(QTreeWidget):
 
     @property
     def chosen(self) -> PlannedCapture | None:
-        """The image to take now; None if there is none, or none is missing."""
+        """The image to take next; None if none is listed or none is missing."""
         place = self.currentIndex().row()
         return self._captures[place] if place >= 0 else None
 
     @property
     def is_complete(self) -> bool:
-        """True if images are listed, and none is missing."""
+        """True if images are listed and none is missing."""
         return bool(self._captures) and not self._missing
 
     @property
     def chosen_is_taken(self) -> bool:
-        """True if the chosen image has been taken, and would be replaced."""
+        """True if the selected image has been taken and would be replaced."""
         return self.chosen is not None and self.chosen not in self._missing
 
     def show_captures(
         self, captures: Sequence[PlannedCapture], missing: Collection[PlannedCapture]
     ) -> None:
-        """Replace what is listed, and choose what is missing next, after what was chosen."""
+        """Replace the list, and select the next missing image after the selected one."""
         last = self.currentIndex().row()
         self._captures, self._missing = tuple(captures), missing
         self.blockSignals(True)
@@ -84,7 +84,7 @@ class CaptureList(QTreeWidget):
             self._show_states()
 
     def _show_states(self) -> None:
-        blank = QPixmap(self.iconSize())  # so that rows and columns keep their sizes
+        blank = QPixmap(self.iconSize())  # keeps the sizes of rows and columns constant
         blank.fill(Qt.GlobalColor.transparent)
         icons = {True: QIcon(blank), False: icon("check", colors().good)}
         for item, capture in zip(self._items, self._captures, strict=True):

@@ -29,22 +29,22 @@ class EvaluationSpec:
 
     title: str
     question: str
-    """The question that it answers, and its duration."""
+    """The question it answers, and its duration."""
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
-    """Makes the fields for its entries."""
+    """Creates the form for its entries."""
     preparation: Preparation | None = None
-    """Makes what is evaluated."""
+    """Button and dialog that prepare the data, if needed."""
 
 
 class EvaluationPage(QWidget):
-    """A page that runs one evaluation in a job, and shows its result.
+    """A page that runs one evaluation in a job and shows its result.
 
     Parameters
     ----------
     spec : EvaluationSpec
     entries : object
-        Dataclass, shown first.
+        Dataclass with the initial values.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class EvaluationPage(QWidget):
             return Finding("", Health.BROKEN, self._failure)
         if self._waits_for:
             found = f"{self._waits_for} is running"
-            return Finding("", Health.LIMITED, found, "one runs at a time")
+            return Finding("", Health.LIMITED, found, "only one can run at a time")
         if not self._results.is_empty:
             return Finding("", Health.GOOD, "Done")
         return self._readiness.finding if self._readiness else None

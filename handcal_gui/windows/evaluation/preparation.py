@@ -1,4 +1,4 @@
-"""A dialog that prepares an evaluation, and the button that opens it."""
+"""The dialog that prepares an evaluation's data, and the button that opens it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from handcal_gui.widgets.fields import named
 
 
 class PreparationDialog(QDialog):
-    """A dialog in which what is evaluated is made.
+    """Base of dialogs that prepare the data of an evaluation.
 
     Attributes
     ----------
     entries : object
-        Of the evaluation, with what was entered here.
+        Entries of the evaluation, with the changes made here.
     """
 
     entries: Any
@@ -26,15 +26,15 @@ class PreparationDialog(QDialog):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
-    """Button and dialog with which an evaluation is prepared."""
+    """The specification of a preparation: its button and its dialog."""
 
     button: str
     help_text: str
     """Text and tooltip of the button."""
     is_possible: Callable[[Any], bool]
-    """Returns whether entries suffice for it."""
+    """Returns whether the entries suffice to open the dialog."""
     dialog: Callable[[Any, QWidget], PreparationDialog]
-    """Makes it for entries, with a parent."""
+    """Creates the dialog, given entries and a parent."""
 
 
 class PreparationButton(QPushButton):
@@ -47,7 +47,7 @@ class PreparationButton(QPushButton):
     Attributes
     ----------
     closed : Signal(object)
-        The dialog was closed, with these entries.
+        Entries with which the dialog was closed.
     """
 
     closed = Signal(object)
@@ -61,7 +61,7 @@ class PreparationButton(QPushButton):
         self.clicked.connect(self._open)
 
     def follow(self, entries: Any) -> None:
-        """Follow other entries; None to be disabled."""
+        """Set the entries; None disables the button."""
         self._entries = entries
         self.setEnabled(entries is not None and self._preparation.is_possible(entries))
 

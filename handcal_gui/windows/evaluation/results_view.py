@@ -1,4 +1,4 @@
-"""Results of an evaluation: its figures and numbers, and buttons for its files."""
+"""Results of an evaluation: figures, numbers, and buttons for the files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from handcal_gui.windows.evaluation.work import Outcome
 
 
 class ResultsView(QWidget):
-    """Shows the finding, the first section's tables, and each figure as it was written."""
+    """Shows the main finding, the key tables, and each figure as written to file."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -43,7 +43,7 @@ class ResultsView(QWidget):
         return self._stack.currentIndex() == 0
 
     def show_outcome(self, outcome: Outcome | None) -> None:
-        """Show what came of it; None if there is nothing."""
+        """Show a result; None clears the view."""
         self._stack.setCurrentIndex(0 if outcome is None else 1)
         self._tabs.clear()
         for page in self._pages:
@@ -71,14 +71,14 @@ class ResultsView(QWidget):
     def _lay_out(self) -> None:
         foot, buttons = QWidget(), []
         for name, text, file, help_text in (
-            ("openPdf", "Open report", "report.pdf", "The PDF, to read and to file"),
+            ("openPdf", "Open report", "report.pdf", "Report as PDF, for reading and archiving"),
             (
                 "openHtml",
                 "Open in browser",
                 "report.html",
-                "The same, with each figure's numbers",
+                "The same report as HTML, with the numbers of each figure",
             ),
-            ("openFolder", "Open folder", "", "Report, figures, and the raw numbers as CSV"),
+            ("openFolder", "Open folder", "", "Folder with report, figures and raw numbers as CSV"),
         ):
             buttons.append(button(name, text, help_text=help_text))
             buttons[-1].clicked.connect(lambda _checked=False, file=file: self._open(file))
@@ -96,7 +96,7 @@ class ResultsView(QWidget):
 
 
 def _key_tables(report: Report) -> list[Table]:
-    """Return the tables with a head, of the first section that has any."""
+    """Return the tables with a header, from the first section that has any."""
     for section in report.sections:
         tables = [item for item in section.items if isinstance(item, Table)]
         if shown := [table for table in tables if any(one.title for one in table.columns)]:

@@ -30,38 +30,38 @@ _MOST_ALIGNMENTS = 20
 
 
 def make_specs() -> Mapping[str, EvaluationSpec]:
-    """Return them by the fields of `EvaluationEntries`."""
+    """Return the specifications by field of `EvaluationEntries`."""
     return {
         "noise": EvaluationSpec(
             "Noise study",
             "How much rotation and noise do the solvers tolerate before their error exceeds the "
-            "paper's 4 mm? About ten minutes on two cores; a quick run, half a minute.",
+            "paper's 4 mm? About ten minutes on two cores; half a minute for a quick run.",
             SimulatedStudy(noise_cases, run_noise_study),
             _noise_form,
         ),
         "methods": EvaluationSpec(
             "Method comparison",
-            "Which calibration method errs least on the same wearers, and what does it cost them? "
-            "100 wearers take about eleven minutes on two cores.",
+            "Which calibration method is most accurate for the same wearers, and how much effort "
+            "does it require? 100 wearers take about eleven minutes on two cores.",
             SimulatedStudy(method_cases, run_method_comparison),
             _methods_form,
         ),
         "cube": EvaluationSpec(
             "Cube test",
-            "How far is a drawn cube from the real one, as a camera in the eye's place sees it? "
+            "How far is a drawn cube from the real one, as seen by a camera at the eye position? "
             "About a minute with rendered captures.",
             GivenData(_missing_captures, run_cube_test),
             _cube_form,
             Preparation(
                 "Capture…",
-                "Take the captures with a camera; enter the folder for them first.",
+                "Take the captures with a camera; enter their folder first.",
                 lambda entries: bool(entries.captures),
                 CaptureDialog,
             ),
         ),
         "users": EvaluationSpec(
             "User test",
-            "How far do calibrations miss what their wearers see, over all trials of their "
+            "How large are the errors that wearers see after calibration, over all trials of their "
             "sessions? A few seconds.",
             GivenData(
                 _missing_sessions,
@@ -77,8 +77,8 @@ def _missing_captures(entries: CubeEntries) -> str:
         return ""
     folder = Path(entries.captures).expanduser()
     if not folder.exists():
-        return f"there is no folder {folder} yet: Capture… makes it"
-    find_captures(folder)  # which says what is wrong with it
+        return f"there is no folder {folder} yet: press Capture… to create it"
+    find_captures(folder)  # raises an error if they are not usable
     return ""
 
 
@@ -108,25 +108,28 @@ def _cube_form() -> EntriesForm:
     captures.setToolTip("POSITION/POSE/real.png and virtual.png, and POSITION/grid.png.")
     cube = PathField("Cube", "file", "Cubes (*.json)", "cube.json of the captures")
     camera = PathField("Camera", "file", INTRINSICS_FILES, "camera.json of the captures")
-    camera.setToolTip("Intrinsics of the camera in the eye's place.")
-    rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "The example's")
-    square = whole_number("square", 20, 2000, "Side of the squares of the grid on the display.")
+    camera.setToolTip("Intrinsics of the camera at the eye position.")
+    rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "The example rig")
+    square = whole_number("square", 20, 2000, "Side length of the squares of the display's grid.")
     square.setSuffix(" px")
     poses = whole_number(
-        "poses", 1, MOST_POSES, "Poses of the cube at each position, rendered or to be captured."
+        "poses", 1, MOST_POSES, "Poses of the cube at each position, rendered or captured."
     )
     alignments = whole_number(
-        "alignments", 1, _MOST_ALIGNMENTS, "Alignments of the hand at each position, if rendered."
+        "alignments",
+        1,
+        _MOST_ALIGNMENTS,
+        "Alignments at each position, if captures are rendered.",
     )
     return EntriesForm(
         {
             "captures": ("Captures", captures),
             "cube": ("Cube", cube),
-            "camera": ("Camera's intrinsics", camera),
+            "camera": ("Camera intrinsics", camera),
             **_output(),
             "rig": ("Rig file", rig),
             "eye": ("Display", choice("eye", "Display", {eye: eye.capitalize() for eye in EYES})),
-            "square_px": ("Grid's squares", square),
+            "square_px": ("Grid squares", square),
             "seed": ("Seed of the rendering", _seed()),
             "poses": ("Poses at each position", poses),
             "alignments": ("Alignments at each", alignments),
@@ -136,7 +139,7 @@ def _cube_form() -> EntriesForm:
 
 def _users_form() -> EntriesForm:
     sessions = PathField("Sessions", "folder")
-    sessions.setToolTip("The folder of one session, or one that holds sessions.")
+    sessions.setToolTip("Folder of one session, or a folder that contains sessions.")
     return EntriesForm({"sessions": ("Sessions", sessions), **_output()})
 
 
@@ -145,14 +148,14 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
         "processes",
         0,
         _MOST_PROCESSES,
-        "On this computer; more than its cores are not faster.",
+        "Number of processes on this computer; more than its cores is not faster.",
     )
     processes.setSpecialValueText("One per core")
     scheduler = named(
         QLineEdit(placeholderText="None: this computer", clearButtonEnabled=True),
         "scheduler",
         "Dask scheduler",
-        "Address of a Dask cluster that does the work instead, as tcp://HOST:PORT.",
+        "Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT.",
     )
     return {
         "seed": ("Seed", _seed()),

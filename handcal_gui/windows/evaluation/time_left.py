@@ -14,9 +14,9 @@ class TimeLeft:
     Parameters
     ----------
     begun : float
-        Share that was done before.
+        Share that was already done at the start.
     clock : callable
-        Gives seconds.
+        Returns the time in seconds.
     """
 
     def __init__(self, begun: float, clock: Callable[[], float] = time.monotonic) -> None:

@@ -1,4 +1,4 @@
-"""The window of evaluations, beside the main one, which can be used meanwhile."""
+"""The evaluation window, which leaves the main window usable."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _RAIL_PX = 24 * SPACING_PX
 
 
 class EvaluationWindow(QDialog):
-    """Offers evaluations, one of which runs at a time; closing cancels it.
+    """Offers evaluations, one of which can run at a time; closing cancels it.
 
     Parameters
     ----------
     specs : mapping of str to EvaluationSpec
-        By the field of the entries.
+        By field of the entries.
     entries : EvaluationEntries
-        Shown first.
+        Initial settings.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class EvaluationWindow(QDialog):
         super().__init__(parent)
         self.setObjectName("evaluationWindow")
         self.setWindowTitle("Evaluate")
-        # A window of its own, with all the buttons of one.
+        # A separate window with all window buttons.
         self.setWindowFlags(Qt.WindowType.Window)
         self._entries = entries
         self._specs = specs

@@ -1,4 +1,4 @@
-"""Jobs of the evaluation window: what they need, what they run, and their results."""
+"""Jobs of the evaluation window: checks of their inputs, their work and their results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from handcal_gui.windows.evaluation.time_left import TimeLeft
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """State of an evaluation with what was entered, and the text of its button."""
+    """State of an evaluation for given entries, and the text of its button."""
 
     finding: Finding
     button: str = "Run"
@@ -43,11 +43,11 @@ class Outcome:
     """Folder of all its files."""
     report: Report
     pictures: Sequence[UInt8]
-    """The report's figures as they were written, each (h, w, 3), RGB."""
+    """The report's figures as written to file, each (h, w, 3), RGB."""
 
 
 class Reported(Protocol):
-    """Result of an evaluation whose report was written into the folder that was entered."""
+    """Result of an evaluation whose report was written to the entered folder."""
 
     @property
     def report(self) -> Report:
@@ -55,13 +55,13 @@ class Reported(Protocol):
 
 
 class Evaluation(Protocol):
-    """An evaluation as a page needs it; entries are a dataclass with an `output` folder."""
+    """Interface of an evaluation; its entries are a dataclass with an `output` folder."""
 
     def readiness(self, entries: Any) -> Readiness:
-        """Check what was entered; HandcalError says what is wrong with it."""
+        """Check the entries; raise HandcalError if they are wrong."""
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
-        """Run it; HandcalError says why that failed."""
+        """Run the evaluation; raise HandcalError if it fails."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,12 +69,12 @@ class SimulatedStudy:
     """A study on simulated wearers; entries are its settings."""
 
     study: Callable[[Any], Study]
-    """Returns the cases that settings describe."""
+    """Returns the cases for given settings."""
     order: Callable[[Any, Progress], Reported]
-    """Runs or resumes the study, and writes its report."""
+    """Runs or resumes the study and writes its report."""
 
     def readiness(self, entries: Any) -> Readiness:
-        """Return how much of the study the folder holds."""
+        """Return how much of the study the folder contains."""
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
@@ -87,7 +87,7 @@ class SimulatedStudy:
         return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
-        """Run or resume the study, with the time left beside its progress."""
+        """Run or resume the study, and report its progress with the remaining time."""
         study, folder = self.study(entries), output_folder(entries.output)
         count = len(study.cases)
         left = TimeLeft(share_done(study, folder))
@@ -104,15 +104,15 @@ class SimulatedStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GivenData:
-    """An evaluation of what is in files."""
+    """An evaluation of data in files."""
 
     missing: Callable[[Any], str]
-    """Returns what has yet to be entered; empty if nothing has."""
+    """Returns a request for missing entries; empty if there are none."""
     order: Callable[[Any, Progress], Reported]
-    """Evaluates the files, and writes the report."""
+    """Evaluates the files and writes the report."""
 
     def readiness(self, entries: Any) -> Readiness:
-        """Return what is missing, or that an earlier report will be replaced."""
+        """Return which entry is missing, or whether an earlier report will be replaced."""
         if missing := self.missing(entries):
             return Readiness(Finding("", Health.BROKEN, missing))
         folder = free_of_studies(output_folder(entries.output))
@@ -121,7 +121,7 @@ class GivenData:
         return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
-        """Evaluate, and write the report."""
+        """Evaluate the files and write the report."""
         return _outcome(output_folder(entries.output), self.order(entries, progress))
 
 

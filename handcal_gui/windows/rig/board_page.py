@@ -1,4 +1,4 @@
-"""The first step: the board, to be printed, and the rig to begin from."""
+"""The first step: the calibration target and the initial rig."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square
 
 
 class BoardPage(QWidget):
-    """Describes the board, shows and saves it."""
+    """Describes, shows and saves the board, and selects the initial rig."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -56,23 +56,30 @@ class BoardPage(QWidget):
         self._columns = whole_number("columns", 3, 40, squares_help)
         self._rows = whole_number("rows", 3, 40, squares_help)
         self._square = number(
-            "square", 1.0, 1000.0, 0.05, " mm", "Side of a square: measure it on the print."
+            "square", 1.0, 1000.0, 0.05, " mm", "Side length of a square, measured on the print."
         )
-        self._marker = number("marker", 0.3, 950.0, 0.05, " mm", "Side of a marker, as measured.")
+        self._marker = number(
+            "marker", 0.3, 950.0, 0.05, " mm", "Measured side length of a marker."
+        )
         self._dictionary = choice(
-            "dictionary", "Dictionary", {name: name for name in DICTIONARIES}, "Of the markers."
+            "dictionary",
+            "Dictionary",
+            {name: name for name in DICTIONARIES},
+            "Dictionary of the markers.",
         )
         self._legacy = named(
             QCheckBox("Printed by OpenCV before 4.6"),
             "legacy",
-            help_text="It began with a white square if the rows are even.",
+            help_text="Boards with an even number of rows started with a white square.",
         )
         self._paper = choice(
             "paper", "Paper", {paper: paper.capitalize() for paper in get_args(Paper)}
         )
-        self._pdf = button("savePdf", "Save as PDF…", help_text="To scale, with a ruler to check")
-        self._picture = button("savePicture", "Save picture…", help_text="PNG, to show on a screen")
-        self._begin = button("begin", "Begin from another rig…")
+        self._pdf = button(
+            "savePdf", "Save as PDF…", help_text="To scale, with a ruler to check the print"
+        )
+        self._picture = button("savePicture", "Save image…", help_text="PNG, to show on a screen")
+        self._begin = button("begin", "Use another initial rig…")
         self._rig = ElidedLabel()
         self._found = FindingLine("board")
         self._preview = ImageView("Preview of the board")
@@ -94,11 +101,11 @@ class BoardPage(QWidget):
         self._take()
 
     def stop(self) -> None:
-        """Wait for the end of what runs in the background."""
+        """Wait for background work to end."""
         self._draw.stop()
 
     def enter(self) -> None:
-        """Nothing to look for."""
+        """Do nothing: the board has no images."""
 
     def _show_board(self, board: Board) -> None:
         self._kind.setCurrentIndex(self._kind.findData(board.kind))
@@ -123,12 +130,12 @@ class BoardPage(QWidget):
                 legacy=self._legacy.isChecked(),
             )
         except ValueError as error:
-            self._preview.show_text(message="There is no such board")
+            self._preview.show_text(message="No such board exists")
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
             return
         self._preview.show_text()
         inner = " × ".join(map(str, board.inner))
-        self._found.show_finding(Finding("", Health.GOOD, f"{inner} inner corners to be found"))
+        self._found.show_finding(Finding("", Health.GOOD, f"{inner} inner corners to find"))
         self._project.enter(board=board, paper=self._paper.currentData())
         self._draw.ask(board)
 
@@ -151,12 +158,12 @@ class BoardPage(QWidget):
         except (ValueError, FileError) as error:
             self._found.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
             return
-        advice = "print it at 100 %, and measure ruler and squares"
+        advice = "print it at 100 % and measure the ruler and the squares"
         self._found.show_finding(Finding("", Health.GOOD, f"saved as {path}", advice))
 
     def _ask_for_rig(self) -> None:
         path, _ = QFileDialog.getOpenFileName(
-            self, "Begin from a rig", "", "Rig files (*.yaml *.yml)"
+            self, "Choose an initial rig", "", "Rig files (*.yaml *.yml)"
         )
         if not path or not self._may_give_up():
             return
@@ -171,8 +178,8 @@ class BoardPage(QWidget):
             return True
         answer = QMessageBox.question(
             self,
-            "Begin from another rig",
-            "Calibrated parts that are not saved will be lost. Continue?",
+            "Use another initial rig",
+            "Calibrated parts that have not been saved will be lost. Continue?",
         )
         return answer == QMessageBox.StandardButton.Yes
 
@@ -205,8 +212,8 @@ class BoardPage(QWidget):
         left.addSpacing(2 * SPACING_PX)
         left.addWidget(
             paragraph(
-                text="The rig to begin from tells what the headset itself knows: the size of its "
-                "displays, and where its rendering cameras are."
+                text="The initial rig provides what the headset itself reports: the size of its "
+                "displays and the poses of its rendering cameras."
             )
         )
         left.addWidget(rig)

@@ -10,17 +10,17 @@ from handcal.rig.views import Coverage
 from handcal_gui.theme import SPACING_PX, colors
 
 _PLENTY = 6
-"""Views in a cell from which on it is as full as it gets."""
+"""Number of views from which on a cell has its full colour."""
 _SIDE_PX = 20
 
 
 class CoverageMap(QWidget):
-    """Shows the image's cells: the fuller, the more views have a corner there; the number, too.
+    """Shows the number of views with a corner in each cell of the image, by colour and digits.
 
     Parameters
     ----------
     title : str
-        Whose image it is.
+        Name of the camera.
     """
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
@@ -28,8 +28,8 @@ class CoverageMap(QWidget):
         self.setObjectName("coverage")
         self.setAccessibleName(f"Coverage, {title.lower()}")
         self.setToolTip(
-            "In how many images the board has a corner in each part of the view. Empty parts tell "
-            "nothing of the lens there."
+            "Number of images with a corner of the board in each part of the view. Empty parts "
+            "give no information about the lens there."
         )
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._title = title
@@ -37,7 +37,7 @@ class CoverageMap(QWidget):
         self.setFixedSize(8 * _SIDE_PX + 1, 6 * _SIDE_PX + 3 * SPACING_PX + 1)
 
     def show_coverage(self, coverage: Coverage | None) -> None:
-        """Show how the corners lie; None before there are any."""
+        """Show the coverage; None if there are no corners yet."""
         self._coverage = coverage
         self.setAccessibleDescription(self.caption)
         self.update()

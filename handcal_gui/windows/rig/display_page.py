@@ -1,4 +1,4 @@
-"""The fourth and fifth step: one eye's display, seen by the viewpoint camera behind it."""
+"""The fourth and fifth steps: one eye's display, seen by the viewpoint camera behind it."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _DISTANCES: dict[Distance, str] = {
     "solved": "solved from the squares' angle",
 }
 _GRID_HINT = (
-    "Save the grid, show it on this display unscaled, put the viewpoint camera where the eye will "
-    "be, focused on the display, darken the room, and take 3 or more images."
+    "Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye "
+    "position, focused on the display. Darken the room and take 3 or more images."
 )
 _BOARD_HINT = (
-    "Leave the viewpoint camera where it is, switch the display off, and take 8 or more images of "
-    "the board through it while the headset tracks the board; the poses go into one JSON file."
+    "Do not move the viewpoint camera. Switch the display off and take 8 or more images of the "
+    "board through it while the headset tracks the board. Save the poses in one JSON file."
 )
 
 
 class DisplayPage(StepPage):
-    """Images of the grid and of the tracked board, and the display solved from them.
+    """Images of the grid and of the tracked board, and the display calibrated from them.
 
     Parameters
     ----------
@@ -52,58 +52,67 @@ class DisplayPage(StepPage):
             "distance",
             "Distance of the virtual screen",
             _DISTANCES,
-            "z(C0→S): measured, such as by the camera's focus, or solved from what a square "
-            "subtends at the nominal distance.",
+            "z(C0→S): measured, for example by the camera's focus, or solved from the angle that "
+            "a square subtends at the nominal distance.",
         )
-        distance_m = number("distanceM", 0.1, 100.0, 0.01, " m", "z(C0→S) as measured.")
-        arcmin = number("arcmin", 1.0, 10_000.0, 0.1, "′", "What a square of the grid subtends.")
+        distance_m = number("distanceM", 0.1, 100.0, 0.01, " m", "Measured z(C0→S).")
+        arcmin = number(
+            "arcmin", 1.0, 10_000.0, 0.1, "′", "Angle that a square of the grid subtends."
+        )
         nominal = number(
-            "nominal", 0.1, 100.0, 0.01, " m", "Distance at which it does: the manufacturer's."
+            "nominal",
+            0.1,
+            100.0,
+            0.01,
+            " m",
+            "Nominal distance for this angle, from the manufacturer.",
         )
-        square = whole_number("gridSquare", 20, 2000, "Side of the grid's squares, pixels.")
+        square = whole_number(
+            "gridSquare", 20, 2000, "Side length of the grid's squares, in pixels."
+        )
         square.setSuffix(" px")
         tracked = PathField("Tracked poses", "file", "Tracked poses (*.json)")
         tracked.setToolTip(
-            "Where the headset tracked the board in each image: "
-            '{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}, metres.'
+            "Poses of the board as tracked by the headset, for each image: "
+            '{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}, in metres.'
         )
         stereo = PathField(
             "Stereo calibration", "file", "Stereo calibrations (*.json)", "Not needed"
         )
         stereo.setToolTip(
-            "Instead of images and poses of the board: what 'handcal rig stereo' made of the "
-            "viewpoint camera, as its depth camera, and the headset's."
+            "Instead of images and poses of the board: the result of 'handcal rig stereo' with the "
+            "viewpoint camera as depth camera."
         )
         files = "Matrices (*.txt *.json *.yaml *.yml)"
         view = PathField("Rendering camera", "file", files, "As in the rig")
         view.setToolTip(
             "T_V_H, from the headset rig to this eye's rendering camera, as the headset reports "
-            "it: 4 rows of 4 numbers; metres; x right, y down, z forward. Otherwise it is that of "
-            "the rig to begin from."
+            "it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the "
+            "initial rig is used."
         )
         form = EntriesForm(
             {
                 "grid_images": ("Images of the grid", PathField("Grid images", "folder")),
-                "square_px": ("Grid's squares", square),
+                "square_px": ("Grid squares", square),
                 "board_images": ("Images of the board", PathField("Board images", "folder")),
-                "tracked": ("Board's poses", tracked),
+                "tracked": ("Board poses", tracked),
                 "stereo": ("or a stereo calibration", stereo),
                 "view": ("Rendering camera T_V_H", view),
                 "distance": ("Distance z(C0→S)", distance),
                 "distance_m": ("measured", distance_m),
-                "square_arcmin": ("Square's angle", arcmin),
+                "square_arcmin": ("Angle of a square", arcmin),
                 "nominal_m": ("at nominal distance", nominal),
             }
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
         grid = ImagesPanel(("Viewpoint camera",), _GRID_HINT)
         board = ImagesPanel(("Viewpoint camera",), _BOARD_HINT)
-        panels = {"Grid on the display": grid, "Place of the camera": board}
+        panels = {"Grid on the display": grid, "Camera pose": board}
         super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
-        self._save = button("saveGrid", "Save grid…", help_text="PNG, for the display to show")
+        self._save = button("saveGrid", "Save grid…", help_text="PNG, to show on the display")
         grid.add_button(self._save)
         self._save.clicked.connect(self._save_grid)
         self._grid.take_requested.connect(self._take_grid)
@@ -116,7 +125,7 @@ class DisplayPage(StepPage):
         return work.left if self._eye == "left" else work.right
 
     def enter(self) -> None:
-        """Look for grid and board in the folders, unless that was done."""
+        """Search the folders for grid and board, unless already done."""
         entries = self._entries
         for distance, fields in self._by_distance.items():
             for field in fields:
@@ -126,7 +135,7 @@ class DisplayPage(StepPage):
             self._grid.look((entries.grid_images,), grid.board, entries.dropped_grid)
 
     def keep(self) -> None:
-        """Keep what is entered, and look for grid and board where they are new."""
+        """Store the entries, and search new folders for grid and board."""
         entries = self.form.take(self._entries)
         entries = replace(
             entries,
@@ -137,7 +146,7 @@ class DisplayPage(StepPage):
         self.enter()
 
     def solve(self) -> None:
-        """Solve from the images that are not left out."""
+        """Solve from the images that are not excluded."""
         work = partial(
             solve_display,
             self._grid.shots,
@@ -150,7 +159,7 @@ class DisplayPage(StepPage):
         self.box.run(work, self._show_solved)
 
     def show_known(self) -> None:
-        """Show what the rig has of this display."""
+        """Show the rig's present calibration of this display."""
         self.box.show_origin(self.project.rig.origins.get(self._eye))
 
     def _show_solved(self, solved: tuple[Solved, Solved]) -> None:
@@ -160,7 +169,7 @@ class DisplayPage(StepPage):
         self._board.show_solved(place)
 
     def _shown(self) -> Grid | None:
-        """Return the grid that the display shows; None, and why, if it has no room for it."""
+        """Return the grid for the display; if it does not fit, show why and return None."""
         screen = screen_of(self.project.rig, self._eye)
         try:
             return grid_on(screen.width_px, screen.height_px, self._entries.square_px)

@@ -1,4 +1,4 @@
-"""The findings about a rig, line by line, with doubtful ones marked."""
+"""A list of the findings about a rig, with doubtful ones marked."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal_gui.theme import colors, icon, quiet
 
 
 class FindingList(QTreeWidget):
-    """Lists what was found, and what is expected where it is doubtful.
+    """Lists findings, and the expected value of doubtful ones.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class FindingList(QTreeWidget):
         self.setAccessibleName(name)
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
-        self.setHeaderLabels(["What", "Found", "Expected"])
+        self.setHeaderLabels(["Item", "Found", "Expected"])
         quiet(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
@@ -34,7 +34,7 @@ class FindingList(QTreeWidget):
         self._findings: tuple[RigFinding, ...] = ()
 
     def show_findings(self, findings: Sequence[RigFinding]) -> None:
-        """Replace what is listed, doubtful things first."""
+        """Replace the list; doubtful findings come first."""
         self._findings = tuple(sorted(findings, key=lambda one: one.is_fine))
         self._refresh()
 

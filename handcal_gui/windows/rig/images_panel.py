@@ -1,4 +1,4 @@
-"""The images of a step: a list, the chosen one, and how well all of them cover the view."""
+"""The images of a step: their list, the selected image, and the coverage of the view."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from handcal_gui.windows.rig.solve import Solved
 
 
 class ImagesPanel(QWidget):
-    """Looks for a board in folders of images, and lets images be left out.
+    """Searches folders of images for a board; single images can be excluded.
 
     Parameters
     ----------
     titles : sequence of str
-        Whose images they are: of one camera, or of the two of pairs.
+        Name of the camera, or names of the two cameras of pairs.
     hint : str
-        Shown while there are none.
+        Text shown while there are no images.
 
     Attributes
     ----------
     shots : tuple of Shot
     dropped_changed : Signal()
-        Other images are left out, or other images are there.
+        The images or the set of excluded images have changed.
     again_requested, take_requested : Signal()
-        The images are to be looked through again; others are to be taken.
+        The user requests to search the images again, or to take images.
     """
 
     dropped_changed = Signal()
@@ -58,8 +58,10 @@ class ImagesPanel(QWidget):
         self._hint = paragraph("hint", hint)
         self._trouble = FindingLine("images")
         self._trouble.hide()
-        self._again = button("again", "Look again", help_text="Read the folders again")
-        self._take = button("take", "Take images…", help_text="With cameras of this computer")
+        self._again = button("again", "Search again", help_text="Read the folders again")
+        self._take = button(
+            "take", "Take images…", help_text="Take images with cameras of this computer"
+        )
         self._again.clicked.connect(self._look_again)
         self._take.clicked.connect(self.take_requested)
         self.bar = JobBar()
@@ -71,22 +73,22 @@ class ImagesPanel(QWidget):
         self._refresh()
 
     def dropped_of(self, before: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the images left out; as before while none are shown."""
+        """Return the excluded images; `before` while no images are shown."""
         return self._list.dropped if self.shots else before
 
     def add_button(self, added: QPushButton) -> None:
-        """Put another button before the panel's own."""
+        """Add a button in front of the panel's own."""
         self._buttons.insertWidget(0, added)
 
     def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
-        """Look for the board in folders, unless that was just done; nothing without all folders."""
+        """Search folders for the board, unless just done; do nothing if a folder is missing."""
         paths = tuple(Path(folder).expanduser() for folder in folders if folder)
         question = (paths, board)
         if question == self._question:
             return
         before = self._question[0] if self._question else ()
         if before and before != paths:
-            dropped = ()  # those were other images
+            dropped = ()  # they refer to other images
         self._question = question
         self._show((), ())
         if len(paths) == len(folders):
@@ -100,7 +102,7 @@ class ImagesPanel(QWidget):
         self._question = None
 
     def show_solved(self, solved: Solved) -> None:
-        """Show how far off each image is."""
+        """Show the residual of each image."""
         worst = (solved.worst.name, solved.worst.why) if solved.worst else ("", "")
         self._list.show_results(solved.residuals_px, solved.tilts_rad, worst)
 
@@ -110,7 +112,7 @@ class ImagesPanel(QWidget):
         self._trouble.show()
 
     def stop(self) -> None:
-        """End what runs in the background."""
+        """End background work."""
         self.bar.stop()
         self._view.stop()
 

@@ -1,4 +1,4 @@
-"""Fields that several steps have."""
+"""Form fields shared by several steps."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _LENSES: dict[LensModel, str] = {
 
 
 def intrinsics_field(name: str) -> PathField:
-    """Return a field for a file of intrinsics that are solved if there is none."""
+    """Return a field for a file of intrinsics, which are solved if it is empty."""
     field = PathField(name, "file", INTRINSICS_FILES, "Solved from the images")
-    field.setToolTip("OpenCV's FileStorage, ROS's camera_info or handcal's JSON.")
+    field.setToolTip("OpenCV FileStorage, ROS camera_info or handcal JSON.")
     return field
 
 
 def lens_field() -> QComboBox:
     """Return a choice of lens models."""
-    return choice("lens", "Lens", _LENSES, "Coefficients of distortion to solve for.")
+    return choice("lens", "Lens", _LENSES, "Distortion coefficients to solve for.")

@@ -1,4 +1,4 @@
-"""The rig that the wizard's pages calibrate, stored in the project folder as it changes."""
+"""The rig being calibrated, stored in the project folder after each change."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SETTLE_MS = 500
 
 
 class RigProject(QObject):
-    """The entries and the rig, which the pages change.
+    """The entries and the rig that the wizard's pages edit.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ class RigProject(QObject):
         Settings of a RealSense that takes images.
     inputs : RigInputs
     rig : Rig
-        As far as it is calibrated.
+        The rig with all parts calibrated so far.
     complaint : str
         Message about files that could not be read; empty if there is none.
     rig_changed : Signal()
-        Another rig, or other intrinsics of the viewpoint camera.
+        The rig or the viewpoint camera's intrinsics have changed.
     failed : Signal(str)
         The entries could not be saved.
     """
@@ -77,7 +77,7 @@ class RigProject(QObject):
         with suppress(FileError):
             verdict = read_json(file).get("verdict")
             return str(verdict.get("name")) if isinstance(verdict, dict) else "good"
-        return "good"  # OpenCV's or ROS's
+        return "good"  # a file by OpenCV or ROS
 
     def enter(self, **changes: Any) -> None:
         """Replace fields of `RigInputs`."""
@@ -91,21 +91,21 @@ class RigProject(QObject):
         self.take_rig(read_rig(path))
 
     def take_part(self, solved: Solved) -> str:
-        """Put a calibrated part into the rig; return the outcome as a message."""
+        """Add a calibrated part to the rig; return the outcome as a message."""
         if solved.put is None:
-            return "it was not put into the rig"
+            return "it was not added to the rig"
         try:
             self.take_rig(solved.put(self.rig))
         except HandcalError as error:
-            return f"it was not put into the rig: {error}"
-        return "it is in the rig now"
+            return f"it was not added to the rig: {error}"
+        return "it was added to the rig"
 
     def camera_solved(self) -> None:
         """Announce that the viewpoint camera's intrinsics may have changed."""
         self.rig_changed.emit()
 
     def take_rig(self, rig: Rig) -> None:
-        """Take another rig, or raise HandcalError if it is implausible or cannot be kept."""
+        """Replace the rig, or raise HandcalError if it is implausible or cannot be stored."""
         try:
             self.folder.save_rig(rig)
         except ValueError as error:
@@ -119,4 +119,4 @@ class RigProject(QObject):
         try:
             self.folder.save(self.inputs)
         except FileError as error:
-            self.failed.emit(f"The entries cannot be saved: {error}")
+            self.failed.emit(f"The entries could not be saved: {error}")

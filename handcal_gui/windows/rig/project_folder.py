@@ -23,27 +23,27 @@ Distance: TypeAlias = Literal["measured", "solved"]
 
 @dataclass(frozen=True, slots=True)
 class StereoEntries:
-    """Inputs of the depth camera's pose; paths are empty where there is none."""
+    """Inputs for the depth camera's pose; missing paths are empty."""
 
     depth_images: str = ""
     headset_images: str = ""
     """Folders of the two cameras' images."""
     depth_intrinsics: str = ""
     headset_intrinsics: str = ""
-    """Files; solved from the images if empty."""
+    """Files of intrinsics; solved from the images if empty."""
     imager_intrinsics: str = ""
     depth_to_color: str = ""
-    """Files: the depth imager's own, and its pose in the colour imager, if the images are the
-    colour imager's."""
+    """Files with the depth imager's intrinsics and its pose in the colour imager, if the images
+    come from the colour imager."""
     lens: LensModel = "full"
-    """Of intrinsics that are solved."""
+    """Lens model for solved intrinsics."""
     dropped: tuple[str, ...] = ()
-    """Images left out, by the depth camera's name."""
+    """Excluded images, by the depth camera's file name."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewpointEntries:
-    """Inputs of the viewpoint camera's intrinsics, or the file that has them."""
+    """Inputs for the viewpoint camera's intrinsics, or a file that contains them."""
 
     images: str = ""
     intrinsics: str = ""
@@ -53,32 +53,32 @@ class ViewpointEntries:
 
 @dataclass(frozen=True, slots=True)
 class DisplayEntries:
-    """Inputs of one eye's display calibration."""
+    """Inputs for one eye's display calibration."""
 
     grid_images: str = ""
     """Folder of images of the grid on the display."""
     square_px: int = 80
-    """Side of the grid's squares."""
+    """Side length of the grid's squares."""
     board_images: str = ""
     tracked: str = ""
-    """Folder of images of the tracked board, and the file of its poses."""
+    """Folder of images of the tracked board, and file of its poses."""
     stereo: str = ""
-    """Instead of both, the JSON of a stereo calibration with the viewpoint camera as its depth
-    camera."""
+    """Alternative to both: the JSON file of a stereo calibration with the viewpoint camera as
+    depth camera."""
     view: str = ""
-    """File of T_V_H, as the headset reports it; that of the rig if empty."""
+    """File of T_V_H as reported by the headset; that of the rig if empty."""
     distance: Distance = "measured"
     """Source of z(C0→S): `distance_m`, or the angle that a square subtends."""
     distance_m: float = 2.0
     square_arcmin: float = 112.0
     nominal_m: float = 2.0
-    """As measured; what a square subtends from the nominal distance."""
+    """The measured distance; the angle that a square subtends at the nominal distance."""
     dropped_grid: tuple[str, ...] = ()
     dropped_board: tuple[str, ...] = ()
 
     @property
     def inputs(self) -> DisplayInputs:
-        """The same as the calibration takes it."""
+        """The same as inputs of the calibration."""
         return DisplayInputs(
             square_px=self.square_px,
             distance_m=self.distance_m if self.distance == "measured" else None,
@@ -101,7 +101,7 @@ class RigInputs:
 
 
 class ProjectFolder:
-    """A folder that stores the entries, the images and the rig as far as it is calibrated.
+    """A folder that stores the entries, the images and the partly calibrated rig.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class ProjectFolder:
     ----------
     path : Path
     viewpoint : Path
-        The viewpoint camera's intrinsics, once solved.
+        File of the viewpoint camera's intrinsics, once solved.
 
     Raises
     ------
@@ -127,9 +127,9 @@ class ProjectFolder:
         self._rig = path / "rig.yaml"
 
     def load(self) -> tuple[RigInputs, str]:
-        """Return the entries, and a message about what went wrong; empty if nothing did.
+        """Return the entries, and a message about any error; otherwise empty.
 
-        A file that cannot be used is kept beside, ending in ``.bad``.
+        A file that cannot be used is kept under a name that ends in ``.bad``.
         """
         if not self._entries.exists():
             return RigInputs(), ""
@@ -143,7 +143,7 @@ class ProjectFolder:
         write_json(self._entries, settings_json(inputs))
 
     def load_rig(self) -> tuple[Rig, str]:
-        """Return the rig as far as it is calibrated, the example at first, and what went wrong."""
+        """Return the partly calibrated rig, initially the example, and a message on any error."""
         example = resource_path("example_rig.yaml")
         if not self._rig.exists():
             return read_rig(example), ""
@@ -153,7 +153,7 @@ class ProjectFolder:
             return read_rig(example), f"The rig was reset: {error}; {_set_aside(self._rig)}"
 
     def save_rig(self, rig: Rig) -> None:
-        """Write the rig as far as it is calibrated.
+        """Write the partly calibrated rig.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class ProjectFolder:
 
 
 def entered_path(text: str) -> Path | None:
-    """Return the path that was entered; None if the field is empty."""
+    """Return the entered path; None if the field is empty."""
     return Path(text).expanduser() if text else None
 
 
@@ -175,4 +175,4 @@ def _set_aside(path: Path) -> str:
     with suppress(OSError):
         path.replace(bad)
         return f"the old file was kept as {bad}"
-    return "the old file cannot be renamed"
+    return "the old file could not be renamed"

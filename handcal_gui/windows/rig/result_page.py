@@ -1,4 +1,4 @@
-"""The last step: the rig as a whole, checked, compared and saved."""
+"""The last step: checking, comparing and saving the rig."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _RIG_FILES = "Rig files (*.yaml *.yml)"
 
 
 class ResultPage(QWidget):
-    """Shows what there is to say of the rig, and saves it.
+    """Shows the findings on the rig and its numbers, compares it with others, and saves it.
 
     Attributes
     ----------
     rig_saved : Signal(Path)
-        A rig file to be used for the next calibration.
+        Rig file to use for the next calibration.
     """
 
     rig_saved = Signal(object)
@@ -69,27 +69,27 @@ class ResultPage(QWidget):
         project.rig_changed.connect(self.enter)
 
     def enter(self) -> None:
-        """Show the rig as it is now."""
+        """Show the present rig."""
         rig = self._project.rig
         self._name.setText(rig.name)
         findings = report_rig(rig)
         self._findings.show_findings(findings)
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         doubtful = sum(not one.is_fine for one in findings)
-        text = f"{doubtful} of {len(findings)} findings are doubtful: see the check"
+        text = f"{doubtful} of {len(findings)} findings are doubtful: see Check"
         health = Health.LIMITED if doubtful else Health.GOOD
-        self._end.show_finding(Finding("", health, text if doubtful else "nothing is doubtful"))
+        self._end.show_finding(Finding("", health, text if doubtful else "no doubtful findings"))
         self._saved = None
         self._use.setEnabled(False)
         self._compare()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Take the name that is being typed: a button may be clicked without taking the focus."""
+        """Store the typed name: clicking a button may leave the focus in the field."""
         self._take_name()
         super().hideEvent(event)
 
     def save(self) -> None:
-        """Ask where to, and save the rig file."""
+        """Choose a path and save the rig file."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
         path, _ = QFileDialog.getSaveFileName(self, "Save the rig file", proposed, _RIG_FILES)
@@ -109,7 +109,7 @@ class ResultPage(QWidget):
         self._end.show_finding(Finding("", Health.GOOD, f"saved as {path}"))
 
     def stop(self) -> None:
-        """Nothing runs in the background."""
+        """Do nothing: the page has no background work."""
 
     def _take_name(self) -> None:
         name = self._name.text().strip()
@@ -131,7 +131,11 @@ class ResultPage(QWidget):
         self._differences.hide()
         if not self._other.path:
             self._compared.show_finding(
-                Finding("", Health.LIMITED, "choose a rig file, such as the rig's last calibration")
+                Finding(
+                    "",
+                    Health.LIMITED,
+                    "choose a rig file, such as the last calibration of this rig",
+                )
             )
             return
         try:
@@ -139,10 +143,8 @@ class ResultPage(QWidget):
         except FileError as error:
             self._compared.show_finding(Finding("", Health.BROKEN, str(error)))
             return
-        self._compared.show_finding(
-            Finding("", Health.GOOD, f"how this rig differs from {other.name}")
-        )
-        self._differences.show_rows(("Differs by",), difference_rows(other, self._project.rig))
+        self._compared.show_finding(Finding("", Health.GOOD, f"compared with {other.name}"))
+        self._differences.show_rows(("Difference",), difference_rows(other, self._project.rig))
         self._differences.show()
 
     def _lay_out(self) -> None:

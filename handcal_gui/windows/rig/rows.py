@@ -1,4 +1,4 @@
-"""The rig's numbers as rows of a table: in a person's units, with how well they are known."""
+"""The rig's numbers as table rows, in practical units and with standard deviations."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from handcal_gui.widgets.number_table import Row
 
 COLUMNS = ("Value", "± σ")
 _LENSES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-_TURN = "The depth camera's rotation vector in the headset's camera: axis times angle."
-_SHIFT = "Where the depth camera is in the headset's camera: x right, y down, z forward."
-_T_C0_V = "From the headset's rendering camera V to the offline viewpoint C0, V's axes."
+_TURN = "Rotation vector of the depth camera in the headset camera: axis times angle."
+_SHIFT = "Position of the depth camera in the headset camera: x right, y down, z forward."
+_T_C0_V = "From the headset's rendering camera V to the offline viewpoint C0, in the axes of V."
 _Z_C0_S = "Distance of the virtual screen S from the offline viewpoint C0."
 
 
@@ -30,58 +30,58 @@ def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
     sigmas = [*result.sigma, *[np.inf] * len(solved.distortion)]
     values = (solved.fx, solved.fy, solved.cx, solved.cy)
     rows = [
-        _row(name, value, sigma, "px", 2, "Pixels; σ from the residuals.")
+        _row(name, value, sigma, "px", 2, "In pixels; σ from the residuals.")
         for name, value, sigma in zip(("fx", "fy", "cx", "cy"), values, sigmas, strict=False)
     ]
     rows += [
-        _row(name, value, sigma, "", 5, "Coefficient of the lens's distortion, OpenCV's model.")
+        _row(name, value, sigma, "", 5, "Distortion coefficient of OpenCV's model.")
         for name, value, sigma in zip(_LENSES, solved.distortion, sigmas[4:], strict=False)
     ]
     rows.append(
-        Row("Pixel", (f"{result.arcmin_per_px:.2f}′", ""), "Angle of a pixel in the middle.")
+        Row("Pixel", (f"{result.arcmin_per_px:.2f}′", ""), "Angle of a pixel at the image centre.")
     )
     return (_rms(result.rms_px), *rows)
 
 
 def stereo_rows(result: StereoCalibration) -> tuple[Row, ...]:
-    """Return the depth camera's place."""
+    """Return the depth camera's pose."""
     spread = f"{np.degrees(result.spread_rad):.2f}°, {1e3 * result.spread_m:.1f} mm"
     return (
         _rms(result.rms_px),
         *_place_rows(result.T_H_D, _sigmas(result.covariance, len(STEREO_PARAMETERS))),
-        Row("Each pair alone", (spread, ""), "RMS difference from what each pair alone gives."),
+        Row("Each pair alone", (spread, ""), "RMS difference from the pose by each pair alone."),
     )
 
 
 def display_rows(result: DisplayCalibration) -> tuple[Row, ...]:
-    """Return one eye's display."""
+    """Return one eye's display calibration."""
     display, sigmas = result.display, _sigmas(result.covariance, len(DISPLAY_PARAMETERS))
     return (
         _rms(result.homography.rms_px),
         Row(
             "Corners",
             (f"{result.homography.sigma_px:.2f} px", ""),
-            "How well the least known corner of the display is known, σ, px of the display.",
+            "σ of the least certain corner of the display, in its pixels.",
         ),
         *_display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas),
         Row("f", (f"{display.K[0, 0]:.1f} px", ""), "Focal length of K, on the display's axis."),
         Row(
-            "Turned",
+            "Rotation",
             (f"{np.degrees(result.turn_rad):.2f}°", ""),
-            "Angle between the display's axes and the headset's V; H0 takes it up.",
+            "Angle between the axes of the display and of the headset's V; included in H0.",
         ),
     )
 
 
 def rig_rows(rig: Rig) -> tuple[Row, ...]:
-    """Return a whole rig's numbers; σ is known of what was calibrated with handcal."""
+    """Return a whole rig's numbers; σ is known for parts calibrated with handcal."""
     return tuple(_rig_rows(rig))
 
 
 def difference_rows(a: Rig, b: Rig) -> tuple[Row, ...]:
-    """Return by how much two rigs differ."""
+    """Return the differences between two rigs."""
     return tuple(
-        Row(one.name, (_with_unit(one.value, one.unit, 3),), "Not negative; 0 if both agree.")
+        Row(one.name, (_with_unit(one.value, one.unit, 3),), "Never negative; 0 if both agree.")
         for one in compare_rigs(a, b)
     )
 
@@ -103,7 +103,7 @@ def _rig_rows(rig: Rig) -> Iterator[Row]:
     camera = rig.depth_intrinsics
     for name in ("fx", "fy", "cx", "cy"):
         value = f"{getattr(camera, name):.2f} px"
-        yield Row(f"Depth camera: {name}", (value, UNKNOWN), "Of the depth camera's intrinsics.")
+        yield Row(f"Depth camera: {name}", (value, UNKNOWN), "From the depth camera's intrinsics.")
 
 
 def _display_rows(t_C0_V_m: Float64, z_C0_S_m: float, sigmas: Sequence[float]) -> Iterator[Row]:
@@ -115,7 +115,7 @@ def _display_rows(t_C0_V_m: Float64, z_C0_S_m: float, sigmas: Sequence[float]) -
 def _place_rows(T_H_D: Float64, sigmas: Sequence[float]) -> Iterator[Row]:
     turn_deg = np.degrees(Rotation.from_matrix(T_H_D[:3, :3]).as_rotvec())
     for axis, value, sigma in zip("xyz", turn_deg, np.degrees(sigmas[:3]), strict=True):
-        yield _row(f"T_H_D turn {axis}", value, sigma, "°", 3, _TURN)
+        yield _row(f"T_H_D rotation {axis}", value, sigma, "°", 3, _TURN)
     for axis, value, sigma in zip("xyz", T_H_D[:3, 3], sigmas[3:], strict=True):
         yield _row(f"T_H_D {axis}", 1e3 * value, 1e3 * sigma, "mm", 2, _SHIFT)
 
@@ -125,7 +125,11 @@ def _sigmas(covariance: Float64 | None, count: int) -> list[float]:
 
 
 def _rms(rms_px: float) -> Row:
-    return Row("RMS", (f"{rms_px:.3f} px", ""), "Root mean square distance of seen and expected.")
+    return Row(
+        "RMS",
+        (f"{rms_px:.3f} px", ""),
+        "Root mean square distance between detected and expected corners.",
+    )
 
 
 def _row(label: str, value: float, sigma: float, unit: str, decimals: int, tooltip: str) -> Row:

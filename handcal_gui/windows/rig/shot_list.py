@@ -1,4 +1,4 @@
-"""The images of a step in a list: what was found, how far off it is, and whether it is used."""
+"""The list of a step's images, with corners found, residual, tilt and use."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.rig.shots import Shot
 
 _COLUMNS = {
-    "Image": "Unticked images are left out; tick them again to take them in.",
-    "Corners": "Corners of the board that were found, in each camera's image.",
-    "Off, px": "Root mean square distance of the corners seen and expected, after solving.",
+    "Image": "Unticked images are excluded; tick them to include them again.",
+    "Corners": "Number of board corners found in each camera's image.",
+    "RMS, px": "Root mean square distance between detected and expected corners, after solving.",
     "Tilt": "Angle between the board's normal and the line of sight, after solving.",
 }
 _IMAGE, _CORNERS, _OFF, _TILT = range(4)
@@ -27,12 +27,12 @@ _SMALL = QSize(6 * SPACING_PX, 4 * SPACING_PX)
 
 
 class ShotList(QTreeWidget):
-    """Lists shots; the tick beside each says whether it is used.
+    """Lists shots, each with a check box to use or exclude it.
 
     Attributes
     ----------
     chosen : Signal(int)
-        Another shot is the current one, by its place in the list.
+        Index of the newly selected shot.
     dropped_changed : Signal()
     """
 
@@ -64,7 +64,7 @@ class ShotList(QTreeWidget):
 
     @property
     def dropped(self) -> tuple[str, ...]:
-        """The shots that are not ticked."""
+        """Names of the unticked shots."""
         return tuple(
             _name(item)
             for item in self._items()
@@ -72,7 +72,7 @@ class ShotList(QTreeWidget):
         )
 
     def show_shots(self, shots: Sequence[Shot], dropped: Iterable[str]) -> None:
-        """Replace what is listed."""
+        """Replace the list."""
         out = frozenset(dropped)
         self.blockSignals(True)
         self.clear()
@@ -88,20 +88,20 @@ class ShotList(QTreeWidget):
         tilts_rad: Mapping[str, float],
         worst: tuple[str, str] = ("", ""),
     ) -> None:
-        """Show how far off each is, its tilt, and which is worst and why."""
+        """Show residual and tilt of each, and mark the worst with the reason."""
         self.blockSignals(True)
         for item in self._items():
             name = _name(item)
             off, tilt = residuals_px.get(name), tilts_rad.get(name)
             item.setText(_OFF, UNKNOWN if off is None else f"{off:.2f}")
             item.setText(_TILT, UNKNOWN if tilt is None else f"{np.degrees(tilt):.0f}°")
-            # Of a pair, the worst is called as the one image: "headset camera's of NAME".
+            # Of a pair, the worst is named after one image: "headset camera's of NAME".
             note = f"worst: {worst[1]}" if worst[0].endswith(name) else ""
             _note(item, item.data(_IMAGE, _PROBLEM) or note)
         self.blockSignals(False)
 
     def changeEvent(self, event: QEvent) -> None:
-        """Redraw the signs when the colours change."""
+        """Redraw the icons when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             for item in self._items():
@@ -149,7 +149,7 @@ def _name(item: QTreeWidgetItem) -> str:
 
 
 def _note(item: QTreeWidgetItem, note: str) -> None:
-    """Show the image's name, and below it what there is to say about it."""
+    """Show the image's name with a note below."""
     text = "\n".join(filter(None, (_name(item), sentence(note))))
     item.setText(_IMAGE, text)
     item.setToolTip(_IMAGE, text)

@@ -1,4 +1,4 @@
-"""A shot as large as it fits, with the corners found drawn over it."""
+"""A large view of a shot with the detected corners."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _ARM = 0.006  # of a corner's cross, relative to the image's width
 
 
 class ShotView(QWidget):
-    """Shows one image, or the two of a pair above each other.
+    """Shows one image, or the two of a pair, one above the other.
 
     Parameters
     ----------
     titles : sequence of str
-        Whose image each is.
+        Camera of each image.
     """
 
     def __init__(self, titles: tuple[str, ...], parent: QWidget | None = None) -> None:
@@ -45,18 +45,18 @@ class ShotView(QWidget):
         self.show_shot(None)
 
     def show_shot(self, shot: Shot | None) -> None:
-        """Show a shot, once it is read; None for none."""
+        """Load and show a shot; None clears the view."""
         self._shot = shot
         if shot is None:
             for image in self._images:
                 image.show_image(None)
                 image.show_overlay(None)
-                image.show_text(message="The chosen image will be shown here")
+                image.show_text(message="The selected image will appear here")
         else:
             self._read.ask(shot.files)
 
     def stop(self) -> None:
-        """Wait for the end of what runs in the background."""
+        """Wait for background work to end."""
         self._read.stop()
 
     def _show_images(self, files: tuple[Path, ...], images: tuple[UInt8, ...]) -> None:

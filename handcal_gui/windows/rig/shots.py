@@ -1,4 +1,4 @@
-"""The images of a step as they are shown: what was found on each, and a small picture of it."""
+"""The images of a step for display: detected corners and a thumbnail of each."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One image, or the two of a pair that were taken at one moment."""
+    """One image, or the two of a pair taken at the same time."""
 
     views: tuple[View, ...]
     """One for each camera."""
     files: tuple[Path, ...]
     small: UInt8 | None
-    """(h, w, 3); the first image, small; None if it cannot be read."""
+    """(h, w, 3): thumbnail of the first image; None if it cannot be read."""
 
     @property
     def name(self) -> str:
-        """The first image's."""
+        """Name of the first image."""
         return self.views[0].name
 
     @property
     def problem(self) -> str:
-        """Reason why nothing was found; empty if everything was."""
+        """Reason why the board was not found; empty if it was."""
         return "; ".join(view.problem for view in self.views if view.problem)
 
 
 def look(
     folders: Sequence[Path], board: Board, progress: Progress = Progress()
 ) -> tuple[Shot, ...]:
-    """Look for the board in one folder of images, or in two whose images belong together.
+    """Search for the board in one folder of images, or in two folders of paired images.
 
     Raises
     ------
     CancelledError
     FileError, ViewsError
-        If there are no images, too many, or none that belong together.
+        If there are no images, too many, or no pairs.
     """
     of_camera = []
     files: dict[tuple[int, str], Path] = {}
@@ -72,7 +72,7 @@ def look(
 
 
 def without(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[View, ...]]:
-    """Return the views, those of shots called one of `names` left out."""
+    """Return the views; those of the named shots are marked as excluded."""
     return [
         tuple(replace(view, dropped=shot.name in names) for view in shot.views) for shot in shots
     ]

@@ -40,17 +40,17 @@ class Solved:
 
     verdict: CalibrationVerdict
     rows: tuple[Row, ...]
-    """The numbers, with how well they are known."""
+    """The numbers with their standard deviations."""
     residuals_px: Mapping[str, float]
     tilts_rad: Mapping[str, float] = field(default_factory=dict)
-    """Of each image; the tilt is between the board's normal and the line of sight."""
+    """By image; the tilt is the angle between the board's normal and the line of sight."""
     worst: WorstView | None = None
     put: Callable[[Rig], Rig] | None = None
-    """Returns a rig with this part in it; None if it is not part of a rig, or bad."""
+    """Returns a rig with this part added; None if it is bad or not part of a rig."""
 
 
 def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
-    """Solve the pose of the depth camera, as ``handcal rig stereo`` and ``make`` do."""
+    """Solve the pose of the depth camera, like ``handcal rig stereo`` and ``make``."""
     pairs = [(first, second) for first, second in without(shots, entries.dropped)]
     result = calibrate_depth_camera(
         pairs,
@@ -75,7 +75,7 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
 
 
 def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Path) -> Solved:
-    """Solve the viewpoint camera's intrinsics, and keep them in a file unless they are bad."""
+    """Solve the viewpoint camera's intrinsics, and write them to a file unless bad."""
     views = [view for (view,) in without(shots, entries.dropped)]
     result = calibrate_camera(views, CameraSettings(lens=entries.lens))
     if result.verdict.name != "bad":
@@ -97,7 +97,7 @@ def solve_display(
     rig: Rig,
     camera_file: Path,
 ) -> tuple[Solved, Solved]:
-    """Calibrate an eye's display; return its result, and that of the viewpoint camera's pose."""
+    """Calibrate an eye's display; return its result and the viewpoint camera's pose."""
     if not camera_file.exists():
         raise HandcalError("the viewpoint camera's intrinsics are missing: solve its step first")
     camera = read_intrinsics(camera_file)

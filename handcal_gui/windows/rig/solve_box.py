@@ -1,4 +1,4 @@
-"""The foot of a step: the button that solves it, and the result."""
+"""The bottom of a step: the Solve button and the result."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Healt
 
 
 class SolveBox(QWidget):
-    """Solves in a job; shows verdict, reason, the worst image and the numbers.
+    """Solves in a job, and shows verdict, reason, worst image and numbers.
 
     Attributes
     ----------
     button : MainButton
-        "Solve"; the page connects it, and enables it.
+        The Solve button, connected and enabled by the page.
     bar : JobBar
     """
 
@@ -46,7 +46,7 @@ class SolveBox(QWidget):
         self.show_origin(None)
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
-        """Solve in a job, and pass the result to `then`."""
+        """Solve in a job and pass the result to `then`."""
 
         def solve(progress: Progress) -> object:
             solved = work()
@@ -56,7 +56,7 @@ class SolveBox(QWidget):
         self.bar.run("Solving", solve, then)
 
     def show_origin(self, origin: Origin | None) -> None:
-        """Show what is known of an earlier result; None if there is none."""
+        """Show an earlier result; None if there is none."""
         self._worst.hide()
         self._table.hide()
         if origin is None:
@@ -66,11 +66,11 @@ class SolveBox(QWidget):
         self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
 
     def show_finding(self, finding: Finding) -> None:
-        """Show how it stands with the result."""
+        """Show a message about the result."""
         self._verdict.show_finding(finding)
 
     def show_solved(self, solved: Solved, kept: str) -> None:
-        """Show a result; `kept` says what became of it."""
+        """Show a result; `kept` describes its use."""
         verdict = solved.verdict
         text = f"{verdict.name}: {verdict.reason}"
         self.show_finding(Finding("", HEALTHS[verdict.name], text, kept))

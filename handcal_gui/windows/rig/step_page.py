@@ -19,7 +19,7 @@ from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 
 class StepPage(QWidget):
-    """Fields on top, images in the middle, the result at the foot.
+    """Fields at the top, images in the middle, and the result at the bottom.
 
     Parameters
     ----------
@@ -62,23 +62,23 @@ class StepPage(QWidget):
         project.rig_changed.connect(self.show_known)
 
     def enter(self) -> None:
-        """Look for what the entries name, unless that was done."""
+        """Search the entered folders, unless already done."""
         raise NotImplementedError
 
     def keep(self) -> None:
-        """Keep what is entered, and look for the board where it is new."""
+        """Store the entries, and search new folders for the board."""
         raise NotImplementedError
 
     def solve(self) -> None:
-        """Solve from the images that are not left out."""
+        """Solve from the images that are not excluded."""
         raise NotImplementedError
 
     def show_known(self) -> None:
-        """Show what the rig has of this step."""
+        """Show the rig's present calibration of this part."""
         raise NotImplementedError
 
     def stop(self) -> None:
-        """End what runs in the background."""
+        """End background work."""
         for panel in self.panels:
             panel.stop()
         self.box.bar.stop()
@@ -91,7 +91,7 @@ class StepPage(QWidget):
         then: Callable[[], object],
         choose: ChooseSettings | None = None,
     ) -> None:
-        """Take images with cameras, into a folder each, and then look for the board in them."""
+        """Take images with cameras, one folder for each, and then search them for the board."""
 
         def end() -> None:
             panel.forget()

@@ -1,4 +1,4 @@
-"""The second step: where the depth camera is on the headset."""
+"""The second step: the pose of the depth camera on the headset."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from handcal_gui.windows.rig.solve import Solved, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage
 
 _HINT = (
-    "Take 20 or more pairs of images of the board, both at the same moment: near and far, all over "
-    "both views, tilted by 20° to 45° to every side. The two images of a pair end in the same "
-    "number, as depth07.png and headset07.png."
+    "Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both "
+    "views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end "
+    "in the same number, such as depth07.png and headset07.png."
 )
 
 
@@ -29,8 +29,8 @@ class StereoPage(StepPage):
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         imager = PathField("Depth imager's intrinsics", "file", INTRINSICS_FILES, "Not needed")
         imager.setToolTip(
-            "Only if the images are those of a colour imager beside the depth imager, and the "
-            "depth is not aligned to it; a RealSense from which images are taken here tells them."
+            "Needed only if the images come from a colour imager beside the depth imager and the "
+            "depth is not aligned to it. Take images… reads them from a RealSense."
         )
         pose = PathField(
             "Pose from depth to colour", "file", "Poses (*.yaml *.yml *.json)", "Not needed"
@@ -40,7 +40,7 @@ class StereoPage(StepPage):
             {
                 "depth_images": ("Depth camera's images", PathField("Depth images", "folder")),
                 "depth_intrinsics": ("its intrinsics", intrinsics_field("Depth intrinsics")),
-                "imager_intrinsics": ("Depth imager's own", imager),
+                "imager_intrinsics": ("Depth imager's intrinsics", imager),
                 "lens": ("Lens", lens_field()),
                 "headset_images": (
                     "Headset camera's images",
@@ -58,24 +58,24 @@ class StereoPage(StepPage):
         self.show_known()
 
     def enter(self) -> None:
-        """Look for the board in the folders, unless that was done."""
+        """Search the folders for the board, unless already done."""
         entries = self.project.inputs.stereo
         folders = entries.depth_images, entries.headset_images
         self.panel.look(folders, self.project.inputs.board, entries.dropped)
 
     def keep(self) -> None:
-        """Keep what is entered, and look for the board where it is new."""
+        """Store the entries, and search new folders for the board."""
         entries = self.form.take(self.project.inputs.stereo)
         self.project.enter(stereo=replace(entries, dropped=self.panel.dropped_of(entries.dropped)))
         self.enter()
 
     def solve(self) -> None:
-        """Solve from the pairs that are not left out."""
+        """Solve from the pairs that are not excluded."""
         work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
         self.box.run(work, self._show_solved)
 
     def show_known(self) -> None:
-        """Show what the rig has of this step."""
+        """Show the rig's present pose of the depth camera."""
         self.box.show_origin(self.project.rig.origins.get("T_H_D"))
 
     def _show_solved(self, solved: Solved) -> None:

@@ -1,4 +1,4 @@
-"""Taking images with cameras of this computer, or out of recordings and videos."""
+"""A dialog for taking images with cameras of this computer, or from recordings and videos."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from handcal_gui.widgets.live_images import Images
 
 
 class TakeDialog(QDialog):
-    """Shows what one or two cameras see, and takes images of it, all at the same moment.
+    """Shows live images of one or two cameras, and takes images with all of them at once.
 
     Parameters
     ----------
     folders : mapping of str to Path
-        What each camera is, and where its images go; those that are there stay.
+        Name of each camera and the folder for its images; existing images are kept.
     board : Board
-        Looked for in each image taken.
+        Board to search for in each image taken.
     choose : ChooseSettings
-        What is taken where images are taken by themselves.
+        Criteria for images taken automatically.
     realsense : RealSenseSettings
     open_source : callable
-        As `open_view_source`.
+        Like `open_view_source`.
     list_cameras : callable
-        As `list_viewpoints`.
+        Like `list_viewpoints`.
     """
 
     def __init__(
@@ -74,10 +74,10 @@ class TakeDialog(QDialog):
         self._take.setShortcut(Qt.Key.Key_Space)
         self._take.setToolTip("Space bar")
         self._by_itself = named(
-            QCheckBox("By itself"),
+            QCheckBox("Automatically"),
             "byItself",
-            help_text="Take an image whenever the board is at rest, sharp, and elsewhere than in "
-            "the images taken before.",
+            help_text="Take an image whenever the board is at rest, sharp, and at a position not "
+            "covered by earlier images.",
         )
         self._close = button("close", "Close")
         self._looker = LatestJob(self._take_if_new, self)
@@ -93,7 +93,7 @@ class TakeDialog(QDialog):
         self._bar.failed.connect(self._show_failure)
         self._lay_out()
         self._refresh()
-        self._found.show_finding(Finding("", Health.LIMITED, "choose the cameras, and show them"))
+        self._found.show_finding(Finding("", Health.LIMITED, "choose the cameras, and press Show"))
         self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._cameras.offer)
 
     @property
@@ -102,12 +102,12 @@ class TakeDialog(QDialog):
         return self._cameras.images
 
     def start(self) -> None:
-        """Show what the chosen cameras see."""
+        """Show the images of the chosen cameras."""
         self._stop_looking()
         self._cameras.start()
 
     def take(self) -> None:
-        """Keep the images shown, and look for the board in them."""
+        """Save the present images, and search them for the board."""
         images = self.shown_images
         if images is None or self._bar.is_busy:
             return
@@ -119,7 +119,7 @@ class TakeDialog(QDialog):
         self._bar.run("Looking for the board", work, self._show_taken)
 
     def done(self, result: int) -> None:
-        """Close cameras and dialog."""
+        """Close the cameras and the dialog."""
         self._stop_looking()
         self._cameras.stop()
         self._bar.stop()
@@ -134,7 +134,7 @@ class TakeDialog(QDialog):
         self._is_looking = False
 
     def _take_if_new(self, images: Images) -> str:
-        """Keep images if they are worth it; return why not, in the job's thread."""
+        """Save images if useful, otherwise return why not; runs in the job's thread."""
         why_not = self._selector.consider(see_board(images, self._board))
         if not why_not:
             keep_images(images, tuple(self._folders.values()))
@@ -145,7 +145,7 @@ class TakeDialog(QDialog):
         self._kept += not why_not
         if self._selector.is_done:
             self._by_itself.setChecked(False)
-            finding = Finding("", Health.GOOD, f"{self._choose.most} taken: that is enough")
+            finding = Finding("", Health.GOOD, f"{self._choose.most} taken: enough images")
         elif why_not:
             finding = Finding("", Health.LIMITED, f"{self._kept} taken; {why_not}")
         else:

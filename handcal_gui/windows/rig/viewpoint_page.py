@@ -1,4 +1,4 @@
-"""The third step: the intrinsics of the camera that is put where the eye will be."""
+"""The third step: the intrinsics of the viewpoint camera, which replaces the eye."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from handcal_gui.windows.rig.solve import Solved, solve_viewpoint
 from handcal_gui.windows.rig.step_page import StepPage
 
 _HINT = (
-    "Take 20 or more images of the board with the viewpoint camera, its focus fixed as it will be "
-    "behind the display: all over the view, up to its edges, tilted by 20° to 45° to every side."
+    "Take 20 or more images of the board with the viewpoint camera, with the focus that it will "
+    "have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in "
+    "all directions."
 )
 
 
 class ViewpointPage(StepPage):
-    """Images of the board, and the intrinsics solved from them; or a file that has them."""
+    """Images of the board and the intrinsics solved from them, or a file of intrinsics."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         given = PathField("Intrinsics", "file", INTRINSICS_FILES, "Solved from the images")
@@ -42,12 +43,12 @@ class ViewpointPage(StepPage):
         self.show_known()
 
     def enter(self) -> None:
-        """Look for the board in the folder, unless that was done."""
+        """Search the folder for the board, unless already done."""
         entries = self.project.inputs.viewpoint
         self.panel.look((entries.images,), self.project.inputs.board, entries.dropped)
 
     def keep(self) -> None:
-        """Keep what is entered, and look for the board where it is new."""
+        """Store the entries, and search a new folder for the board."""
         entries = self.form.take(self.project.inputs.viewpoint)
         dropped = self.panel.dropped_of(entries.dropped)
         self.project.enter(viewpoint=replace(entries, dropped=dropped))
@@ -55,12 +56,12 @@ class ViewpointPage(StepPage):
         self.enter()
 
     def solve(self) -> None:
-        """Solve from the images that are not left out."""
+        """Solve from the images that are not excluded."""
         entries, output = self.project.inputs.viewpoint, self.project.folder.viewpoint
         self.box.run(partial(solve_viewpoint, self.panel.shots, entries, output), self._show_solved)
 
     def show_known(self) -> None:
-        """Show whether there are intrinsics."""
+        """Show the file of intrinsics, if there is one."""
         self.box.show_origin(None)
         file = self.project.camera_file
         if file.exists():
@@ -68,7 +69,7 @@ class ViewpointPage(StepPage):
 
     def _show_solved(self, solved: Solved) -> None:
         is_bad = solved.verdict.name == "bad"
-        kept = "it is not used" if is_bad else "the displays are calibrated with it"
+        kept = "it is not used" if is_bad else "the displays will be calibrated with it"
         self.project.camera_solved()
         self.box.show_solved(solved, kept)
         self.panel.show_solved(solved)

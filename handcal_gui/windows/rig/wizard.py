@@ -34,40 +34,40 @@ _FIRST_SIZE = QSize(1240, 760)
 _RAIL_PX = 29 * SPACING_PX
 _SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
-    "Board": ("The board to take images of, and the rig to begin from.", None),
-    "Depth and headset camera": ("Where the depth camera is on the headset: T_H_D.", "T_H_D"),
-    "Viewpoint camera": ("The camera put where the wearer's eye will be.", None),
-    "Left display": ("Projection and place of the left eye's display.", "left"),
-    "Right display": ("Projection and place of the right eye's display.", "right"),
-    "Result": ("The rig as a whole: check, compare and save it.", None),
+    "Board": ("The calibration target and the initial rig.", None),
+    "Depth and headset camera": ("Pose of the depth camera on the headset: T_H_D.", "T_H_D"),
+    "Viewpoint camera": ("The camera in the position of the wearer's eye.", None),
+    "Left display": ("Projection and position of the left eye's display.", "left"),
+    "Right display": ("Projection and position of the right eye's display.", "right"),
+    "Result": ("The whole rig: check, compare and save it.", None),
 }
-"""By title: what the step is for, and the part of the rig that comes of it."""
+"""By title: the step's purpose, and the part of the rig that it calibrates."""
 
 
 class Page(Protocol):
-    """A page as the wizard needs it."""
+    """Interface of a page of the wizard."""
 
     def enter(self) -> None:
-        """Come into sight."""
+        """Prepare to be shown."""
 
     def stop(self) -> None:
-        """End what runs in the background."""
+        """End background work."""
 
 
 class RigWizard(QDialog):
-    """Leads through the offline calibration; everything entered is kept in a folder.
+    """Guides through the offline calibration; all entries are stored in a folder.
 
     Parameters
     ----------
     folder : ProjectFolder
-        A later wizard goes on from there.
+        Project folder; a later wizard resumes from it.
     realsense : RealSenseSettings, optional
-        How one is run that images are taken with.
+        Settings of a RealSense used to take images.
 
     Attributes
     ----------
     rig_saved : Signal(Path)
-        A rig file to be used for the next calibration.
+        Rig file to use for the next calibration.
     project : RigProject
     """
 
@@ -101,7 +101,7 @@ class RigWizard(QDialog):
             self._pages.append(page)
         self._back = button("rigBack", "Back")
         self._next = button("rigNext", "Next")
-        self._close = button("rigClose", "Close", help_text="Everything entered is kept")
+        self._close = button("rigClose", "Close", help_text="All entries are kept")
         for title in _STEPS:
             self._rail.addItem(QListWidgetItem(title))
         self._lay_out()
@@ -133,7 +133,7 @@ class RigWizard(QDialog):
         self._rail.setCurrentRow(step)
 
     def done(self, result: int) -> None:
-        """Keep everything, end what runs, and close."""
+        """Store all entries, end background work, and close."""
         for page in self._pages:
             page.stop()
         self.project.save()
@@ -145,7 +145,7 @@ class RigWizard(QDialog):
             super().keyPressEvent(event)
 
     def changeEvent(self, event: QEvent) -> None:
-        """Redraw the signs when the colours change."""
+        """Redraw the icons when the colours change."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange:
             self._refresh()
@@ -160,7 +160,7 @@ class RigWizard(QDialog):
         self._pages[step].enter()
 
     def _refresh(self) -> None:
-        """Mark the steps by what has come of them."""
+        """Mark each step with its state."""
         for row, title in enumerate(_STEPS):
             verdict = self._verdict(title)
             name, role = _SIGNS.get(verdict, ("wait", "muted"))
@@ -171,7 +171,7 @@ class RigWizard(QDialog):
             self._rail.item(row).setToolTip(verdict or "not done yet")
 
     def _verdict(self, title: str) -> str:
-        """Return how a step ended; empty if it has not."""
+        """Return a step's verdict; empty if it is not done."""
         origins = self.project.rig.origins
         part = _STEPS[title][1]
         if part is not None:

@@ -89,7 +89,7 @@ def test_one_camera_cannot_be_both(pair: Pair) -> None:
     for place in range(2):
         pair.choose(place, "RealSense, colour")
     pair.widget.start()
-    assert pair.said == ["one camera cannot be both: choose another"]
+    assert pair.said == ["both are the same camera: choose another for one of them"]
 
 
 def test_a_recording_is_shown_as_a_camera_is(qtbot: QtBot, pair: Pair) -> None:

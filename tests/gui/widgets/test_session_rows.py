@@ -41,7 +41,7 @@ def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
         assert len(cells) == len(ALIGNMENT_COLUMNS)
         assert cells[:2] == (str(number), "Both eyes")
         angle_deg = np.degrees(np.linalg.norm(alignment.rotation_rad))
-        assert float(cells[column(ALIGNMENT_COLUMNS, "Turned °")]) == pytest.approx(
+        assert float(cells[column(ALIGNMENT_COLUMNS, "Rotation °")]) == pytest.approx(
             angle_deg, abs=0.05
         )
         shown_mm = cells[column(ALIGNMENT_COLUMNS, "Left φ mm")].replace("−", "-").split()

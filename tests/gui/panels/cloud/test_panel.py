@@ -49,7 +49,7 @@ def _count(widget: QWidget, color: str) -> int:
 
 
 def test_empty_it_says_what_will_appear(panel: CloudPanel) -> None:
-    assert "Hold a hand up" in _view(panel).accessibleDescription()
+    assert "Hold a hand in front" in _view(panel).accessibleDescription()
     assert _legend(panel) == ["Cursor –", "Live hand –"]
 
 
@@ -81,7 +81,7 @@ def test_hand_beyond_the_guard_is_red_and_said_to_be(
     panel: CloudPanel, snapshot: MakeSnapshot
 ) -> None:
     panel.show_snapshot(snapshot(observation={"is_over_limit": True}))
-    assert "turned too far" in _view(panel).accessibleDescription()
+    assert "rotated too far" in _view(panel).accessibleDescription()
     assert _count(panel, colors().red) > 100
     assert _count(_view(panel), colors().live) == 0
 

@@ -57,7 +57,7 @@ def test_before_a_cursor_it_says_what_it_will_show(panel: RotationPanel, snapsho
 
 @pytest.mark.parametrize(
     ("rotation_deg", "expected"),
-    [((0.5, 0.5, 0.5), "✓ Hold still"), ((1, 8, 2), "✓ Near enough"), ((-9, 0, 4), "▲ Turn back")],
+    [((0.5, 0.5, 0.5), "✓ Hold still"), ((1, 8, 2), "✓ Within limit"), ((-9, 0, 4), "▲ Turn back")],
 )
 def test_the_word_says_whether_it_may_be_confirmed(
     panel: RotationPanel, snapshot: Make, rotation_deg: tuple[float, ...], expected: str
@@ -115,7 +115,7 @@ def test_another_cursor_begins_another_history(panel: RotationPanel, snapshot: M
 def test_after_the_alignment_it_asks_for_nothing(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(turned(snapshot, (0, 0, 5)))
     panel.show_snapshot(snapshot(State.ALIGNED))
-    assert text(panel, "advice") == "The alignment is taken."
+    assert text(panel, "advice") == "The alignment is confirmed."
     assert word(panel) == ""
 
 

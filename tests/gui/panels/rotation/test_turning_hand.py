@@ -9,11 +9,11 @@ from handcal.types import Float64
 from handcal_gui.panels.rotation.turning_hand import TurningHand
 
 NEAREST = {"x": (0, 0, -1), "y": (0, 0, -1), "z": (0, -1, 0)}
-"""Where the arrow's middle is: on the side of the wearer, or at the top."""
+"""Centre of the arrow: on the wearer's side, or at the top."""
 
 
 def arrow_centre(picture: TurningHand) -> Float64:
-    """Return the mean place, from the middle, of what has the arrow's colour."""
+    """Return the mean position, from the centre, of the pixels in the arrow's colour."""
     image = picture.grab().toImage()
     color = picture.palette().windowText().color()
     places = [

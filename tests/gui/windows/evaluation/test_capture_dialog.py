@@ -139,7 +139,7 @@ def test_captures_are_taken_one_after_the_other(
     technician.wait_for_instruction("centre/pose-1: show the virtual cube, cover the real one.")
     assert technician.said == "Taken: centre/pose-1/real.png, 3 faces of the cube."
     technician.button.click()
-    technician.wait_for_instruction("All captures are there.")
+    technician.wait_for_instruction("All captures have been taken.")
     assert not technician.button.isEnabled()
     assert sorted(path.name for path in folder.rglob("*.png")) == [
         "grid.png",

@@ -144,7 +144,7 @@ def test_one_runs_at_a_time(numbers: Any, student: Student) -> None:
     numbers.pauses_at = 0
     student.press("Run")
     student.window.show_page("methods")
-    student.wait_for_text("Numbers is running. One runs at a time.")
+    student.wait_for_text("Numbers is running. Only one can run at a time.")
     assert not student.button.isEnabled()
     student.window.show_page("noise")
     student.page.cancel()

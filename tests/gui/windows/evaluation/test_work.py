@@ -1,4 +1,4 @@
-"""What evaluations do, without a window."""
+"""Evaluations, tested without a window."""
 
 from __future__ import annotations
 

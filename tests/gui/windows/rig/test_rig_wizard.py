@@ -72,9 +72,9 @@ def test_a_rig_is_calibrated_saved_and_used(
 ) -> None:
     undone = "not done yet"
     assert marks(wizard) == ["good", *[undone] * 5]
-    assert "in the rig now" in solve(qtbot, wizard, STEREO)
-    assert "displays are calibrated with it" in solve(qtbot, wizard, VIEWPOINT)
-    assert "in the rig now" in solve(qtbot, wizard, LEFT)
+    assert "added to the rig" in solve(qtbot, wizard, STEREO)
+    assert "displays will be calibrated with it" in solve(qtbot, wizard, VIEWPOINT)
+    assert "added to the rig" in solve(qtbot, wizard, LEFT)
     assert undone not in marks(wizard)[:RIGHT]
     assert marks(wizard)[VIEWPOINT] == "needs more views"  # eight of them
     assert marks(wizard)[RIGHT:] == [undone, undone]

@@ -30,7 +30,7 @@ def test_a_rig_in_a_persons_units() -> None:
     cells = {row.label: row.cells for row in rig_rows(rig)}
     assert cells["Left: t(C0→V) x"] == ("-0.50 mm", "–")
     assert cells["Right: z(C0→S)"] == ("2.000 m", "–")
-    assert cells["T_H_D turn x"] == ("-15.000°", "0.057°")
+    assert cells["T_H_D rotation x"] == ("-15.000°", "0.057°")
     assert cells["T_H_D y"] == ("-30.00 mm", "0.20 mm")
     assert cells["Depth camera: fx"][0] == "1005.00 px"
 

@@ -1,4 +1,4 @@
-"""What the jobs do, against the truth of the rendered photographs."""
+"""The jobs, tested against the ground truth of rendered images."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def test_images_are_taken_by_themselves_until_they_are_enough(
     assert isinstance(by_itself, QCheckBox)
     start(qtbot, dialog)
     by_itself.click()
-    qtbot.waitUntil(lambda: said(dialog) == "2 taken: that is enough.")
+    qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
     assert not by_itself.isChecked()
     for folder in ("depth", "headset"):
         names = [path.name for path in sorted((tmp_path / folder).iterdir())]
