@@ -114,7 +114,7 @@ def _headset(settings: StationSettings, pairing_key: str) -> Finding:
     if settings.source != "simulator":
         return _limited(
             "the virtual headset knows nothing of a real hand",
-            "fit to look at the camera's picture; to calibrate, use a network headset",
+            "suitable only for viewing the camera image; to calibrate, use a network headset",
         )
     return _good("virtual, with a simulated wearer; started on this computer")
 
