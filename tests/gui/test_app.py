@@ -127,7 +127,7 @@ def test_it_ends_well_when_told_to(tmp_path: Path) -> None:
 
 
 def is_listening(pid: int) -> bool:
-    """Tell whether a process has said what to do on SIGTERM."""
+    """Return whether a process has a handler for SIGTERM."""
     status = Path(f"/proc/{pid}/status").read_text()
     (caught,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
     return bool(int(caught, 16) & 1 << signal.SIGTERM - 1)

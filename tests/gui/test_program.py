@@ -124,7 +124,7 @@ def live(technician: Technician, studio: Any) -> Technician:
 
 
 def can_start(technician: Technician) -> bool:
-    """Tell whether the start page offers to start a calibration."""
+    """Return whether the start page offers to start a calibration."""
     return bool(technician.child(QPushButton, "start").isEnabled())
 
 
@@ -139,7 +139,7 @@ def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT
 
 
 def is_turned(technician: Technician) -> bool:
-    """Tell whether the hand is seen that is not the cursor's."""
+    """Return whether the hand in view is rotated from the cursor."""
     seen = technician.snapshot.observation
     if seen is None or seen.rotation_rad is None:
         return False

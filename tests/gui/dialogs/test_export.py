@@ -1,4 +1,4 @@
-"""The export dialog: what is asked for is made, or nothing changes and the reason is told."""
+"""The export dialog: it writes the chosen formats, or changes nothing and shows the reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A finding is told by word and icon, not by colour alone, and mended by a click."""
+"""A finding is shown by a word and an icon, not by colour alone; a click fixes it."""
 
 from __future__ import annotations
 

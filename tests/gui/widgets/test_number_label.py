@@ -7,7 +7,7 @@ from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
 
 class _Requests(QObject):
-    """Counts how often a widget's layout is to be computed anew."""
+    """Counts the layout requests of a widget."""
 
     def __init__(self) -> None:
         super().__init__()

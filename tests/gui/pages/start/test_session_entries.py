@@ -1,4 +1,4 @@
-"""What the start page says of sessions that can be resumed, opened, or neither."""
+"""Entries of the start page for sessions that can be resumed, opened, or neither."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def test_directions(
 
 
 def test_scene_follows_the_mouse() -> None:
-    """What is in front moves right when turned to the right, and down when turned down."""
+    """A point in front moves right when the scene is rotated right, and down when rotated down."""
     near = np.array([[0.0, 0.0, -50.0]])
     orbit = Orbit().looking(Direction.FRONT)
     assert orbit.turned(-0.1, 0.0).project(near)[0, 0] > 1.0

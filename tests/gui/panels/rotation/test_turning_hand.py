@@ -9,7 +9,7 @@ from handcal.types import Float64
 from handcal_gui.panels.rotation.turning_hand import TurningHand
 
 NEAREST = {"x": (0, 0, -1), "y": (0, 0, -1), "z": (0, -1, 0)}
-"""Where the arrow's middle is: on the side of the wearer, or at the top."""
+"""Direction of the arrow's middle: towards the wearer, or the top."""
 
 
 def arrow_centre(picture: TurningHand) -> Float64:

@@ -1,4 +1,4 @@
-"""What evaluations do, without a window."""
+"""Evaluations, run without a window."""
 
 from __future__ import annotations
 

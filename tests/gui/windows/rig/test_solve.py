@@ -1,4 +1,4 @@
-"""What the jobs do, against the truth of the rendered photographs."""
+"""Results of the jobs, compared with the truth of rendered photographs."""
 
 from __future__ import annotations
 
