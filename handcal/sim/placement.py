@@ -49,7 +49,7 @@ class EyeView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slip:
+class PlacementError:
     """The error of a placement."""
 
     rotation_rad: Float64
@@ -172,7 +172,7 @@ def _offsets(view: EyeView, points_m: Float64) -> tuple[Float64, Float64]:
     return (seen_px - view.drawn_px[shown]).ravel(), J.reshape(-1, 3)
 
 
-def misplace(T_W_hand: Float64, eye_m: Float64, slip: Slip) -> Float64:
+def apply_placement_error(T_W_hand: Float64, eye_m: Float64, error: PlacementError) -> Float64:
     """Apply a placement error to a hand seen from `eye_m`: across and along the line of sight.
 
     Parameters
@@ -181,9 +181,9 @@ def misplace(T_W_hand: Float64, eye_m: Float64, slip: Slip) -> Float64:
         Already rotated by the error.
     eye_m : (3,) float64
         W.
-    slip : Slip
+    error : PlacementError
     """
     line_m = T_W_hand[:3, 3] - eye_m
     across = np.linalg.svd(line_m[None])[2][1:]
-    aside = Rotation.from_rotvec(slip.lateral_rad @ across)
-    return rigid(T_W_hand[:3, :3], eye_m + (1.0 + slip.depth_ratio) * aside.apply(line_m))
+    aside = Rotation.from_rotvec(error.lateral_rad @ across)
+    return rigid(T_W_hand[:3, :3], eye_m + (1.0 + error.depth_ratio) * aside.apply(line_m))

@@ -19,8 +19,8 @@ from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.placement import Slip
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_slip
+from handcal.sim.placement import PlacementError
+from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
 from handcal.types import EYES, METHODS, Float64, Intrinsics, Method
 
 FLOOR = "known pairs"
@@ -230,7 +230,7 @@ def _solve(
 
 def _solve_wearer(
     settings: NoiseSettings,
-    slip: float,
+    error_scale: float,
     rng: np.random.Generator,
     hand: int,
     trial: int,
@@ -239,7 +239,7 @@ def _solve_wearer(
     """Solve one eye's alignment by a wearer who looks through the displays."""
     rig, usual, eye = example_rig(), WearerSettings(), EYES[trial // settings.hands % 2]
     true_m = draw_eyes(rng, usual)[eye]
-    drawn = draw_slip(rng, usual)
+    drawn = draw_placement_error(rng, usual)
     alignment = overlay_by_eye(
         rng,
         study_hand(hand),
@@ -247,7 +247,11 @@ def _solve_wearer(
         {eye: true_m},
         settings.points,
         settings.depth_sigma_m,
-        slip=Slip(slip * drawn.rotation_rad, slip * drawn.lateral_rad, slip * drawn.depth_ratio),
+        placement_error=PlacementError(
+            error_scale * drawn.rotation_rad,
+            error_scale * drawn.lateral_rad,
+            error_scale * drawn.depth_ratio,
+        ),
     )
     for method in methods:
         found = solve_alignment(alignment, rig, method)[eye]

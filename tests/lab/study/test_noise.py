@@ -86,7 +86,7 @@ def test_more_noise_is_a_larger_error() -> None:
 
 
 def test_a_wearer_is_solved_as_well_as_the_hand_is_put() -> None:
-    steady, clumsy = (lengths_mm("wearer", slip, QUIET) for slip in (0.0, 4.0))
+    steady, clumsy = (lengths_mm("wearer", scale, QUIET) for scale in (0.0, 4.0))
     assert FLOOR not in steady
     assert steady["consistent"] < 1.0
     assert clumsy["consistent"] > 3.0 * steady["consistent"]
