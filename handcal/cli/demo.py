@@ -24,8 +24,6 @@ from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal.types import EYES, Eye, Rig
 
-Report = Callable[[str, float], None]
-
 _PATIENCE_S = 60.0
 _PATIENCE_STEPS = 300
 """Minimum number of station steps before giving up, so that a slow computer gets more time."""
@@ -48,7 +46,7 @@ class DemoSettings:
 
 
 def run_demo(
-    settings: DemoSettings, rig_path: Path, output: Path, report: Report
+    settings: DemoSettings, rig_path: Path, output: Path, report: Callable[[str, float], None]
 ) -> dict[str, Any]:
     """Calibrate one simulated wearer, and compare the result with the truth.
 
@@ -105,7 +103,9 @@ def run_demo(
     }
 
 
-def _follow_plan(station: Station, settings: DemoSettings, report: Report) -> list[Observation]:
+def _follow_plan(
+    station: Station, settings: DemoSettings, report: Callable[[str, float], None]
+) -> list[Observation]:
     """Do every planned alignment; solve and apply after each."""
     calibration = station.calibration
     each: tuple[tuple[Eye, ...], ...] = (

@@ -27,8 +27,8 @@ from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
 from handcal.rig.views import WorstView
 from handcal.types import Float64, Intrinsics
 
-Format: TypeAlias = Literal["opencv", "ros", "json"]
-FORMATS: tuple[Format, ...] = ("opencv", "ros", "json")
+CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
+FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
 JSON_VERSION = 1
 MAX_BYTES = 2**20
 _MAX_REACH_M = 10.0
@@ -106,7 +106,7 @@ def read_stereo(path: Path) -> StereoCalibration:
         raise FileError(f"{path}: {error}") from error
 
 
-def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: Format) -> None:
+def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: CalibrationFormat) -> None:
     """Write a camera's intrinsics, atomically.
 
     Raises
@@ -130,7 +130,7 @@ def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: Format) -> None:
         write_atomic(path, storage.releaseAndGetString().encode())
 
 
-def write_pose(path: Path, T_H_D: Float64, kind: Format) -> None:
+def write_pose(path: Path, T_H_D: Float64, kind: CalibrationFormat) -> None:
     """Write T_H_D, atomically.
 
     Raises

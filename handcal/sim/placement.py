@@ -39,7 +39,7 @@ class CursorMatch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EyeView:
+class CursorView:
     """The view of one open eye."""
 
     seen: Float64
@@ -99,7 +99,7 @@ def view_through(
     T_W_H: Float64,
     drawn: Float64,
     cursor_m: Float64,
-) -> EyeView:
+) -> CursorView:
     """Return one eye's view of the world and of the cursor.
 
     Parameters
@@ -118,11 +118,11 @@ def view_through(
     drawn_px = project(drawn @ invert(T_W_H), cursor_m)
     size_px = display.width_px - 0.5, display.height_px - 0.5
     drawn_px[~np.all((drawn_px >= -0.5) & (drawn_px <= size_px), axis=1)] = np.nan
-    return EyeView(seen, drawn_px)
+    return CursorView(seen, drawn_px)
 
 
 def overlay_hand(
-    surface_m: Float64, T_W_hand: Float64, views: Sequence[EyeView]
+    surface_m: Float64, T_W_hand: Float64, views: Sequence[CursorView]
 ) -> tuple[Float64, float] | None:
     """Translate a hand until it overlaps the cursor in all open eyes.
 
@@ -135,7 +135,7 @@ def overlay_hand(
         The hand's points that the cursor shows, in the hand's frame.
     T_W_hand : (4, 4) float64
         Initial pose; its rotation is kept.
-    views : sequence of EyeView
+    views : sequence of CursorView
         The open eyes.
 
     Returns
@@ -162,7 +162,7 @@ def overlay_hand(
     return rigid(T_W_hand[:3, :3], translation_m), float(np.sqrt(2.0 * np.mean(residual_px**2)))
 
 
-def _offsets(view: EyeView, points_m: Float64) -> tuple[Float64, Float64]:
+def _offsets(view: CursorView, points_m: Float64) -> tuple[Float64, Float64]:
     """Return, for drawn points, seen minus drawn (2N,) in px, and its Jacobian in the points."""
     shown = np.isfinite(view.drawn_px[:, 0])
     homogeneous = points_m[shown] @ view.seen[:, :3].T + view.seen[:, 3]

@@ -9,7 +9,7 @@ from handcal.geometry import invert, rigid, transform
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.placement import (
-    EyeView,
+    CursorView,
     PlacementError,
     apply_placement_error,
     match_cursor,
@@ -38,7 +38,7 @@ def surface_m(hand: HandModel) -> Float64:
     return transform(invert(T_W_HAND) @ T_W_D, points_m)
 
 
-def _views(surface_m: Float64, shift_m: Sequence[float], eyes: tuple[Eye, ...]) -> list[EyeView]:
+def _views(surface_m: Float64, shift_m: Sequence[float], eyes: tuple[Eye, ...]) -> list[CursorView]:
     return [
         view_through(
             RIG.eyes[eye],
@@ -83,7 +83,7 @@ def test_both_eyes_shifted_alike_agree_on_the_hand(surface_m: Float64) -> None:
     assert placed[1] < 2.0  # a translated hand is not quite what a shifted eye sees
 
 
-def _seen_px(view: EyeView, points_m: Float64) -> Float64:
+def _seen_px(view: CursorView, points_m: Float64) -> Float64:
     homogeneous = np.column_stack([points_m, np.ones(len(points_m))]) @ view.seen.T
     return homogeneous[:, :2] / homogeneous[:, 2:]
 

@@ -6,9 +6,9 @@ from time import perf_counter
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured, ReportShare
 from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
 from handcal.link.pairing import new_pairing_key
@@ -18,14 +18,14 @@ _LOSSES = 0.0, 0.3
 _PATIENCE_S = 5.0
 
 
-def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
+def measure_delivery(settings: BenchSettings, progress: ReportShare) -> Measured:
     """Measure the time until a cursor is acknowledged over loopback."""
     figures = []
     worst_ms = {}
     for done, loss in enumerate(_LOSSES, 1):
         durations_ms = _cursor_durations_ms(loss, settings)
         median_ms = float(np.median(durations_ms))
-        figures.append(Figure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
+        figures.append(BenchFigure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
         worst_ms[f"{loss:g}"] = max(durations_ms)
         progress(done / len(_LOSSES))
     return Measured(figures, {"worst_ms_at_loss": worst_ms})

@@ -16,10 +16,10 @@ from handcal.lab.bench.paper_simulation import measure_paper_simulation
 from handcal.lab.bench.scale import measure_scale
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.speed import measure_speed
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured, ReportShare
 from handcal.lab.bench.wearer import measure_wearer
 
-PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
+PARTS: dict[str, Callable[[BenchSettings, ReportShare], Measured]] = {
     "speed": measure_speed,
     "delivery": measure_delivery,
     "wearer": measure_wearer,

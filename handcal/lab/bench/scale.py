@@ -7,13 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Measured, Progress
+from handcal.lab.bench.trials import Measured, ReportShare
 from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
 from handcal.lab.study.run import Study, run_study
-from handcal.lab.study.store import Row
-from handcal.progress import Progress as TaskProgress
+from handcal.lab.study.store import StudyRow
+from handcal.progress import Progress
 
 # Each process makes its own hands; in a whole study this time is negligible.
 _HANDS = 2
@@ -21,7 +21,7 @@ _SPEED_UP = 1.7
 _PER_MINUTE = 2000.0
 
 
-def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
+def measure_scale(settings: BenchSettings, progress: ReportShare) -> Measured:
     """Run a small noise study in this process, then in two, including their start."""
     if not settings.study_trials:
         progress(1.0)
@@ -41,13 +41,15 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
     solved = sum(row["method"] != FLOOR for row in rows)
     return Measured(
         [
-            Figure(
+            BenchFigure(
                 "noise study: alignments solved a minute, two workers",
                 60.0 * solved / together_s,
                 "",
                 at_least=_PER_MINUTE,
             ),
-            Figure("noise study: two workers / one", alone_s / together_s, "", at_least=_SPEED_UP),
+            BenchFigure(
+                "noise study: two workers / one", alone_s / together_s, "", at_least=_SPEED_UP
+            ),
         ],
         {
             "alignments": len(study.cases),
@@ -58,9 +60,9 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
     )
 
 
-def _timed(study: Study, workers: int, progress: Progress) -> tuple[float, list[Row]]:
+def _timed(study: Study, workers: int, progress: ReportShare) -> tuple[float, list[StudyRow]]:
     with TemporaryDirectory() as folder:
         start_s = perf_counter()
-        shown = TaskProgress(report=lambda _what, share: progress(share))
+        shown = Progress(report=lambda _what, share: progress(share))
         rows = run_study(study, Path(folder), workers=workers, progress=shown)
         return perf_counter() - start_s, rows

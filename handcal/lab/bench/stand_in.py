@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from handcal.display import reprojection_arcmin
-from handcal.lab.bench.trials import Progress, run_trials, trial_hand
+from handcal.lab.bench.trials import ReportShare, run_trials, trial_hand
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
 from handcal.sim.overlay import overlay_by_eye
@@ -17,7 +17,9 @@ _POINTS = 3000
 _DEPTH_SIGMA_M = 0.001
 
 
-def reprojection_of_wearers(rig: Rig, worn_rig: Rig, wearers: int, progress: Progress) -> Float64:
+def reprojection_of_wearers(
+    rig: Rig, worn_rig: Rig, wearers: int, progress: ReportShare
+) -> Float64:
     """Return each wearer's mean reprojection error, arcmin, after one alignment with both eyes.
 
     They differ in eyes, hands and placement errors; wearer n is the same for every rig.

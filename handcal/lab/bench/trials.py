@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.study.trials import study_hand
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment, simulate_alignment
 from handcal.sim.hand import HandModel
@@ -19,9 +19,9 @@ from handcal.types import Float64
 
 Task = TypeVar("Task")
 Case = TypeVar("Case")
-Outcome = TypeVar("Outcome")
+Result = TypeVar("Result")
 
-Progress: TypeAlias = Callable[[float], None]
+ReportShare: TypeAlias = Callable[[float], None]
 """Called with the share done."""
 
 Errors: TypeAlias = Mapping[str, Float64]
@@ -34,13 +34,13 @@ _HANDS = 10
 class Measured:
     """The result of a part of the benchmark: headline figures, and details as JSON."""
 
-    figures: list[Figure]
+    figures: list[BenchFigure]
     details: Any
 
 
 def run_trials(
-    trial: Callable[[Task], Outcome], tasks: Sequence[Task], progress: Progress
-) -> list[Outcome]:
+    trial: Callable[[Task], Result], tasks: Sequence[Task], progress: ReportShare
+) -> list[Result]:
     """Run a trial for every task, with one thread per core; the order is kept."""
     outcomes = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -51,7 +51,7 @@ def run_trials(
 
 
 def collect_errors(
-    trial: Callable[[Case, int], Errors], cases: Sequence[Case], trials: int, progress: Progress
+    trial: Callable[[Case, int], Errors], cases: Sequence[Case], trials: int, progress: ReportShare
 ) -> dict[Case, Errors]:
     """Run trials 0, 1, … of every case, and stack their errors of φ.
 

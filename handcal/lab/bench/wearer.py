@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Errors, Measured, Progress, collect_errors, trial_hand
+from handcal.lab.bench.trials import Errors, Measured, ReportShare, collect_errors, trial_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
@@ -16,7 +16,7 @@ _ASIDE_M, _ALONG_M = 0.005, 0.010
 _BIAS_MM = 0.3
 
 
-def measure_wearer(settings: BenchSettings, progress: Progress) -> Measured:
+def measure_wearer(settings: BenchSettings, progress: ReportShare) -> Measured:
     """Measure the bias in φ3 for an eye 10 mm nearer to the display and 10 mm farther."""
     rig = example_rig()
 
@@ -45,8 +45,8 @@ def measure_wearer(settings: BenchSettings, progress: Progress) -> Measured:
     )
     return Measured(
         [
-            Figure("bias at φ3 = ±10 mm", bias_mm, "mm", at_most=_BIAS_MM),
-            Figure("share of φ3 that paper misses", 100 * float(missed), "%"),
+            BenchFigure("bias at φ3 = ±10 mm", bias_mm, "mm", at_most=_BIAS_MM),
+            BenchFigure("share of φ3 that paper misses", 100 * float(missed), "%"),
         ],
         rows,
     )

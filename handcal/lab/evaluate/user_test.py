@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from handcal.errors import FileError
-from handcal.export.tables import trial_rows
+from handcal.export.tables import corner_rows
 from handcal.progress import Progress
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import calibration_numbers
@@ -27,7 +27,7 @@ from handcal.statistics import (
 )
 
 CornerRow: TypeAlias = dict[str, Any]
-"""One corner of one trial: the columns of `trial_rows`, and whose it is."""
+"""One corner of one trial: the columns of `corner_rows`, and whose it is."""
 
 Unit: TypeAlias = Literal["wearer", "calibration"]
 """The unit that an interval takes for independent."""
@@ -155,7 +155,7 @@ def _corners(name: str, record: SessionRecord) -> Iterator[CornerRow]:
     """Yield the rows of a session; a wearer without name is one of their own."""
     calibrations = calibration_numbers(record.trials)
     whose = {"wearer": record.wearer or f"not named, {name}", "session": name}
-    for row in trial_rows(record.trials):
+    for row in corner_rows(record.trials):
         yield {**whose, "calibration": calibrations[row["trial"]], **row}
 
 

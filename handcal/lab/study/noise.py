@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from handcal.lab.study.run import Case, Study
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import floor_error_m, solve_trial, study_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
@@ -97,7 +97,7 @@ _Making: TypeAlias = "tuple[AlignmentSettings, float]"
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class NoiseSection:
     """A part of the study, in which one thing varies."""
 
     name: str
@@ -119,55 +119,57 @@ def _measured(settings: NoiseSettings, **changes: Any) -> _Making:
     return replace(usual, **changes), settings.angle_deg
 
 
-SECTIONS: Mapping[str, Section] = {
+SECTIONS: Mapping[str, NoiseSection] = {
     section.name: section
     for section in (
-        Section(
+        NoiseSection(
             "rotation",
             lambda settings: sorted({*settings.coarse_deg, *settings.fine_deg}),
             lambda settings, angle: (AlignmentSettings(settings.points, exact=False), angle),
             "rotation, °",
         ),
-        Section(
+        NoiseSection(
             "rotation, size kept",
             lambda settings: settings.kept_deg,
             lambda settings, angle: (AlignmentSettings(settings.points), angle),
             "rotation, °",
         ),
-        Section(
+        NoiseSection(
             "eye box",
             lambda settings: settings.shift_max_m,
             lambda settings, shift: _measured(settings, shift_max_m=shift),
             "each component of φ within ±, mm",
             1e3,
         ),
-        Section(
+        NoiseSection(
             "depth noise",
             lambda settings: settings.depth_sigmas_m,
             lambda settings, sigma: _measured(settings, depth_sigma_m=sigma),
             "σ of each point's depth, mm",
             1e3,
         ),
-        Section(
+        NoiseSection(
             "forearm",
             lambda settings: settings.forearms_m,
             lambda settings, forearm: _measured(settings, hand_forearm_m=forearm),
             "forearm of the hand's cloud, mm",
             1e3,
         ),
-        Section(
+        NoiseSection(
             "points",
             lambda settings: settings.counts,
             lambda settings, count: _measured(settings, count=int(count)),
             "points of each cloud",
         ),
-        Section(
+        NoiseSection(
             HANDS,
             lambda settings: range(settings.shapes),
             lambda settings, _hand: _measured(settings),
             "hand",
         ),
-        Section("wearer", lambda settings: settings.slips, None, "wearer's errors, × the usual"),
+        NoiseSection(
+            "wearer", lambda settings: settings.slips, None, "wearer's errors, × the usual"
+        ),
     )
 }
 
@@ -183,7 +185,7 @@ def noise_study(settings: NoiseSettings) -> Study:
     return Study("noise", settings, cases, noise_trial)
 
 
-def noise_trial(settings: NoiseSettings, case: Case) -> list[Row]:
+def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
     """Simulate one alignment and solve it by every method that its number is for.
 
     Returns
@@ -204,7 +206,7 @@ def noise_trial(settings: NoiseSettings, case: Case) -> list[Row]:
         if section.making is None
         else _solve(*section.making(settings, float(case["value"])), rng, hand, methods)
     )
-    rows: list[Row] = []
+    rows: list[StudyRow] = []
     for method, iterations, error_m in solved:
         errors_mm = dict(zip(ERRORS_MM, (1e3 * error_m).tolist(), strict=True))
         rows.append({**case, "hand": hand, "method": method, "iterations": iterations, **errors_mm})

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from handcal.export.figures import name_axes
 from handcal.lab.study.noise import ERRORS_MM, FLOOR, HANDS, SECTIONS, NoiseSettings
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
 from handcal.statistics import INTERVAL_METHOD, MeanInterval, mean_interval
@@ -75,7 +75,7 @@ class _Point:
 _Mean: TypeAlias = Callable[[_Point], float]
 
 
-def noise_report(settings: NoiseSettings, rows: Sequence[Row]) -> Report:
+def noise_report(settings: NoiseSettings, rows: Sequence[StudyRow]) -> Report:
     """Return the report of a noise study from all its rows."""
     sections = {name: _points([row for row in rows if row["section"] == name]) for name in SECTIONS}
     alignments = len({(row["section"], row["value"], row["trial"]) for row in rows})
@@ -93,7 +93,7 @@ def noise_report(settings: NoiseSettings, rows: Sequence[Row]) -> Report:
     )
 
 
-def _counts(settings: NoiseSettings, rows: Sequence[Row]) -> dict[str, str]:
+def _counts(settings: NoiseSettings, rows: Sequence[StudyRow]) -> dict[str, str]:
     solved = {
         method: f"{sum(row['method'] == method for row in rows):,}"
         for method in _COLORS
@@ -107,15 +107,15 @@ def _counts(settings: NoiseSettings, rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
-def _points(rows: Sequence[Row]) -> list[_Point]:
+def _points(rows: Sequence[StudyRow]) -> list[_Point]:
     """Return the errors by method and value."""
-    groups: dict[tuple[str, float], list[Row]] = {}
+    groups: dict[tuple[str, float], list[StudyRow]] = {}
     for row in rows:
         groups.setdefault((str(row["method"]), _number(row["value"])), []).append(row)
     return [_point(value, method, group) for (method, value), group in groups.items()]
 
 
-def _point(value: float, method: str, rows: Sequence[Row]) -> _Point:
+def _point(value: float, method: str, rows: Sequence[StudyRow]) -> _Point:
     errors_mm = np.array([[_number(row[name]) for name in ERRORS_MM] for row in rows])
     hands = [row["hand"] for row in rows]
     length, *components = (
@@ -271,8 +271,8 @@ def _draw(
     ax.set_ylim(bottom=0.0)
 
 
-def _figure_row(name: str, point: _Point) -> Row:
-    row: Row = {
+def _figure_row(name: str, point: _Point) -> StudyRow:
+    row: StudyRow = {
         "section": name,
         "value": point.value,
         "method": point.method,

@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias
 
 from handcal.errors import CancelledError
-from handcal.lab.study.store import Row, StudyFolder, holds_study
+from handcal.lab.study.store import StudyFolder, StudyRow, holds_study
 from handcal.lab.study.workers import open_workers
 from handcal.progress import Progress
 
@@ -35,7 +35,7 @@ class Study:
     settings: Any
     """A frozen dataclass of JSON-able fields, which can be pickled."""
     cases: Sequence[Case]
-    trial: Callable[[Any, Case], list[Row]]
+    trial: Callable[[Any, Case], list[StudyRow]]
     """Gives the rows of one case from `settings` and the case, its random numbers from these alone.
     A function of a module, so that other processes can import it; no number in its rows is NaN or
     infinite."""
@@ -48,7 +48,7 @@ def run_study(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress = Progress(),
-) -> list[Row]:
+) -> list[StudyRow]:
     """Run the cases of a study that are left, and return the rows of all cases in their order.
 
     The rows do not depend on the number of workers. Completed chunks of cases are kept in `folder`,
@@ -135,7 +135,7 @@ def _run_chunks(
     chunks: Mapping[int, Sequence[Case]],
     executor: Executor,
     progress: Progress,
-) -> Iterator[tuple[int, list[list[Row]]]]:
+) -> Iterator[tuple[int, list[list[StudyRow]]]]:
     """Yield the number of each chunk, and the rows of its cases, once all of them are done."""
     places = {
         executor.submit(_run_case, study.trial, study.settings, case): (number, place)
@@ -145,7 +145,7 @@ def _run_chunks(
     finished: SimpleQueue[Future[str]] = SimpleQueue()
     for future in places:
         future.add_done_callback(finished.put)
-    parts: dict[int, dict[int, list[Row]]] = {number: {} for number in chunks}
+    parts: dict[int, dict[int, list[StudyRow]]] = {number: {} for number in chunks}
     while parts:
         progress.check()
         try:
@@ -159,7 +159,7 @@ def _run_chunks(
             yield number, [part[place] for place in range(len(part))]
 
 
-def _run_case(trial: Callable[[Any, Case], list[Row]], settings: Any, case: Case) -> str:
+def _run_case(trial: Callable[[Any, Case], list[StudyRow]], settings: Any, case: Case) -> str:
     """Return the rows of a case as JSON: what is read again is just what is returned at once."""
     try:
         return json.dumps(trial(settings, case), allow_nan=False)

@@ -15,7 +15,7 @@ from handcal.lab.study.noise import (
     noise_trial,
 )
 from handcal.lab.study.run import Case
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.types import METHODS, Float64
 
 SETTINGS = replace(QUICK_NOISE, hands=1, depth_sigma_m=0.0)
@@ -92,7 +92,7 @@ def test_a_wearer_is_solved_as_well_as_the_hand_is_put() -> None:
     assert clumsy["consistent"] > 3.0 * steady["consistent"]
 
 
-def methods_of(rows: list[Row]) -> set[object]:
+def methods_of(rows: list[StudyRow]) -> set[object]:
     return {row["method"] for row in rows}
 
 
