@@ -334,7 +334,7 @@ def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Gri
 
 
 def views_of(paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()) -> tuple[View, ...]:
-    """Look for a board in images, with progress; leave those out that are dropped."""
+    """Look for a board in images, with progress; leave out the dropped ones."""
     from handcal.progress import Progress
     from handcal.rig.views import drop, image_files, read_views
 

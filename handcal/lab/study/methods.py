@@ -1,6 +1,7 @@
 """Comparison of calibration methods on the same simulated wearers: errors, and the wearers' time.
 
-Every case is a wearer, who does all that every method asks. `docs/methods.md` says what is assumed.
+Every case is a wearer, who does the alignments of every method. `docs/methods.md` lists the
+assumptions.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def compare_methods(settings: MethodSettings, case: Case) -> list[StudyRow]:
     corners of |x|, |y|, |z| in the headset's axes.
     """
     wearer, placement = study_wearer(settings, case)
-    # A method's wearer errs the same whatever other methods there are.
+    # A wearer's errors with one method do not depend on the other methods.
     seeds = np.random.SeedSequence([settings.seed, int(case["wearer"]), 1]).spawn(4)
     generators = [np.random.default_rng(seed) for seed in seeds]
     calibrations = [
@@ -123,7 +124,7 @@ def compare_methods(settings: MethodSettings, case: Case) -> list[StudyRow]:
 
 
 def study_wearer(settings: MethodSettings, case: Case) -> tuple[StudyWearer, WearerSettings]:
-    """Return a case's wearer and how far the wearer's overlays miss."""
+    """Return a case's wearer and the errors of the wearer's overlays."""
     number = int(case["wearer"])
     usual = WearerSettings()
     placement = replace(
@@ -163,7 +164,7 @@ def target_errors(wearer: StudyWearer, projections: Projections, depth_m: float)
 
 
 def method_rows(wearer: StudyWearer, found: MethodCalibration, case: Case) -> list[StudyRow]:
-    """Return a row for each distance of the target: what a calibration errs there."""
+    """Return a row for each distance of the target, with the errors of a calibration there."""
     row: StudyRow = {
         **case,
         "method": found.method,
@@ -190,7 +191,7 @@ def _meet(eyes_m: Sequence[Float64], rays: Sequence[Float64]) -> Float64:
 
 
 def rendered(wearer: StudyWearer, shift_m: Mapping[Eye, Float64]) -> Projections:
-    """Return what the rig renders with for given eye shifts φ, (3,) each."""
+    """Return the rig's projections for given eye shifts φ, (3,) each."""
     return {
         eye: eye_projection(wearer.rig.eyes[eye], shift_m[eye]) @ wearer.T_E_H(eye) for eye in EYES
     }

@@ -124,7 +124,7 @@ def _misalignment_table(rows: Sequence[StudyRow]) -> Table:
 
 
 def _eye_distance(settings: MethodSettings, rows: Sequence[StudyRow]) -> Section:
-    """Compare what a varying eye distance costs with what one displacement for two eyes must."""
+    """Compare the errors that a varying eye distance causes, by method, with the prediction."""
     sigma_m = settings.eye_distance_sigmas_m[1]
     depth_m = TARGET_DEPTHS_M[1]
     columns = [Column("method", "left"), Column("rms, set, arcmin"), Column("rms, varying, arcmin")]
@@ -148,9 +148,9 @@ def _eye_distance(settings: MethodSettings, rows: Sequence[StudyRow]) -> Section
 
 
 def predicted_cost_arcmin(sigma_m: float, depth_m: float) -> float:
-    """Return the rms error that an unseen eye distance leaves in each eye.
+    """Return the rms error in each eye that an unknown eye distance causes.
 
-    Half the deviation, seen at the target's depth against the display's.
+    It is the parallax of half the deviation between the depths of the target and the display.
     """
     distance_m = example_rig().eyes["left"].z_C0_S_m
     return float(60.0 * np.degrees(0.5 * sigma_m * (1.0 / depth_m - 1.0 / distance_m)))

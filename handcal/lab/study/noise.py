@@ -24,11 +24,11 @@ from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
 from handcal.types import EYES, METHODS, Float64, Intrinsics, Method
 
 FLOOR = "known pairs"
-"""Stands for a method: least squares with the true pairs, which only a turned hand disturbs."""
+"""Name of the lower bound: least squares with the true pairs, disturbed only by a rotated hand."""
 ERRORS_MM = "error_1_mm", "error_2_mm", "error_3_mm"
 """The columns of φ's error."""
 HANDS = "hand shape"
-"""The section whose values are people."""
+"""The section in which the hand varies."""
 
 # A D415's smaller images, which are drawn three times as fast, show enough points.
 _CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
@@ -50,7 +50,7 @@ class NoiseSettings:
     """The first so many of them, but for the section of hand shapes, are solved by ``linear``, and
     by ``paper``, which is slow."""
     hands: int = 20
-    """People, who come again; errors of one are not independent of one another."""
+    """Number of people, each with several alignments; the errors of one person are correlated."""
     points: int = 1000
     """Of each cloud."""
     depth_sigma_m: float = 0.001
@@ -186,7 +186,7 @@ def noise_study(settings: NoiseSettings) -> Study:
 
 
 def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
-    """Simulate one alignment and solve it by every method that its number is for.
+    """Simulate one alignment and solve it by every method that uses this trial number.
 
     Returns
     -------

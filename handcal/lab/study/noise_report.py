@@ -21,7 +21,7 @@ from handcal.types import Float64
 
 LINE_MM = 4.0
 _PUBLISHED_DEG = 9.0
-# Where rcICP and ICP are compared.
+# Rotations at which rcICP and ICP are compared.
 _COMPARED_DEG = 5.0, 9.0, 20.0, 40.0, 60.0
 _COLORS = {
     "consistent": "#0072b2",
@@ -164,7 +164,7 @@ def _lead(points: Sequence[_Point]) -> str:
 
 
 def _published(points: Sequence[_Point]) -> Table:
-    """Return what the paper found, and what is found here."""
+    """Return the paper's findings beside those of this study."""
     reach = f"within {LINE_MM:g} mm up to"
     rows = [
         (f"{method}: {what} {reach}", published, f"{_reach_deg(points, method, mean):g}°")
@@ -216,7 +216,7 @@ def _section(settings: NoiseSettings, name: str, points: Sequence[_Point]) -> Se
 def _shown(
     settings: NoiseSettings, name: str, points: Sequence[_Point]
 ) -> tuple[Sequence[_Point], Sequence[_Point]]:
-    """Return what the figure's left axes show, and its right ones."""
+    """Return the curves of the figure's left and right axes."""
     right = [point for point in points if point.method != "icp"]
     if name != "rotation":
         return points, right

@@ -18,7 +18,7 @@ from handcal.lab.study.workers import open_workers
 from handcal.progress import Progress
 
 Case: TypeAlias = dict[str, float | int | str]
-"""Names a cell of the study, and the wearer or trial in it: JSON-able."""
+"""Identifies a cell of the study and a wearer or trial in it; JSON-able."""
 
 RUNNING = "Running the trials"
 """The activity that `run_study` reports."""
@@ -58,7 +58,7 @@ def run_study(
     ----------
     study : Study
     folder : Path
-        Of this study alone; may hold part of it.
+        A folder for this study only; may contain completed parts of it.
     workers : int, optional
         Processes; one per core by default, and no other process than this one for 1.
     scheduler : str, optional
@@ -108,9 +108,9 @@ def resumable() -> Iterator[None]:
 
 
 def share_done(study: Study, folder: Path) -> float:
-    """Return which share of a study a folder holds, 0..1.
+    """Return the completed share of a study in a folder, 0..1.
 
-    A damaged chunk counts, though it will be done again: files are not read, so that this is quick.
+    A damaged chunk counts, although it will be repeated: to be quick, no file is read.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def _run_chunks(
 
 
 def _run_case(trial: Callable[[Any, Case], list[StudyRow]], settings: Any, case: Case) -> str:
-    """Return the rows of a case as JSON: what is read again is just what is returned at once."""
+    """Return the rows of a case as JSON, so that stored rows and new ones are identical."""
     try:
         return json.dumps(trial(settings, case), allow_nan=False)
     except Exception as error:

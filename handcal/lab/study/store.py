@@ -26,7 +26,7 @@ _LIBRARIES = "handcal", "numpy", "scipy", "opencv-python-headless"
 
 
 def holds_study(folder: Path) -> bool:
-    """Return whether a folder is that of a study."""
+    """Return whether a folder contains a study."""
     return (folder / _STUDY).exists()
 
 
@@ -49,7 +49,7 @@ class StudyFolder:
     Parameters
     ----------
     path : Path
-        Made if it is not there.
+        Created if missing.
     name : str
     settings : dict
         JSON-able.
@@ -123,7 +123,7 @@ def _sha256(value: object) -> str:
 
 
 def _differences(stored: Mapping[str, Any], study: Mapping[str, Any]) -> str:
-    """Return what the two differ in, as one line: empty if they are the same."""
+    """Return the differences as one line; empty if there are none."""
     parts = []
     for key in study:
         old, new = stored.get(key), study[key]

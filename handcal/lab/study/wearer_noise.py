@@ -1,7 +1,7 @@
 """Search of the wearers' errors with which the paper's method errs as in the paper's user test.
 
-A method comparison is worth no more than its wearers. Theirs err in what they overlay by multiples
-of `WearerSettings`' errors: across, in size and in rotation alike.
+A method comparison is only as good as its simulated wearers. Their overlay errors are multiples of
+`WearerSettings`' errors: across, in size and in rotation alike.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A simulated wearer who does what each calibration method asks: hands, points, a cube.
 
-What is aligned with what, and how far it misses, is made by rays through the displays; no method's
-equation takes part.
+Alignments and their errors are simulated by rays through the displays, without any method's
+equations.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _MPAAM_CORNERS = (0, 2, 4, 6, 7)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StudyWearer:
-    """Somebody who wears the example rig."""
+    """A person who wears the example rig."""
 
     rig: Rig
     hand: HandModel
@@ -47,7 +47,7 @@ class StudyWearer:
         return view_of_eye(self.rig.eyes[eye], np.eye(4))
 
     def sees(self, eye: Eye) -> Float64:
-        """Return (3, 4): on which pixel an eye sees a point of H, by the truth."""
+        """Return the true projection (3, 4) of an eye: pixels from points in H."""
         return eye_projection(self.rig.eyes[eye], self.true_shift_m[eye]) @ self.T_E_H(eye)
 
     def eye_m(self, eye: Eye) -> Float64:
@@ -156,7 +156,7 @@ def align_cube(
     wearer : StudyWearer
     rng : numpy.random.Generator
     placement : WearerSettings
-        How far the overlay misses, the same as a hand's.
+        Errors of the overlay, the same as those of a hand.
     tracking_sigma_m : float
         Of each corner, each axis.
 
