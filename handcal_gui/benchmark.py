@@ -26,7 +26,7 @@ from PySide6.QtWidgets import QApplication
 from handcal.camera.camera import Camera
 from handcal.geometry import rigid
 from handcal.io.closable import Closable
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.link.pairing import new_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
@@ -198,7 +198,7 @@ class _Measurement(QObject):
             QApplication.quit()
 
 
-def measure(frames: int) -> list[Figure]:
+def measure(frames: int) -> list[BenchFigure]:
     """Return the figures of a number of frames after a warm-up.
 
     Parameters
@@ -233,14 +233,16 @@ def measure(frames: int) -> list[Figure]:
     grown = watch.memory_mb[-1] / watch.memory_mb[len(watch.memory_mb) // 4]
     bare_s, first_s = (_start_s(code) for code in (_BARE_WINDOW, _FIRST_WINDOW))
     return [
-        Figure("camera frames taken", rate_hz, "Hz"),
-        Figure("event loop's delay, p99", _percentile(watch.delays_ms, 99), "ms", at_most=30.0),
-        Figure("frame to screen, p95", _percentile(watch.ages_ms, 95), "ms", at_most=80.0),
-        Figure("first window / bare window", first_s / bare_s, "", at_most=1.5),
-        Figure(
+        BenchFigure("camera frames taken", rate_hz, "Hz"),
+        BenchFigure(
+            "event loop's delay, p99", _percentile(watch.delays_ms, 99), "ms", at_most=30.0
+        ),
+        BenchFigure("frame to screen, p95", _percentile(watch.ages_ms, 95), "ms", at_most=80.0),
+        BenchFigure("first window / bare window", first_s / bare_s, "", at_most=1.5),
+        BenchFigure(
             f"memory at the end of {frames:,} frames / after a quarter", grown, "", at_most=1.05
         ),
-        Figure("memory at the end", watch.memory_mb[-1], "MB"),
+        BenchFigure("memory at the end", watch.memory_mb[-1], "MB"),
     ]
 
 

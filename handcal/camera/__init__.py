@@ -1,1 +1,1 @@
-"""Where frames come from: one interface for devices, recordings and the simulator."""
+"""Sources of frames: one interface for devices, recordings and the simulator."""

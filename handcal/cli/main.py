@@ -152,7 +152,7 @@ def load(name: str, module: str) -> Command:
 
 
 def _add(parser: Parser, entries: Mapping[str, Entry], words: Sequence[str]) -> None:
-    """Add commands to a parser, the one that `words` begin with complete with its options."""
+    """Add commands to a parser; only the command that begins `words` gets its options."""
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     # No option before a command takes a value.
     place = next((i for i, word in enumerate(words) if not word.startswith("-")), len(words))
@@ -167,7 +167,7 @@ def _add(parser: Parser, entries: Mapping[str, Entry], words: Sequence[str]) -> 
 
 
 class _Version(argparse.Action):
-    """Prints the version, which only then is looked up."""
+    """Prints the version; it is looked up only on request."""
 
     def __call__(self, *_: object) -> None:
         from importlib.metadata import version

@@ -47,7 +47,7 @@ def command(*options: Option, json: bool = False) -> Callable[[Run], Command]:
 
 
 def arg(*names: str, **settings: Any) -> Option:
-    """Return an argument of a command, given as to argparse's ``add_argument``."""
+    """Return an argument of a command; takes the arguments of argparse's ``add_argument``."""
     return lambda parser: parser.add_argument(*names, **settings)
 
 

@@ -18,7 +18,7 @@ from handcal.conventions import (
     openxr_view,
     unity_world_to_camera,
 )
-from handcal.export.outcome import Origin, SessionOutcome, printable
+from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
 from handcal.io.files import write_atomic, write_json
 from handcal.rig.rig_file import quoted
 from handcal.types import EYES, Eye, Projection
@@ -114,7 +114,7 @@ def _eye(outcome: SessionOutcome, eye: Eye, near_m: float, far_m: float) -> dict
 
 
 def _solution(
-    outcome: SessionOutcome, eye: Eye, origin: Origin, near_m: float, far_m: float
+    outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin, near_m: float, far_m: float
 ) -> dict[str, Any]:
     projection = outcome.projection(eye, origin)
     clip = opengl_projection(projection, near_m, far_m).tolist()

@@ -8,12 +8,12 @@ import numpy as np
 
 from handcal.export.figures import ResidualCells
 from handcal.register.results import Results
-from handcal.report.document import Row
+from handcal.report.document import FigureRow
 from handcal.session.trial import Trial
 from handcal.types import Eye, Float64
 
 
-def convergence_rows(results: Results) -> Iterator[Row]:
+def convergence_rows(results: Results) -> Iterator[FigureRow]:
     """Yield a row for every iteration of every alignment and eye."""
     for number, shifts in results.alignments.items():
         for eye, shift in shifts.items():
@@ -26,7 +26,7 @@ def convergence_rows(results: Results) -> Iterator[Row]:
                 }
 
 
-def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[Row]:
+def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[FigureRow]:
     """Yield a row for every cell of an alignment's residual maps."""
     for eye, of_eye in cells.items():
         for x_mm, y_mm, points, inliers, mean_mm in zip(
@@ -45,7 +45,7 @@ def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[R
 
 def overlay_rows(
     number: int, eye: Eye, outlines: Mapping[str, Mapping[str, Sequence[Float64]]]
-) -> Iterator[Row]:
+) -> Iterator[FigureRow]:
     """Yield a row for every corner of the outlines, by calibration and object."""
     for when, of_what in outlines.items():
         for what, closed in of_what.items():
@@ -62,7 +62,7 @@ def overlay_rows(
                     }
 
 
-def running_mean_rows(trials: Mapping[int, Trial]) -> Iterator[Row]:
+def running_mean_rows(trials: Mapping[int, Trial]) -> Iterator[FigureRow]:
     """Yield a row for every trial, with the mean of the eye's trials so far."""
     errors: dict[Eye, list[float]] = {}
     for number, trial in trials.items():

@@ -15,7 +15,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, Eye, Float64, Projection
 
-Origin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
+ShiftOrigin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 
 # φ solved again by another version of NumPy differs by rounding.
 _SAME_M = 1e-7
@@ -31,7 +31,7 @@ class SessionOutcome:
     """The session's own."""
     results: Results | None
     """All alignments solved again; None without alignments."""
-    shifts_m: Mapping[Eye, Mapping[Origin, Float64]]
+    shifts_m: Mapping[Eye, Mapping[ShiftOrigin, Float64]]
     """each (3,); every known φ of an eye, the final one first: fine-tuned by hand, solved, and the
     zero of the offline calibration."""
 
@@ -45,7 +45,7 @@ class SessionOutcome:
         """Time of the session's creation, UTC, ISO 8601."""
         return printable(self.record.events[0].time)
 
-    def final(self, eye: Eye) -> Origin:
+    def final(self, eye: Eye) -> ShiftOrigin:
         """Return the origin of the eye's final φ."""
         return next(iter(self.shifts_m[eye]))
 
@@ -53,12 +53,12 @@ class SessionOutcome:
         """Return the eye's final φ, (3,)."""
         return self.shifts_m[eye][self.final(eye)]
 
-    def is_applied(self, eye: Eye, origin: Origin) -> bool:
+    def is_applied(self, eye: Eye, origin: ShiftOrigin) -> bool:
         """Return whether the headset rendered with this φ of the eye at the end."""
         last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
         return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < _SAME_M)
 
-    def projection(self, eye: Eye, origin: Origin) -> Projection:
+    def projection(self, eye: Eye, origin: ShiftOrigin) -> Projection:
         """Return the projection of an eye for one of its φ."""
         display = self.record.rig.eyes[eye]
         P = projection_matrix(display, self.shifts_m[eye][origin])
@@ -91,8 +91,10 @@ def printable(text: str) -> str:
     return "".join(char if char.isprintable() else "\ufffd" for char in text[:_MAX_CHARACTERS])
 
 
-def _shifts_m(record: SessionRecord, results: Results | None, eye: Eye) -> dict[Origin, Float64]:
-    shifts_m: dict[Origin, Float64] = {}
+def _shifts_m(
+    record: SessionRecord, results: Results | None, eye: Eye
+) -> dict[ShiftOrigin, Float64]:
+    shifts_m: dict[ShiftOrigin, Float64] = {}
     if record.fine_tuned is not None and eye in record.fine_tuned:
         shifts_m["fine_tuned"] = record.fine_tuned[eye]
     if results is not None and eye in results.eyes:

@@ -17,18 +17,18 @@ from handcal.export.figure_rows import (
     running_mean_rows,
 )
 from handcal.export.figures import ResidualCells
-from handcal.export.outcome import Origin, SessionOutcome
-from handcal.export.tables import parameter_rows, trial_rows
+from handcal.export.outcome import SessionOutcome, ShiftOrigin
+from handcal.export.tables import corner_rows, parameter_rows
 from handcal.register.results import Results
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
-from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise
+from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise_trials
 from handcal.statistics import mean_interval
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
 
-_ORIGINS: Mapping[Origin, str] = {
+_ORIGINS: Mapping[ShiftOrigin, str] = {
     "fine_tuned": "fine-tuned by hand",
     "solved": "as solved",
     "offline": "offline calibration",
@@ -320,7 +320,7 @@ def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignmen
 
 def _user_test(outcome: SessionOutcome) -> Section:
     record = outcome.record
-    statistics = summarise(record.trials.values())
+    statistics = summarise_trials(record.trials.values())
     groups = {"all": statistics.total} if statistics.total else {}
     groups |= {f"{eye} eye": errors for eye, errors in statistics.by_eye.items()}
     groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
@@ -341,7 +341,7 @@ def _user_test(outcome: SessionOutcome) -> Section:
         "trial-errors",
         "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
         lambda axes: figures.draw_trial_errors(axes, record.trials.values()),
-        list(trial_rows(record.trials)),
+        list(corner_rows(record.trials)),
         height_mm=62.0,
         columns=2,
     )
@@ -413,7 +413,7 @@ def _error_cells(errors: ErrorStatistics) -> list[str]:
     ]
 
 
-def _shift_cells(outcome: SessionOutcome, eye: Eye, origin: Origin) -> list[str]:
+def _shift_cells(outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin) -> list[str]:
     if origin == "solved" and outcome.results is not None:
         return _with_sigma(outcome.results.eyes[eye])
     return [_mm(value) for value in outcome.shifts_m[eye][origin]]

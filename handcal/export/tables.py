@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.export.outcome import Origin, SessionOutcome
+from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.io.files import write_atomic
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.rows import rows_csv
@@ -68,7 +68,7 @@ def write_parameters(path: Path, outcome: SessionOutcome) -> None:
 
 def write_trials(path: Path, outcome: SessionOutcome) -> None:
     """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    _write(path, _TRIALS, outcome, trial_rows(outcome.record.trials))
+    _write(path, _TRIALS, outcome, corner_rows(outcome.record.trials))
 
 
 def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
@@ -105,7 +105,7 @@ def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
             }
 
 
-def _place(outcome: SessionOutcome, eye: Eye, origin: Origin) -> dict[str, Any]:
+def _place(outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin) -> dict[str, Any]:
     return {
         "eye": eye,
         "final": _yes(outcome.final(eye) == origin),
@@ -132,7 +132,7 @@ def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any
     }
 
 
-def trial_rows(trials: Mapping[int, Trial]) -> Iterator[dict[str, Any]]:
+def corner_rows(trials: Mapping[int, Trial]) -> Iterator[dict[str, Any]]:
     """Yield a row for every corner of every trial."""
     for number, trial in trials.items():
         for corner in range(len(trial.corners_E_m)):

@@ -87,7 +87,8 @@ def fit_match(
     distance_m : float
         z(C0→S).
     T_drawn : (4, 4) float64, optional
-        Map to the cursor as drawn, if not with the offline calibration; see `model.drawn`.
+        Map to the cursor as drawn, if not with the offline calibration: see
+        `model.cursor_displacement`.
     """
     T_cursor = T_E if T_drawn is None else T_drawn @ T_E
     T_back = np.asarray(np.linalg.inv(T_cursor))

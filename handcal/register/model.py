@@ -20,11 +20,11 @@ from handcal.types import Float64
 
 def predict(hand_m: Float64, shift_m: Float64, distance_m: float, *, exact: bool) -> Float64:
     """Return the cursor points that `hand_m` covers, (N, 3), all in E0(t_b)."""
-    update = drawn if exact else update_matrix
+    update = cursor_displacement if exact else update_matrix
     return transform(update(shift_m, distance_m), hand_m)
 
 
-def drawn(shift_m: Float64, distance_m: float) -> Float64:
+def cursor_displacement(shift_m: Float64, distance_m: float) -> Float64:
     """Return the (4, 4) affine map of E that puts a cursor where a projection with φ draws it.
 
     The equation above is for a cursor drawn with the offline calibration. A cursor drawn with

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from handcal.geometry import is_rigid, transform
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.fuse import with_eye_box
-from handcal.register.model import design, drawn
+from handcal.register.model import cursor_displacement, design
 from handcal.register.rcicp import Checkpoint, solve_icp, solve_linear, solve_paper
 from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
 
@@ -122,7 +122,7 @@ def solve_alignment(
     for eye in alignment.eyes:
         distance_m = rig.eyes[eye].z_C0_S_m
         T_E = _check_pose(alignment.T_E_W[eye])
-        T_drawn = drawn(alignment.drawn_shift_m[eye], distance_m)
+        T_drawn = cursor_displacement(alignment.drawn_shift_m[eye], distance_m)
         if method == "consistent":
             shifts[eye] = fit_match(match, T_E, distance_m, T_drawn)
         else:

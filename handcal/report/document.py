@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Row: TypeAlias = Mapping[str, float | int | str | bool | None]
+FigureRow: TypeAlias = Mapping[str, float | int | str | bool | None]
 """A row of numbers by column name; the names include units."""
 
 AXES_LEFT_MM = 13.0
@@ -50,7 +50,7 @@ class Figure:
     caption: str
     draw: Callable[[Sequence[Axes]], None]
     """Draws into the given axes; called once for each file that contains the figure."""
-    rows: Sequence[Row]
+    rows: Sequence[FigureRow]
     """Its data: the rows of its CSV file."""
     height_mm: float = 60.0
     columns: int = 1

@@ -64,7 +64,7 @@ def with_stereo(
     depth_intrinsics: Intrinsics | None = None,
     T_C_D: Float64 | None = None,
 ) -> Rig:
-    """Return `rig` with the depth camera's place calibrated.
+    """Return `rig` with the pose of the depth camera calibrated.
 
     Parameters
     ----------
@@ -73,14 +73,14 @@ def with_stereo(
     made : str, optional
         When, ISO 8601; now if not given.
     depth_intrinsics, T_C_D : Intrinsics, (4, 4) float64, optional
-        If the stereo calibration is of the depth camera's colour imager and depth is not aligned
-        to it: the depth imager's own, and from the depth to the colour imager, as the device
-        tells them.
+        Required if the stereo calibration is of the depth camera's colour imager and depth is not
+        aligned to it: the depth imager's own intrinsics, and the transform from the depth to the
+        colour imager, as the device reports them.
 
     Raises
     ------
     ViewsError
-        If the pairs do not determine the place.
+        If the pairs do not determine the pose.
     """
     if stereo.covariance is None:
         raise ViewsError("these pairs do not determine the pose of the depth camera: add others")

@@ -18,7 +18,7 @@ Int64: TypeAlias = NDArray[np.int64]
 
 DICTIONARIES = {name: getattr(cv2.aruco, name) for name in dir(cv2.aruco) if name[:5] == "DICT_"}
 MIN_CORNERS = 8
-"""Fewer corners of a board are not enough to use a view."""
+"""Minimum number of corners for a view to be used."""
 
 
 class BoardError(HandcalError):
@@ -34,18 +34,19 @@ class Board:
     """
 
     kind: BoardKind = "charuco"
-    """A ChArUco board may be seen in part, and tells which side is up. A checkerboard must be seen
-    whole. With an even number of squares along one side and an odd one along the other it tells
-    which side is up; otherwise it is taken to stand as upright as it can."""
+    """A ChArUco board may be partly visible, and its orientation is unambiguous. A checkerboard
+    must be fully visible. Its orientation is unambiguous if one side has an even and the other an
+    odd number of squares; otherwise the most upright orientation is assumed."""
     squares: tuple[int, int] = (10, 7)
     """(int, int); columns and rows of squares, 3 to 40."""
     square_m: float = 0.025
     marker_m: float = 0.016
     """Sides of a square and of a marker."""
     dictionary: str = "DICT_5X5_100"
-    """Of the markers, as OpenCV calls it."""
+    """OpenCV's name of the marker dictionary."""
     legacy: bool = False
-    """Printed by OpenCV before 4.6, which began with a white square if the rows are even."""
+    """True for a board printed by OpenCV before 4.6: with an even number of rows, it begins with a
+    white square."""
 
     def __post_init__(self) -> None:
         columns, rows = self.squares
@@ -67,7 +68,7 @@ class Board:
 
     @property
     def marker_dictionary(self) -> cv2.aruco.Dictionary:
-        """The markers that `dictionary` names."""
+        """The marker dictionary named by `dictionary`."""
         return cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary])
 
     @property
@@ -83,13 +84,13 @@ class BoardView:
     points_m: Float64
     """(N, 3); corners in the board's frame; z is 0."""
     pixels: Float64
-    """(N, 2); the same in the image."""
+    """(N, 2); the same corners in the image."""
     size: tuple[int, int]
     """(int, int); width and height of the image."""
     ids: Int64
     """(N,); their numbers on the board, ascending."""
     blur_px: float
-    """Width of the squares' edges in the image: 1 to 3 where it is sharp."""
+    """Blur width of the squares' edges in the image: 1 to 3 in a sharp image."""
 
     def __post_init__(self) -> None:
         freeze(self, "points_m", np.float64, None, 3)
@@ -106,7 +107,7 @@ def corners_m(board: Board) -> Float64:
 
 @lru_cache(maxsize=8)
 def charuco(board: Board) -> cv2.aruco.CharucoBoard:
-    """Return a ChArUco board as OpenCV knows it."""
+    """Return a ChArUco board as OpenCV's own type."""
     made = cv2.aruco.CharucoBoard(
         board.squares, board.square_m, board.marker_m, board.marker_dictionary
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from handcal.rig.board import MIN_CORNERS, Board
 from handcal.types import Float64, UInt8
 
-# Fewer markers than these are also found in leaves and carpets.
+# Fewer markers than this may be false detections, as in leaves or carpets.
 _ENOUGH_MARKERS = 4
 _FAMILIES = (
     "DICT_4X4_1000",
@@ -29,13 +29,13 @@ FindCorners: TypeAlias = Callable[[UInt8, Board], tuple[NDArray[np.int64], Float
 
 
 def explain_missing(gray: UInt8, board: Board, find: FindCorners) -> str:
-    """Return one line on why `find` gave too few corners.
+    """Return one line that explains why `find` returned too few corners.
 
     Parameters
     ----------
     gray : (H, W) uint8
     board : Board
-        The board looked for.
+        The board to find.
     find : callable
         `handcal.rig.board_finder.find_corners`.
     """
@@ -48,7 +48,7 @@ def explain_missing(gray: UInt8, board: Board, find: FindCorners) -> str:
 
 
 def light_trouble(gray: UInt8) -> str:
-    """Return what is wrong with an image's light; an empty text if nothing is."""
+    """Return the problem of an image's exposure; an empty text if there is none."""
     low, high = np.percentile(gray, (2, 98))
     if high - low >= 25:
         return ""
@@ -58,7 +58,7 @@ def light_trouble(gray: UInt8) -> str:
 
 
 def why_not_plain(gray: UInt8) -> str:
-    """Return that a checkerboard that was found has markers; an empty text if it has none."""
+    """Return a message if the checkerboard found has markers; else an empty text."""
     seen = _markers_of_some_family(gray)
     return f"a board with markers ({seen}) is seen, not a plain checkerboard" if seen else ""
 
@@ -113,7 +113,7 @@ def _markers(gray: UInt8, dictionary: cv2.aruco.Dictionary) -> list[int]:
 
 
 def _markers_of_some_family(gray: UInt8) -> str:
-    """Return the family of dictionaries of which most markers are seen, or an empty text."""
+    """Return the dictionary family with the most markers detected, or an empty text."""
     counts = {
         name: len(_markers(gray, cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))))
         for name in _FAMILIES
@@ -125,7 +125,7 @@ def _markers_of_some_family(gray: UInt8) -> str:
 
 
 def _checkerboard_size(gray: UInt8) -> tuple[int, int] | None:
-    """Return how many squares a checkerboard of any size has, the fewer first, if one is seen."""
+    """Return the numbers of squares of a checkerboard, the smaller first; None if not found."""
     found, _, meta = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), cv2.CALIB_CB_LARGER)
     if not found:
         return None

@@ -1,4 +1,4 @@
-"""Finds a calibration board's corners in an image."""
+"""Detection of a calibration board's corners in an image."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, 
 from handcal.rig.board_diagnosis import explain_missing, why_not_plain
 from handcal.types import Float32, Float64, UInt8
 
-# Corners found further from where the others put them belong to something else, in squares.
+# In squares: corners farther than this from the place predicted by the others are rejected.
 _STRAY_SQUARES = 0.5
 _MIN_SIDE_PX = 64
 
@@ -22,11 +22,11 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     Parameters
     ----------
     image : (H, W) or (H, W, 3) uint8
-        Grey or RGB, as the camera sees it: lens included, not mirrored. That a plain checkerboard
-        is mirrored cannot be seen in one image.
+        Grey or RGB, with lens distortion, not mirrored. A mirrored checkerboard cannot be
+        recognised from one image.
     board : Board
     explain : bool
-        Whether to find out why there is no board, which takes longer than finding one.
+        Also diagnose why no board was found; this takes longer than the detection.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
 
 
 def find_corners(gray: UInt8, board: Board) -> tuple[Int64, Float64]:
-    """Return what corners are seen: numbers (N,) and pixels (N, 2), not yet refined or checked."""
+    """Return the detected corners: numbers (N,) and pixels (N, 2), not yet refined or checked."""
     if board.kind == "checkerboard":
         return _find_checkerboard(gray, board)
     pixels, ids, _, _ = cv2.aruco.CharucoDetector(charuco(board)).detectBoard(gray)
@@ -77,7 +77,7 @@ def _find_checkerboard(gray: UInt8, board: Board) -> tuple[Int64, Float64]:
     columns, rows = board.inner
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
     found, corners = cv2.findChessboardCorners(gray, board.inner, flags=flags)
-    if not found:  # slower, and now and then the only one to see it
+    if not found:  # slower, but sometimes the only one that finds it
         found, corners = cv2.findChessboardCornersSB(gray, board.inner)
     if not found:
         return np.empty(0, np.int64), np.empty((0, 2))
@@ -95,7 +95,7 @@ def _upright(gray: UInt8, grid: Float64) -> Float64:
 
 
 def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
-    """Return whether the first square is black, as printed, and how far x points to the right."""
+    """Return whether the first square is black, as printed, and the component of x to the right."""
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
     row, column = np.indices(middles.shape[:2])
     shades = shades_at(gray, middles)
@@ -105,7 +105,7 @@ def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
 
 
 def _fits(points_m: Float64, pixels: Float64) -> NDArray[np.bool_]:
-    """Tell which corners lie where a plane's image has them, lens distortion allowed."""
+    """Return which corners agree with the image of a plane, allowing for lens distortion."""
     off_px = _STRAY_SQUARES * float(np.median(_spacings_px(pixels)))
     H, inliers = cv2.findHomography(points_m[:, :2], pixels, cv2.RANSAC, off_px)
     return np.zeros(len(pixels), np.bool_) if H is None else np.asarray(inliers).ravel() > 0
@@ -124,7 +124,7 @@ def _goes_on(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> bool:
 
 
 def _checker(gray: UInt8, corners: Float64, H: Float64) -> Float64:
-    """Return how much the squares around each corner alternate; half as much at a board's edge."""
+    """Return the contrast between the squares around each corner; half of it at a board's edge."""
     quadrants = 0.3 * np.array([[-1, -1], [1, 1], [-1, 1], [1, -1]])
     places = cv2.perspectiveTransform(corners[:, None] + quadrants, H)
     shades = shades_at(gray, np.asarray(places, dtype=np.float64))
@@ -133,10 +133,10 @@ def _checker(gray: UInt8, corners: Float64, H: Float64) -> Float64:
 
 
 def _refine(gray: UInt8, pixels: Float64, board: Board) -> Float64:
-    """Refine corners in windows that hold no other corner.
+    """Refine corners in windows that contain no other corner.
 
     OpenCV's usual radius of 11 pixels reaches the edges of the next squares on a small, steep or
-    turned board, which more than doubles the calibration's residual on its own stereo sample.
+    rotated board. On OpenCV's own stereo sample this more than doubles the calibration's residual.
     """
     gap = (1 - board.marker_m / board.square_m) / 2 if board.kind == "charuco" else 1.0
     radius = int(np.clip(min(0.3, 0.9 * gap) * _spacings_px(pixels).min(), 2, 11))
@@ -157,7 +157,7 @@ def _spacings_px(pixels: Float64) -> Float64:
 
 
 def _blur_px(gray: UInt8, ids: Int64, pixels: Float64, board: Board) -> float:
-    """Return the width of the squares' edges: contrast over steepness, halfway between corners."""
+    """Return the blur width of the squares' edges, in pixels: contrast divided by gradient."""
     starts, ends = _neighbours(ids, pixels, board.inner[0])
     across = (ends - starts)[:, ::-1] * [1, -1]
     across /= np.linalg.norm(across, axis=1, keepdims=True)
@@ -184,7 +184,7 @@ def _neighbours(ids: Int64, pixels: Float64, columns: int) -> tuple[Float64, Flo
 
 
 def shades_at(gray: UInt8 | Float32, places: Float64) -> Float64:
-    """Return an image's shades at places of shape (..., 2), in pixels."""
+    """Return an image's grey values at positions of shape (..., 2), in pixels."""
     x, y = places.reshape(-1, 1, 2).astype(np.float32).T
     shades = cv2.remap(gray, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(shades, dtype=np.float64).reshape(places.shape[:-1])

@@ -1,4 +1,4 @@
-"""A board to put up: as an image for a screen, or to scale on paper."""
+"""A board to print or show: as an image for a screen, or to scale on paper."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def write_board_pdf(path: Path, board: Board, paper: Paper = "a4") -> None:
 
 
 def black_rectangles_m(board: Board) -> Float64:
-    """Return what is black on the board: (N, 4) left, top, right, bottom in its frame."""
+    """Return the black rectangles of the board: (N, 4) left, top, right, bottom in its frame."""
     columns, rows = board.squares
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(columns), np.arange(rows)))
     # An older OpenCV began with a white square if the rows are even.
@@ -82,7 +82,7 @@ def _marker_cells(board: Board) -> Float64:
 def marker_cells_m(
     dictionary: cv2.aruco.Dictionary, marker: int, corner_m: ArrayLike, side_m: float
 ) -> Float64:
-    """Return a marker's black cells, side by side ones in one: (N, 4) left, top, right, bottom.
+    """Return a marker's black cells, adjacent ones merged: (N, 4) left, top, right, bottom.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def marker_cells_m(
     bits = cv2.aruco.generateImageMarker(dictionary, marker, across)
     cells = []
     for row, line in enumerate(bits):
-        # Where black begins and ends: gaps between cells of their own would show in print.
+        # Start and end of each black run: gaps between separate cells would be visible in print.
         ends = np.flatnonzero(np.diff(np.concatenate([[255], line, [255]]).astype(int)))
         cells += [[start, row, end, row + 1] for start, end in ends.reshape(-1, 2)]
     return np.tile(corner_m, 2) + np.array(cells) * side_m / across
@@ -107,7 +107,7 @@ def _size_m(board: Board) -> Float64:
 
 
 def _caption(board: Board) -> str:
-    """Return what is printed below the board."""
+    """Return the caption below the board."""
     columns, rows = board.squares
     text = f"{board.kind} {columns}x{rows}, square {1e3 * board.square_m:g} mm"
     if board.kind == "charuco":

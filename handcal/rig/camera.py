@@ -1,4 +1,4 @@
-"""A camera's intrinsics from views of a board, and how far to trust them.
+"""A camera's intrinsics from views of a board, with their uncertainty.
 
 The method is Zhang's, "A flexible new technique for camera calibration", 2000, by OpenCV.
 """
@@ -50,40 +50,40 @@ MIN_VIEWS = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """Settings of the solver for intrinsics, and limits of good ones."""
+    """Settings of the solver for intrinsics, and limits of a good result."""
 
     lens: LensModel = "full"
     """Distortion: none; k1, k2; k1, k2, p1, p2, k3; the same and k4 to k6."""
     good_views: int = 10
-    """With fewer, more are asked for."""
+    """With fewer views, the verdict asks for more."""
     good_coverage: float = 0.6
-    """Share of the image's cells that must have had a corner."""
+    """Minimum share of the image's cells that contain a corner in any view."""
     good_spread_rad: float = 0.2
     """Least spread of the boards' normals about their mean, RMS."""
     max_focal_sigma: float = 0.001
     bad_focal_sigma: float = 0.03
-    """Relative standard deviation of the focal lengths: up to which they are good, and from which
-    on they are as good as unknown."""
+    """Relative standard deviation of the focal lengths: good up to the first, useless from the
+    second."""
     max_rms_px: float = 1.0
-    """Above, something is wrong: board, focus or exposure."""
+    """A larger residual indicates a fault: board, focus or exposure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraCalibration:
-    """A camera's intrinsics, and how far to trust them."""
+    """A camera's intrinsics, with their uncertainty."""
 
     intrinsics: Intrinsics
     covariance: Float64 | None
     """(P, P); of fx, fy, cx, cy and the coefficients solved for, in order; None if not
     determined."""
     rms_px: float
-    """Root mean square distance of seen and expected corners."""
+    """Root mean square distance between detected and predicted corners."""
     residuals_px: Mapping[str, float]
-    """The same of each view."""
+    """The same for each view."""
     T_C_B: Mapping[str, Float64]
     """each (4, 4); the board's pose in each view."""
     dropped: tuple[str, ...]
-    """Views left out by a person."""
+    """Views excluded by the user."""
     coverage: Coverage
     worst: WorstView
     verdict: CalibrationVerdict
@@ -146,7 +146,7 @@ def calibrate_camera(
 
 
 def linearise(seen: BoardView, T_C_B: Float64, intrinsics: Intrinsics) -> tuple[Float64, Float64]:
-    """Return residuals (N, 2), seen less expected, px, and the derivatives of the expected.
+    """Return residuals (N, 2), detected minus predicted, px, and the derivatives of the predicted.
 
     The derivatives, (2N, 10 + coefficients), are by the rotation vector, the translation, fx, fy,
     cx, cy and the coefficients.
@@ -161,7 +161,7 @@ def linearise(seen: BoardView, T_C_B: Float64, intrinsics: Intrinsics) -> tuple[
 
 
 def solved_columns(lens: LensModel) -> list[int]:
-    """Return which of `linearise`'s derivatives are by intrinsics that a lens model solves for."""
+    """Return the columns of `linearise`'s derivatives that belong to a lens model's intrinsics."""
     return [*range(6, 10), *(10 + number for number in _SOLVED[lens])]
 
 
@@ -171,7 +171,7 @@ def lens_flags(lens: LensModel) -> int:
 
 
 def refined(intrinsics: Intrinsics, K: ArrayLike, coefficients: ArrayLike) -> Intrinsics:
-    """Return the intrinsics with OpenCV's result, as many coefficients as there were."""
+    """Return the intrinsics from OpenCV's result, with the same number of coefficients."""
     K, found = np.asarray(K), np.asarray(coefficients).ravel()
     return replace(
         intrinsics,
@@ -190,7 +190,7 @@ def tilt(T_C_B: Float64, seen: BoardView) -> float:
 
 
 def normal_spread(poses: Mapping[str, Float64]) -> float:
-    """Return how far the boards' normals spread about their mean, RMS, rad."""
+    """Return the RMS spread of the boards' normals about their mean, rad."""
     normals = np.stack([T[:3, 2] for T in poses.values()])
     mean = normals.mean(axis=0)
     mean /= np.linalg.norm(mean)

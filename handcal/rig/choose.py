@@ -17,16 +17,16 @@ class ChooseSettings:
     most: int = 25
     """Views, or pairs of views."""
     rest_share: float = 0.003
-    """A board at rest has moved by less since the moment looked at before: mean distance of its
-    corners, of the image's width. The images of a pair are seldom taken quite together."""
+    """Largest motion of a board at rest since the previous images: mean distance of its corners, as
+    a share of the image's width. The images of a pair are rarely exactly simultaneous."""
     apart_share: float = 0.06
-    """Least difference from every view kept before; 0 keeps similar views as well."""
+    """Minimum difference from every view kept before; 0 keeps similar views as well."""
     most_blur_px: float = 4.0
     """Width of the squares' edges."""
 
 
 ALIKE = ChooseSettings(most=5, apart_share=0.0)
-"""A few views by a camera that stands still, as of a display's grid."""
+"""A few views from a fixed camera, as of a display's grid."""
 
 
 class ViewSelector:
@@ -67,7 +67,7 @@ class ViewSelector:
 
 
 def _moved_share(a: BoardView, b: BoardView) -> float:
-    """Return the mean distance of the corners that both show, of the image's width."""
+    """Return the mean distance of the corners found in both, as a share of the image's width."""
     _, of_a, of_b = np.intersect1d(a.ids, b.ids, assume_unique=True, return_indices=True)
     if not len(of_a):
         return np.inf

@@ -25,16 +25,16 @@ class RigDifference:
     name: str
     """Name of the difference."""
     value: float
-    """By how much; not negative."""
+    """Size of the difference; not negative."""
     unit: str
     """mm, °, px, ′ or %."""
 
 
 def compare_rigs(a: Rig, b: Rig) -> tuple[RigDifference, ...]:
-    """Return by how much rig `b` differs from rig `a`, part by part.
+    """Return the differences between rig `b` and rig `a`, part by part.
 
-    Each eye ends with the mean distance, seen from C0, between what both rigs draw of the user
-    test's target, as the depth camera tracks it.
+    The last difference of each eye is the mean distance, seen from C0, between the user test's
+    target as drawn by each rig when the depth camera tracks it.
     """
     differences = _between_poses("T_H_D", a.T_H_D, b.T_H_D)
     differences.append(
@@ -73,7 +73,7 @@ def _distance(a: Float64, b: Float64) -> float:
 
 
 def _pinhole_move_px(a: Intrinsics, b: Intrinsics) -> float:
-    """Return the largest distance between where both see the points that `a` has on its image."""
+    """Return the largest distance between the pixels of both for points in the image of `a`."""
     x = (np.linspace(0.0, a.width - 1.0, 9) - a.cx) / a.fx
     y = (np.linspace(0.0, a.height - 1.0, 9) - a.cy) / a.fy
     points_m = np.dstack([*np.meshgrid(x, y), np.ones((9, 9))]).reshape(-1, 3)
@@ -82,7 +82,7 @@ def _pinhole_move_px(a: Intrinsics, b: Intrinsics) -> float:
 
 
 def _display_move_px(a: EyeDisplay, b: EyeDisplay) -> float:
-    """Return the largest distance on the display between where both have the same ray from C0."""
+    """Return the largest distance on the display between both pixels of the same ray from C0."""
     x, y = np.linspace(0.0, a.width_px - 1.0, 9), np.linspace(0.0, a.height_px - 1.0, 9)
     pixels = np.dstack([*np.meshgrid(x, y), np.ones((9, 9))]).reshape(-1, 3)
     rays = np.linalg.solve(a.K @ a.H0, pixels.T).T
@@ -91,7 +91,7 @@ def _display_move_px(a: EyeDisplay, b: EyeDisplay) -> float:
 
 
 def _drawn_apart(a: Rig, b: Rig, eye: Eye) -> float:
-    """Return the mean distance between what both draw of a target before the eye of `a`, arcmin."""
+    """Return the mean distance, arcmin, between both drawings of a target for the eye of `a`."""
     target_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
     T_D_E = invert(view_of_eye(a.eyes[eye], np.eye(4)) @ a.T_H_D)
     target_D_m = transform(T_D_E, target_E_m)

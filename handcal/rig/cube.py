@@ -1,4 +1,4 @@
-"""A cube with an ArUco marker on every face: its description, and where it is in an image."""
+"""A cube with an ArUco marker on every face: its description and its detection in an image."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _AXES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 }
 # From the middle of a face to the corners of its marker, as OpenCV orders them.
 _AROUND = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-# Corners farther from where the pose puts them belong to another cube, in markers' sides.
+# In marker sides: corners farther than this from their predicted place belong to another cube.
 _MISFIT_SIDES = 0.05
 
 
@@ -48,18 +48,18 @@ _FAINT = 0.3  # slopes below this share of the steepest are noise
 class Cube:
     """A cube with one marker in the middle of each face, upright in the printed net.
 
-    Its frame has the origin in the cube's middle. Who looks at the front has x to the right, y
-    down and z into the cube. The net is left, front, right and back side by side, top above the
-    front, bottom below it.
+    Its frame has the origin in the cube's middle. Seen from the front, x points right, y down and z
+    into the cube. The net is left, front, right and back side by side, top above the front, bottom
+    below it.
     """
 
     side_m: float = 0.060
     marker_m: float = 0.045
     """Sides of a face and of a marker, as measured on the cube."""
     dictionary: str = "DICT_4X4_50"
-    """Of the markers, as OpenCV calls it."""
+    """OpenCV's name of the marker dictionary."""
     ids: tuple[int, int, int, int, int, int] = (0, 1, 2, 3, 4, 5)
-    """The markers on front, right, back, left, top and bottom."""
+    """Marker numbers on front, right, back, left, top and bottom."""
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.side_m <= 1.0:
@@ -76,7 +76,7 @@ class Cube:
 
     @property
     def marker_dictionary(self) -> cv2.aruco.Dictionary:
-        """The markers that `dictionary` names."""
+        """The marker dictionary named by `dictionary`."""
         return cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary])
 
 
@@ -174,7 +174,7 @@ def _explain_missing(image: UInt8, cube: Cube, ids: list[int]) -> str:
 
 
 def refine_corners(gray: UInt8, corners_px: Float64, cells: int) -> Float64:
-    """Return a marker's corners, (4, 2), found again by a line through each of its edges.
+    """Return a marker's corners, (4, 2), refined by fitting a line to each of its edges.
 
     OpenCV's refinement pulls the corners of a marker inwards where the lens blurs: 0.3 px on
     rendered images, 0.05 px with this one. The marker then seems farther away than it is.
@@ -183,18 +183,18 @@ def refine_corners(gray: UInt8, corners_px: Float64, cells: int) -> Float64:
     ----------
     gray : (H, W) uint8
     corners_px : (4, 2) float64
-        In order around the marker, known to a pixel or so.
+        In order around the marker, accurate to about a pixel.
     cells : int
-        Along each side of the marker, its border included.
+        Number of cells along each side of the marker, including its border.
     """
-    exact = gray.astype(np.float32)  # shades between those of pixels are not rounded
+    exact = gray.astype(np.float32)  # interpolated grey values are not rounded
     edges = [_line(exact, np.roll(corners_px, -i, axis=0), cells) for i in range(4)]
     meeting = np.cross(np.roll(edges, 1, axis=0), edges)
     return np.asarray(meeting[:, :2] / meeting[:, 2:])
 
 
 def _line(gray: Float32, corners_px: Float64, cells: int) -> Float64:
-    """Return the line (a, b, c), a x + b y + c = 0, where the edge between the first two is."""
+    """Return the edge between the first two corners as a line (a, b, c): a x + b y + c = 0."""
     start_px = corners_px[0]
     along = corners_px[1] - start_px
     across = np.array([-along[1], along[0]]) / np.linalg.norm(along)

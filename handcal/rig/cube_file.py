@@ -19,7 +19,7 @@ def read_cube(path: Path) -> Cube:
     Raises
     ------
     FileError
-        If the file cannot be read, is none, or a field is unknown or wrong.
+        If the file cannot be read, is not a cube description, or a field is unknown or wrong.
     """
     values = read_json(path)
     if values.pop("handcal_cube", None) != CUBE_VERSION:
@@ -28,5 +28,5 @@ def read_cube(path: Path) -> Cube:
 
 
 def write_cube(path: Path, cube: Cube) -> None:
-    """Write a cube's description, atomically; FileError if that is impossible."""
+    """Write a cube's description, atomically; FileError if it cannot be written."""
     write_json(path, {"handcal_cube": CUBE_VERSION, **asdict(cube)})

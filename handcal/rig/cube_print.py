@@ -25,7 +25,7 @@ _TAB_M = 0.008
 
 
 def write_cube_pdf(path: Path, cube: Cube, paper: Paper = "a4") -> None:
-    """Write the cube's net as a PDF page at its true size, marks where to cut and to fold.
+    """Write the cube's net as a PDF page at its true size, with marks for cutting and folding.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def write_cube_pdf(path: Path, cube: Cube, paper: Paper = "a4") -> None:
 
 
 def net_rectangles_m(cube: Cube) -> Float64:
-    """Return what is black on the net: (N, 4) left, top, right, bottom."""
+    """Return the black rectangles of the net: (N, 4) left, top, right, bottom."""
     margin_m = 0.5 * (cube.side_m - cube.marker_m)
     parts = []
     for face, marker in zip(FACES, cube.ids, strict=True):
@@ -70,7 +70,7 @@ def _tabs(side_m: float) -> list[Float64]:
 def _outline(first_m: Float64, last_m: Float64) -> Float64:
     """Return the ends of four thin lines just within a rectangle.
 
-    Whole lines around a marker are a square as well, which OpenCV may take instead of the marker.
+    Complete lines around a marker would form a square that OpenCV may mistake for the marker.
     """
     (left, top), (right, bottom) = first_m, last_m
     across, down = (_MARK_SHARE * (last_m - first_m)).tolist()

@@ -1,4 +1,4 @@
-"""One eye's display, from a grid shown on it that the viewpoint camera behind it sees.
+"""Calibration of one eye's display, from a grid on it seen by the viewpoint camera behind it.
 
 The display is a plane S in front of the camera, so a homography takes the camera's pixels to the
 display's. Combined with the camera's lens matrix and its pose in the headset it is the off-axis
@@ -45,10 +45,10 @@ class Screen:
 
 @dataclass(frozen=True, slots=True)
 class DisplaySettings:
-    """Distance of the display, and limits of a calibration that is accepted."""
+    """Distance of the display, and limits for accepting a calibration."""
 
     distance_m: float | None = None
-    """z(C0→S) as measured, such as by the focus of the viewpoint camera."""
+    """z(C0→S) as measured, for example by the focus of the viewpoint camera."""
     pixel_m: float | None = None
     """Size of a display's pixel on S, to solve z(C0→S) from the grid: see `pixel_size_m`. Either
     this or `distance_m`."""
@@ -56,14 +56,14 @@ class DisplaySettings:
     """Relative standard deviation of either."""
     good_px: float = 0.5
     bad_px: float = 2.0
-    """Root mean square reprojection error in the camera up to which the plane fits well, and from
-    which on it does not fit."""
+    """Root mean square reprojection error in the camera: good up to the first, rejected from the
+    second."""
     good_sigma_px: float = 0.3
     """Largest standard deviation of the display's corners, px."""
     largest_turn_rad: float = 0.05
-    """Between the axes of the display and of V."""
+    """Limit of the angle between the axes of the display and of V."""
     largest_offset_m: float = 0.02
-    """From C0 to V: the eye box."""
+    """Limit of the distance from C0 to V: the eye box."""
 
     def __post_init__(self) -> None:
         if (self.distance_m is None) == (self.pixel_m is None):
@@ -116,11 +116,11 @@ def pixel_size_m(angle_rad: float, pixels: float, distance_m: float) -> float:
     Parameters
     ----------
     angle_rad : float
-        What the grid, or a single pixel, subtends from the display's nominal eye point.
+        Angle subtended by the grid, or by a single pixel, at the display's nominal eye point.
     pixels : float
-        How many pixels that are.
+        Number of pixels that subtend this angle.
     distance_m : float
-        Of S from the nominal eye point, as the manufacturer tells it.
+        Distance of S from the nominal eye point, as specified by the manufacturer.
     """
     if not (0.0 < angle_rad < np.pi and pixels > 0.0 and distance_m > 0.0):
         raise ValueError("angle, pixels and distance must be positive, the angle below 180°")
@@ -130,13 +130,13 @@ def pixel_size_m(angle_rad: float, pixels: float, distance_m: float) -> float:
 def fit_homography(
     views: Mapping[str, GridView], camera: Intrinsics, width_px: int, height_px: int
 ) -> DisplayHomography:
-    """Find the plane-induced homography between display and camera, the camera held still.
+    """Find the plane-induced homography between the display and a fixed camera.
 
     Parameters
     ----------
     views : mapping of name to GridView
     camera : Intrinsics
-        The viewpoint camera; its distortion is taken out first.
+        The viewpoint camera; its distortion is removed first.
     width_px, height_px : int
         Size of the display.
 
@@ -176,7 +176,7 @@ def calibrate_display(
     camera : Intrinsics
         The viewpoint camera.
     viewpoint : ViewpointPose
-        Where it was while it saw the grid.
+        Its pose while it saw the grid.
     screen : Screen
     settings : DisplaySettings
     """
@@ -220,7 +220,7 @@ def calibrate_display(
 def pose_before(
     homography: DisplayHomography, camera: Intrinsics, width_px: int, height_px: int
 ) -> tuple[Float64, Float64]:
-    """Return R_S_C by PnP, and where the camera is in S: in pixels, from the display's first."""
+    """Return R_S_C by PnP, and the camera's position in S: in pixels, from the display's first."""
     width, height = width_px - 1.0, height_px - 1.0
     corners_px = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
     seen_px = cv2.perspectiveTransform(corners_px[None], homography.H_C_S)[0]
@@ -231,7 +231,7 @@ def pose_before(
 
 
 def undistort(pixels: Float64, camera: Intrinsics) -> Float64:
-    """Return where pixels (N, 2) of a camera were without its lens distortion."""
+    """Return pixels (N, 2) of a camera with the lens distortion removed."""
     K = camera_matrix(camera)
     straight = cv2.undistortPoints(
         pixels[:, None],
@@ -248,7 +248,7 @@ def _corner_sigma_px(
 ) -> float:
     """Propagate the corners' errors, repeated in every image, to the display's own corners."""
     same = np.unique(display_px, axis=0, return_inverse=True)[1].ravel()
-    # The display's pixels are brought near 1, or the normal equations lose their digits.
+    # The display's pixels are scaled to about 1: otherwise the normal equations lose precision.
     scale = float(max(width_px, height_px))
     H = H @ np.diag([scale, scale, 1.0])
     J = _jacobian(H, display_px / scale)
@@ -261,7 +261,7 @@ def _corner_sigma_px(
 
 
 def _jacobian(H: Float64, points: Float64) -> Float64:
-    """Return (2N, 8): derivatives of the mapped points by all of H but its last element."""
+    """Return (2N, 8): derivatives of the mapped points by all elements of H except the last."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
     mapped = homogeneous @ H.T
     weights = homogeneous / mapped[:, 2:]

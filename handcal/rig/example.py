@@ -25,7 +25,7 @@ def example_rig() -> Rig:
         name="Example: HoloLens 1 with RealSense D415",
         eyes={"left": _display(-1.0), "right": _display(1.0)},
         T_H_D=rigid([np.radians(-15.0), 0.0, 0.0], [-0.0175, -0.030, 0.015]),
-        # A D415's depth image is rectified, so it has no distortion left.
+        # A D415's depth image is rectified, so it has no distortion.
         depth_intrinsics=Intrinsics(1280, 720, 1005.0, 1005.0, 639.5, 359.5),
     )
 

@@ -11,17 +11,17 @@ from handcal.types import Float64
 
 
 def rms(off_px: Float64) -> float:
-    """Return the root mean square length of (N, 2) residuals, as OpenCV counts it."""
+    """Return the root mean square length of (N, 2) residuals, as OpenCV defines it."""
     return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))))
 
 
 def marginal_covariance(
     blocks: Iterable[tuple[Float64, Float64]], residuals: Float64
 ) -> Float64 | None:
-    """Return the covariance of the shared parameters, the others' uncertainty included.
+    """Return the covariance of the shared parameters, including the uncertainty of the others.
 
     The normal equations' Schur complement (Triggs et al., "Bundle adjustment: a modern
-    synthesis", 2000, section 6), with the noise taken from the residuals.
+    synthesis", 2000, section 6), with the noise estimated from the residuals.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def marginal_covariance(
     information: Float64 = np.zeros(())
     count = 0
     for shared, own in blocks:
-        # What is left of the shared columns once the view's own have explained what they can.
+        # Shared columns, minus their projection onto the view's own columns.
         basis, _ = np.linalg.qr(own)
         rest = shared - basis @ (basis.T @ shared)
         information = information + rest.T @ rest
@@ -55,12 +55,12 @@ def marginal_covariance(
 
 
 def clustered_covariance(J: Float64, residuals: Float64, group: NDArray[np.integer]) -> Float64:
-    """Return the covariance (P, P) of the P parameters, the groups taken for independent.
+    """Return the covariance (P, P) of the P parameters, treating the groups as independent.
 
-    For residuals that err together, as all corners of one wrongly tracked board. It is the
-    jackknife's: how much the solution moves when one group after the other is left out, to first
-    order (Bell & McCaffrey 2002, Bias reduction in standard errors for linear regression with
-    multi-stage samples), which few groups do not make too small.
+    For correlated residuals, such as all corners of one wrongly tracked board. It is the jackknife
+    covariance: the change of the solution, to first order, when each group in turn is left out
+    (Bell & McCaffrey 2002, Bias reduction in standard errors for linear regression with multi-stage
+    samples). It is not too small even with few groups.
 
     Parameters
     ----------

@@ -27,8 +27,8 @@ from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
 from handcal.rig.views import WorstView
 from handcal.types import Float64, Intrinsics
 
-Format: TypeAlias = Literal["opencv", "ros", "json"]
-FORMATS: tuple[Format, ...] = ("opencv", "ros", "json")
+CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
+FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
 JSON_VERSION = 1
 MAX_BYTES = 2**20
 _MAX_REACH_M = 10.0
@@ -38,13 +38,13 @@ Value = TypeVar("Value")
 
 
 def read_intrinsics(path: Path) -> Intrinsics:
-    """Read a camera's intrinsics in any of `FORMATS`, told apart by what is in the file.
+    """Read a camera's intrinsics in any of `FORMATS`, recognised by the file's content.
 
     Raises
     ------
     FileError
-        If the file cannot be read, is none of them, a field is missing or implausible, or the
-        lens model is another than OpenCV's pinhole.
+        If the file cannot be read or has another format, a field is missing or implausible, or the
+        lens model is not OpenCV's pinhole.
     """
     return _read(path, _intrinsics_of_json, _intrinsics_of_yaml)
 
@@ -75,7 +75,8 @@ def read_stereo(path: Path) -> StereoCalibration:
     Raises
     ------
     FileError
-        If the file cannot be read, is none, or a field is missing or implausible.
+        If the file cannot be read, is not a stereo calibration, or a field is missing or
+        implausible.
     """
     values = read_json(path)
     try:
@@ -106,7 +107,7 @@ def read_stereo(path: Path) -> StereoCalibration:
         raise FileError(f"{path}: {error}") from error
 
 
-def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: Format) -> None:
+def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: CalibrationFormat) -> None:
     """Write a camera's intrinsics, atomically.
 
     Raises
@@ -130,13 +131,13 @@ def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: Format) -> None:
         write_atomic(path, storage.releaseAndGetString().encode())
 
 
-def write_pose(path: Path, T_H_D: Float64, kind: Format) -> None:
+def write_pose(path: Path, T_H_D: Float64, kind: CalibrationFormat) -> None:
     """Write T_H_D, atomically.
 
     Raises
     ------
     ValueError
-        If it is not rigid, or ROS is asked for: camera_info holds no pose.
+        If it is not rigid, or the format is ROS: camera_info holds no pose.
     FileError
         If the file cannot be written.
     """
@@ -206,10 +207,10 @@ def _read(
 
 
 def _as_storage(data: bytes) -> bytes:
-    """Return YAML as others write it in the dialect that OpenCV reads."""
+    """Return YAML from other programs in the dialect that OpenCV reads."""
     if data.startswith(b"%YAML"):
         return data
-    # PyYAML begins a list below its key, where OpenCV wants it further in.
+    # PyYAML does not indent a list below its key; OpenCV requires it.
     return b"%YAML 1.2\n---\n" + re.sub(rb"(?m)^( *)- ", rb"\1  - ", data)
 
 
@@ -266,7 +267,7 @@ def _number(values: dict[str, Any], key: str) -> float:
 
 
 def _numbers(values: object, name: str, dimensions: int) -> Float64:
-    """Return JSON's numbers, nested as deep as said, as an array of finite ones."""
+    """Return nested lists of finite JSON numbers as an array; their depth is `dimensions`."""
     try:
         array = np.array(values)
     except ValueError:  # lists of different lengths
@@ -320,7 +321,7 @@ def _yaml_matrix(root: Fields, name: str, shape: tuple[int, int] | None) -> Floa
 
 
 def _coefficients(intrinsics: Intrinsics) -> Float64:
-    """Return at least OpenCV's usual five coefficients."""
+    """Return the coefficients, padded to OpenCV's usual five."""
     given = intrinsics.distortion
     return np.array([*given, *[0.0] * (5 - len(given))])
 

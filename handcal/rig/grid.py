@@ -1,4 +1,4 @@
-"""The grid that a display shows to the viewpoint camera behind it, and where it is seen."""
+"""The grid that a display shows to the viewpoint camera behind it, and its detection."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal.rig.board_finder import find_board
 from handcal.rig.check import MAX_SIDE_PX
 from handcal.types import Float64, UInt8, freeze
 
-# Boards are described in metres, grids in pixels: any scale will do, if it is always the same.
+# Boards are described in metres, grids in pixels: any constant scale works.
 _BOARD_M = 1e-4
 _MARKER_SHARE = 0.7
 _SMALLEST_SQUARE_PX, _LARGEST_SQUARE_PX = 20, 2000
@@ -22,18 +22,18 @@ _SMALLEST_SQUARE_PX, _LARGEST_SQUARE_PX = 20, 2000
 class Grid:
     """A ChArUco grid in the middle of a display.
 
-    Any part of it tells where it belongs and which side is up, so that the camera need not see
-    the whole display.
+    Any part of it determines position and orientation, so the camera need not see the whole
+    display.
     """
 
     width_px: int
     height_px: int
     """Size of the display."""
     square_px: int = 80
-    """Side of a square; as many squares are shown as there is room for, 40 at most each way. A
+    """Side of a square; the grid has as many squares as fit, at most 40 in each direction. A
     multiple of 10 gives markers whose edges lie between pixels."""
     dictionary: str = "DICT_5X5_1000"
-    """Of the markers, as OpenCV calls it."""
+    """OpenCV's name of the marker dictionary."""
 
     def __post_init__(self) -> None:
         if not _SMALLEST_SQUARE_PX <= self.square_px <= _LARGEST_SQUARE_PX:
@@ -62,7 +62,7 @@ class Grid:
 
     @property
     def board(self) -> Board:
-        """The same as a board."""
+        """The grid as a board."""
         side_m = _BOARD_M * self.square_px
         return Board("charuco", self.squares, side_m, _MARKER_SHARE * side_m, self.dictionary)
 
@@ -74,7 +74,7 @@ class GridView:
     display_px: Float64
     """(N, 2); corners on the display."""
     pixels: Float64
-    """(N, 2); the same in the camera's image, lens included."""
+    """(N, 2); the same corners in the camera's image, with lens distortion."""
     size: tuple[int, int]
     """(int, int); width and height of the image."""
 
@@ -113,7 +113,7 @@ def find_grid(image: UInt8, grid: Grid) -> GridView:
 
 
 def on_display(found: BoardView, grid: Grid) -> GridView:
-    """Return what was found of `grid.board` as corners on the display."""
+    """Return the corners found of `grid.board` as corners on the display."""
     # A board begins at the outer edge of its first pixel, half a pixel before the centre.
     display_px = found.points_m[:, :2] / _BOARD_M + np.array(grid.corner_px) - 0.5
     return GridView(display_px, found.pixels, found.size)

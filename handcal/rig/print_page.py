@@ -23,26 +23,26 @@ PAPERS: dict[Paper, tuple[float, float]] = {
     "tabloid": (0.2794, 0.4318),
 }
 _INCH_M = 0.0254
-_EDGE_M = 0.005  # what printers cannot reach
+_EDGE_M = 0.005  # margin outside the printable area
 _RULER_M, _CAPTION_M = 0.1, 0.012
 
 
 def write_page(
     path: Path, size_m: Float64, rectangles_m: Float64, caption: str, paper: Paper
 ) -> None:
-    """Write a PDF page with what is printed in its middle, a ruler and a caption below.
+    """Write a PDF page with the print in its middle, and a ruler and a caption below.
 
     Parameters
     ----------
     path : Path
     size_m : (2,) float64
-        Width and height of what is printed.
+        Width and height of the print.
     rectangles_m : (N, 4) float64
-        What is black: left, top, right, bottom, from its upper left corner.
+        Black rectangles: left, top, right, bottom, from the upper left corner of the print.
     caption : str
         One line of text.
     paper : Paper
-        Turned if need be.
+        Used in landscape if necessary.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def write_page(
 
 
 def _page(size_m: Float64, paper: Paper) -> Float64:
-    """Return the page's width and height, turned so that what is printed fits."""
+    """Return the page's width and height, in the orientation in which the print fits."""
     if paper not in PAPERS:
         raise ValueError(f"no paper {paper}; there is {', '.join(PAPERS)}")
     needed_m = size_m + 2 * _EDGE_M + [0.0, _CAPTION_M]

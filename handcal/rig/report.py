@@ -1,4 +1,4 @@
-"""Report on a rig: the checks that a person would make, beyond plausibility."""
+"""Report on a rig: the checks of an expert, beyond plausibility."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _HAND_DEPTHS_M = (0.4, 0.5, 0.6)
 
 @dataclass(frozen=True, slots=True)
 class RigFinding:
-    """One thing about a rig."""
+    """One statement about a rig."""
 
     what: str
     found: str
@@ -31,7 +31,7 @@ class RigFinding:
 
 
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
-    """Return what there is to say about a rig that `check_rig` accepts."""
+    """Return the findings about a rig that `check_rig` accepts."""
     return tuple(_findings(rig))
 
 
@@ -93,7 +93,7 @@ def _angle_deg(display: EyeDisplay) -> float:
 
 
 def _seen_by_depth_camera(rig: Rig, display: EyeDisplay) -> float:
-    """Return the share of the display's pixels behind which the depth camera sees a hand."""
+    """Return the share of the display's pixels at which the depth camera can see a hand."""
     x = np.linspace(0.0, display.width_px - 1.0, 15)
     y = np.linspace(0.0, display.height_px - 1.0, 9)
     pixels = np.dstack([*np.meshgrid(x, y), np.ones((9, 15))]).reshape(-1, 3)

@@ -2,7 +2,8 @@
 
 Anything that reads FileStorage reads it. Per eye: K, H0, t_C0_V_m, z_C0_S_m, the display's size
 and T_V_H; for the depth camera: T_H_D and its intrinsics; and how each was calibrated. Numbers
-survive exactly. Version 1, which does not know how, is read as well; writing makes it version 2.
+survive exactly. Version 1, without this history, can be read too; files are always written as
+version 2.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.types import EYES, RIG_PARTS, EyeDisplay, Intrinsics, Origin, Rig, RigPart
 
 RIG_VERSION = 2
-MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 8 kB with how it was calibrated
+MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 8 kB with its calibration history
 
 
 def write_rig(path: str | PathLike[str], rig: Rig) -> None:
@@ -34,7 +35,7 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
     Raises
     ------
     ValueError
-        If the rig would be refused by `read_rig`.
+        If `read_rig` would refuse the rig.
     FileError
         If the file cannot be written.
 
@@ -121,7 +122,7 @@ def read_rig(path: str | PathLike[str]) -> Rig:
 
 
 def quoted(text: str) -> str:
-    """Quote a text: OpenCV leaves plain words as they are, and reads ``true`` as no text."""
+    """Quote a text: OpenCV does not quote plain words, and would read ``true`` as a boolean."""
     escaped = text.replace("\\", r"\\").replace('"', r"\"")
     return f'"{escaped}"'
 

@@ -1,4 +1,4 @@
-"""Steps of a headset's offline calibration, as the commands and the rig wizard order them."""
+"""Steps of a headset's offline calibration, used by the commands and the rig wizard."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from handcal.types import Eye, Float64, Intrinsics, Rig
 
 @dataclass(frozen=True, slots=True)
 class DisplayInputs:
-    """The numbers and files that one eye's display is calibrated with, beside the images."""
+    """Numbers and files for the calibration of one eye's display, besides the images."""
 
     square_px: int = 80
     """Side of the grid's squares."""
@@ -39,7 +39,7 @@ class DisplayInputs:
     nominal_m: float = 2.0
     """Angle that a square subtends at the nominal distance of the virtual image."""
     pose_V_H: Path | None = None
-    """File of T_V_H as the headset reports it, or None for that of the rig."""
+    """File of T_V_H as reported by the headset, or None to use that of the rig."""
 
     @property
     def settings(self) -> DisplaySettings:
@@ -116,7 +116,7 @@ def calibrate_eye_display(
     Parameters
     ----------
     rig : Rig
-        Tells the size of the display and, unless `inputs` does, T_V_H.
+        Gives the size of the display and, unless `inputs` does, T_V_H.
     eye : {"left", "right"}
     grid_views : sequence of View
         By the viewpoint camera, of the grid's board.

@@ -34,7 +34,7 @@ _Both: TypeAlias = tuple[Float64, Float64]  # of the depth camera's and the head
 
 MIN_PAIRS = 3
 _MIN_SHARED_CORNERS = 8
-# One pair alone, seen well, gives the cameras' distance to a few millimetres.
+# A single good pair gives the distance of the cameras to a few millimetres.
 _DISAGREE_M = 0.02
 _SWAPPED = "the cameras are swapped: the depth camera's images are the headset's, and the reverse"
 
@@ -53,7 +53,7 @@ class StereoSettings:
     max_shift_sigma_m: float = 3e-4
     """Standard deviation of the rotation and the translation, each along its worst axis."""
     max_shift_m: float = 0.5
-    """Two cameras on one headset are not further apart."""
+    """Maximum distance between two cameras on one headset."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,12 +71,12 @@ class StereoCalibration:
     rms_px: float
     """Over both images of all pairs."""
     residuals_px: Mapping[str, float]
-    """Of each pair, called as the depth camera's image."""
+    """For each pair, by the name of the depth camera's image."""
     spread_rad: float
     spread_m: float
-    """RMS difference of T_H_D from what each pair alone gives."""
+    """RMS difference between T_H_D and the poses from single pairs."""
     dropped: tuple[str, ...]
-    """Pairs left out by a person."""
+    """Pairs excluded by the user."""
     worst: WorstView
     verdict: CalibrationVerdict
 
@@ -107,7 +107,7 @@ def calibrate_stereo(
     pairs : sequence of (View, View)
         The depth camera's and the headset camera's. A pair with either dropped is left out.
     depth, headset : Intrinsics, optional
-        Solved from the same views if not given, which asks for more and better views.
+        If not given, solved from the same views, which then must be more and better.
     settings : StereoSettings, optional
 
     Raises
@@ -131,7 +131,7 @@ def calibrate_stereo(
     _check_not_swapped(both, depth, headset, rms_px)
     if rms_px > settings.max_rms_px:
         _check_not_mirrored(both, depth, headset, rms_px)
-    # Both cameras' own solutions are improved by what they see together, if that is at all one.
+    # Solved intrinsics of both cameras are refined jointly if the pairs fit well.
     joint = lens if all(solved) and rms_px < settings.max_rms_px else None
     T_H_D, T_D_B, depth, headset = _solve(both, depth, headset, joint)
     off_px, by = _fit(both, depth, headset, T_H_D, T_D_B)
@@ -305,7 +305,7 @@ def _composed(T_D_B: Float64, T_H_D: Float64) -> tuple[Float64, Float64]:
 
 
 def _alone(pair: _Pair, depth: Intrinsics, headset: Intrinsics) -> Float64:
-    """Return T_H_D as one pair alone gives it."""
+    """Return T_H_D from a single pair."""
     return _pose(pair.headset, headset) @ invert(_pose(pair.depth, depth))
 
 
@@ -395,7 +395,7 @@ def _worst(
 
 
 def _disagreement(names: Sequence[str], alone: Float64) -> str:
-    """Say which pair alone puts the cameras elsewhere than most do, or that most disagree."""
+    """Return a message if one pair contradicts the others or hardly two agree; else empty."""
     each = np.stack([_differences(T, alone) for T in alone])
     medians = np.median(each, axis=1)
     apart = each[medians[:, 1].argmin()]

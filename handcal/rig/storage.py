@@ -1,4 +1,4 @@
-"""FileStorage text read field by field, with an error that names the bad one."""
+"""FileStorage text read field by field; errors name the invalid field."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Value = TypeVar("Value")
 
 
 def parse_storage(data: bytes, convert: Callable[[Fields], Value]) -> Value:
-    """Return what `convert` makes of FileStorage YAML of at most `MAX_STORAGE_BYTES`.
+    """Return the result of `convert` for FileStorage YAML of at most `MAX_STORAGE_BYTES`.
 
     Raises
     ------
@@ -42,7 +42,7 @@ class Fields:
         self._node = node
 
     def has(self, name: str) -> bool:
-        """Return whether the field is there."""
+        """Return whether the field exists."""
         return not self._node.getNode(name).empty()
 
     def section(self, name: str) -> Fields:
@@ -85,7 +85,7 @@ class Fields:
     def matrix(self, name: str, rows: int, columns: int) -> Float64:
         """Return an opencv-matrix of doubles of the given size."""
         node = self._node.getNode(name)
-        # The size is checked before OpenCV allocates what the file asks for.
+        # The size is checked before OpenCV allocates memory for it.
         require(
             node.isMap()
             and node.getNode("rows").real() == rows

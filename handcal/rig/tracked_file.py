@@ -27,7 +27,7 @@ def read_tracked(path: Path) -> dict[str, Float64]:
     Raises
     ------
     FileError
-        If the file cannot be read, is none of these, or a pose is not rigid.
+        If the file cannot be read, is not of this format, or a pose is not rigid.
     """
     values = read_json(path)
     if values.get("handcal_tracked") != TRACKED_VERSION:

@@ -25,10 +25,10 @@ _GOOD_SIGMA_M = 0.001
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedView:
-    """A board seen by the viewpoint camera while the headset knows where the board is."""
+    """A board seen by the viewpoint camera and tracked by the headset at the same time."""
 
     view: BoardView
-    """As the viewpoint camera sees it."""
+    """The view of the viewpoint camera."""
     T_H_B: Float64
     """(4, 4); from the board to the headset rig, as tracked."""
 
@@ -74,9 +74,9 @@ def plane_pose(points: Float64, pixels: Float64, camera: Intrinsics) -> Float64:
 
 
 def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> ViewpointPose:
-    """Find the viewpoint camera's place by the least reprojection error over all views.
+    """Find the viewpoint camera's pose by minimising the reprojection error over all views.
 
-    The covariance takes the views, not their corners, for independent: a wrong tracked pose moves
+    The covariance treats the views, not their corners, as independent: a wrong tracked pose moves
     all corners of its view.
 
     Parameters
@@ -123,12 +123,12 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
 def viewpoint_from_tracked(
     views: Iterable[View], T_H_B: Mapping[str, Float64], camera: Intrinsics
 ) -> ViewpointPose:
-    """Take the place from views of a board, not those left out, and its tracked poses by name.
+    """Find the pose from the views of a board that are not left out, and its tracked poses by name.
 
     Raises
     ------
     ViewsError
-        If the board is seen in too few, or one in which it is seen has no pose.
+        If too few views show the board, or one that shows it has no tracked pose.
     """
     found = used(views, 1)
     missing = sorted(set(found) - set(T_H_B))
@@ -140,7 +140,7 @@ def viewpoint_from_tracked(
 
 
 def viewpoint_from_stereo(stereo: StereoCalibration) -> ViewpointPose:
-    """Take the place from a stereo calibration with the viewpoint camera as its depth camera.
+    """Take the pose from a stereo calibration with the viewpoint camera as its depth camera.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def _first_guess(points_H_m: Float64, pixels: Float64, camera: Intrinsics) -> Fl
 
 
 def _moved(T_H_C: Float64, x: Float64) -> Float64:
-    """Turn a camera about its own axes by x[:3] rad and move it in H by x[3:] m."""
+    """Rotate a camera about its own axes by x[:3] rad and move it in H by x[3:] m."""
     T = T_H_C @ rigid(x[:3])
     T[:3, 3] += x[3:]
     return T

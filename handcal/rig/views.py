@@ -1,4 +1,4 @@
-"""A set of views of a board: read, looked through, dropped, paired, and the worst of a fit."""
+"""Sets of views of a board: reading, excluding, pairing, and the worst view of a fit."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class View:
     """Unique among the views, as the file's name."""
     found: BoardView | None
     problem: str = ""
-    """Reason why nothing was found; empty if it was."""
+    """Reason why no board was found; empty if one was."""
     dropped: bool = False
-    """Left out by a person."""
+    """True if excluded by the user."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,14 +48,14 @@ class Coverage:
     """The distribution of all views' corners over the image."""
 
     hits: NDArray[np.int64]
-    """(6, 8); in how many views each cell of the image has a corner."""
+    """(6, 8); number of views with a corner in each cell of the image."""
     share: float
-    """Cells with one."""
+    """Number of cells with a corner."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorstView:
-    """The view with the largest residual, in pixels, and why."""
+    """The view with the largest residual, in pixels, and its likely cause."""
 
     name: str
     rms_px: float
@@ -121,12 +121,12 @@ def read_views(
 
 
 def drop(views: Iterable[View], names: Collection[str]) -> tuple[View, ...]:
-    """Return the views, those called one of `names` left out, all others in.
+    """Return the views with exactly those in `names` left out.
 
     Raises
     ------
     ViewsError
-        If there is no view of a name.
+        If a name is not that of a view.
     """
     views = tuple(views)
     unknown = set(names) - {view.name for view in views}
@@ -136,12 +136,12 @@ def drop(views: Iterable[View], names: Collection[str]) -> tuple[View, ...]:
 
 
 def used(views: Iterable[View], at_least: int) -> dict[str, BoardView]:
-    """Return what was found in the views that are not left out, by name.
+    """Return the boards found in the views that are not left out, by name.
 
     Raises
     ------
     ViewsError
-        If they are fewer than `at_least`, or not all of one size.
+        If there are fewer than `at_least`, or their sizes differ.
     """
     views = tuple(views)
     found = {view.name: view.found for view in views if view.found and not view.dropped}
@@ -243,13 +243,13 @@ def _by_number(views: Iterable[View]) -> dict[int, View]:
 def worst_view(
     found: Mapping[str, BoardView], off_px: Mapping[str, Float64], tilt_rad: Mapping[str, float]
 ) -> WorstView:
-    """Return the view with the largest residual, and what it is likely to come from.
+    """Return the view with the largest residual, and its likely cause.
 
     Parameters
     ----------
     found : mapping of name to BoardView
     off_px : mapping of name to (N, 2) float64
-        Seen less expected pixels.
+        Detected minus predicted pixels.
     tilt_rad : mapping of name to float
         Angle between the board's normal and the line of sight.
     """
@@ -287,7 +287,7 @@ def _stray_corners(seen: BoardView, off_px: Float64, usual_px: float) -> list[st
 def _unlike(
     found: Mapping[str, BoardView], tilt_rad: Mapping[str, float], name: str, others: list[str]
 ) -> list[str]:
-    """Return in what the view differs from the others: blur, size, tilt, place."""
+    """Return the difference between the view and the others: blur, size, tilt or place."""
 
     def compare(values: Mapping[str, float]) -> tuple[float, float]:
         return values[name], float(np.median([values[one] for one in others]))

@@ -1,8 +1,8 @@
-"""The view of the viewpoint camera turned to the display's axes, as an eye behind it has it.
+"""The viewpoint camera's image, rotated to the display's axes, as an eye would see it.
 
-A camera is never quite parallel to the display. What is aligned in its image must be aligned on
-the display: frames are undistorted and warped by the pure rotation between the two
-(Hu et al. 2021, assessment with eye-replacement camera).
+A camera is never exactly parallel to the display. Objects aligned in its image must also be aligned
+on the display: frames are undistorted and warped by the pure rotation between the two (Hu et al.
+2021, assessment with eye-replacement camera).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ def rotation_homography(camera: Intrinsics, R_S_C: Float64) -> Float64:
 
 
 class RotationWarp:
-    """Undistorts and turns frames of one camera; the way of every pixel is found once.
+    """Undistorts and rotates frames of one camera; the pixel map is computed once.
 
     Parameters
     ----------
     camera : Intrinsics
-        Of the frames; the warped ones have the same without distortion.
+        Intrinsics of the frames; warped frames have the same, without distortion.
     R_S_C : (3, 3) float64
         From the camera's axes to the display's.
     """
@@ -50,7 +50,7 @@ class RotationWarp:
         Raises
         ------
         ValueError
-            If it is not of the camera's size.
+            If it does not have the camera's size.
         """
         if frame.shape[:2] != self._size:
             height, width = self._size

@@ -122,7 +122,7 @@ def make_trial(
     )
 
 
-def summarise(trials: Collection[Trial]) -> TrialStatistics:
+def summarise_trials(trials: Collection[Trial]) -> TrialStatistics:
     """Return statistics of trials; JSON-able with `dataclasses.asdict`."""
     return TrialStatistics(
         total=_errors(trials) if trials else None,

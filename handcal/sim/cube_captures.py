@@ -32,7 +32,7 @@ from handcal.sim.cube import CubePainter, draw_cube
 from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
-from handcal.sim.wearer import WearerSettings, draw_slip
+from handcal.sim.wearer import WearerSettings, draw_placement_error
 from handcal.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, UInt8
 
 POSITIONS = {
@@ -180,7 +180,7 @@ class _Studio:
                 {settings.eye: true_m},
                 settings.points,
                 settings.depth_sigma_m,
-                slip=draw_slip(rng, settings.wearer),
+                placement_error=draw_placement_error(rng, settings.wearer),
             )
             for _ in range(settings.alignments)
         ]

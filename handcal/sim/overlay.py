@@ -10,7 +10,7 @@ from handcal.display import projection_matrix, view_of_eye
 from handcal.errors import HandcalError
 from handcal.geometry import invert, rigid, transform
 from handcal.sim.hand import HandModel
-from handcal.sim.placement import Slip, misplace, overlay_hand, view_through
+from handcal.sim.placement import PlacementError, apply_placement_error, overlay_hand, view_through
 from handcal.sim.raster import visible_points
 from handcal.types import EYES, Alignment, Bool, Eye, Float64, Rig
 
@@ -19,7 +19,7 @@ _FOREARM_M = 0.04
 _PALM_H_M = np.array([0.0, 0.088, 0.51])
 _PALM_SPREAD_M = np.array([0.015, 0.006, 0.025])
 _PALM_TURN_RAD = 0.1
-_NO_SLIP = Slip(np.zeros(3), np.zeros(2), 0.0)
+_NO_ERROR = PlacementError(np.zeros(3), np.zeros(2), 0.0)
 
 
 def overlay_by_eye(
@@ -30,7 +30,7 @@ def overlay_by_eye(
     points: int,
     depth_sigma_m: float = 0.0,
     *,
-    slip: Slip = _NO_SLIP,
+    placement_error: PlacementError = _NO_ERROR,
     drawn_shift_m: Mapping[Eye, Float64] | None = None,
     worn_rig: Rig | None = None,
 ) -> Alignment:
@@ -47,7 +47,7 @@ def overlay_by_eye(
         Number of points of each cloud; the two are sampled independently.
     depth_sigma_m : float
         Standard deviation of each point's depth noise.
-    slip : Slip
+    placement_error : PlacementError
         Error of the overlay.
     drawn_shift_m : mapping of eye to (3,) float64, optional
         φ with which the cursor is drawn; default: the offline calibration.
@@ -92,7 +92,7 @@ def overlay_by_eye(
         )
         for eye, shift_m in true_shift_m.items()
     ]
-    turned = T_H_raised @ rigid(slip.rotation_rad)
+    turned = T_H_raised @ rigid(placement_error.rotation_rad)
     placed = overlay_hand(transform(invert(T_H_raised), cursor_m), turned, views)
     if placed is None:
         raise HandcalError(
@@ -103,7 +103,9 @@ def overlay_by_eye(
         transform(invert(view_of_eye(worn.eyes[eye], np.eye(4))), shift_m[None])[0]
         for eye, shift_m in true_shift_m.items()
     ]
-    hand_m, hand_is_cut = see(misplace(placed[0], np.mean(eyes_m, axis=0), slip))
+    hand_m, hand_is_cut = see(
+        apply_placement_error(placed[0], np.mean(eyes_m, axis=0), placement_error)
+    )
     R_D_raised = rig.T_H_D[:3, :3].T @ T_H_raised[:3, :3]
     return Alignment(
         cursor_m=cursor_m,
@@ -112,7 +114,7 @@ def overlay_by_eye(
         hand_is_cut=hand_is_cut,
         T_E_W={eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES},
         eyes=tuple(true_shift_m),
-        rotation_rad=R_D_raised @ slip.rotation_rad,
+        rotation_rad=R_D_raised @ placement_error.rotation_rad,
         t_a_ns=0,
         t_b_ns=1,
         drawn_shift_m=drawn_m,

@@ -39,7 +39,7 @@ class CursorMatch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EyeView:
+class CursorView:
     """The view of one open eye."""
 
     seen: Float64
@@ -49,7 +49,7 @@ class EyeView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slip:
+class PlacementError:
     """The error of a placement."""
 
     rotation_rad: Float64
@@ -99,7 +99,7 @@ def view_through(
     T_W_H: Float64,
     drawn: Float64,
     cursor_m: Float64,
-) -> EyeView:
+) -> CursorView:
     """Return one eye's view of the world and of the cursor.
 
     Parameters
@@ -118,11 +118,11 @@ def view_through(
     drawn_px = project(drawn @ invert(T_W_H), cursor_m)
     size_px = display.width_px - 0.5, display.height_px - 0.5
     drawn_px[~np.all((drawn_px >= -0.5) & (drawn_px <= size_px), axis=1)] = np.nan
-    return EyeView(seen, drawn_px)
+    return CursorView(seen, drawn_px)
 
 
 def overlay_hand(
-    surface_m: Float64, T_W_hand: Float64, views: Sequence[EyeView]
+    surface_m: Float64, T_W_hand: Float64, views: Sequence[CursorView]
 ) -> tuple[Float64, float] | None:
     """Translate a hand until it overlaps the cursor in all open eyes.
 
@@ -135,7 +135,7 @@ def overlay_hand(
         The hand's points that the cursor shows, in the hand's frame.
     T_W_hand : (4, 4) float64
         Initial pose; its rotation is kept.
-    views : sequence of EyeView
+    views : sequence of CursorView
         The open eyes.
 
     Returns
@@ -162,7 +162,7 @@ def overlay_hand(
     return rigid(T_W_hand[:3, :3], translation_m), float(np.sqrt(2.0 * np.mean(residual_px**2)))
 
 
-def _offsets(view: EyeView, points_m: Float64) -> tuple[Float64, Float64]:
+def _offsets(view: CursorView, points_m: Float64) -> tuple[Float64, Float64]:
     """Return, for drawn points, seen minus drawn (2N,) in px, and its Jacobian in the points."""
     shown = np.isfinite(view.drawn_px[:, 0])
     homogeneous = points_m[shown] @ view.seen[:, :3].T + view.seen[:, 3]
@@ -172,7 +172,7 @@ def _offsets(view: EyeView, points_m: Float64) -> tuple[Float64, Float64]:
     return (seen_px - view.drawn_px[shown]).ravel(), J.reshape(-1, 3)
 
 
-def misplace(T_W_hand: Float64, eye_m: Float64, slip: Slip) -> Float64:
+def apply_placement_error(T_W_hand: Float64, eye_m: Float64, error: PlacementError) -> Float64:
     """Apply a placement error to a hand seen from `eye_m`: across and along the line of sight.
 
     Parameters
@@ -181,9 +181,9 @@ def misplace(T_W_hand: Float64, eye_m: Float64, slip: Slip) -> Float64:
         Already rotated by the error.
     eye_m : (3,) float64
         W.
-    slip : Slip
+    error : PlacementError
     """
     line_m = T_W_hand[:3, 3] - eye_m
     across = np.linalg.svd(line_m[None])[2][1:]
-    aside = Rotation.from_rotvec(slip.lateral_rad @ across)
-    return rigid(T_W_hand[:3, :3], eye_m + (1.0 + slip.depth_ratio) * aside.apply(line_m))
+    aside = Rotation.from_rotvec(error.lateral_rad @ across)
+    return rigid(T_W_hand[:3, :3], eye_m + (1.0 + error.depth_ratio) * aside.apply(line_m))

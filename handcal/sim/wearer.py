@@ -17,9 +17,9 @@ from handcal.geometry import interpolate_pose, invert, rigid, transform
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import (
     CursorMatch,
-    Slip,
+    PlacementError,
+    apply_placement_error,
     match_cursor,
-    misplace,
     overlay_hand,
     view_through,
 )
@@ -148,11 +148,13 @@ class _Sway:
         return rigid(sway[:3], sway[3:])
 
 
-def draw_slip(rng: np.random.Generator, settings: WearerSettings, turned_rad: float = 0.0) -> Slip:
+def draw_placement_error(
+    rng: np.random.Generator, settings: WearerSettings, turned_rad: float = 0.0
+) -> PlacementError:
     """Draw the error of one placement, of a hand rotated by about `turned_rad`."""
     axis = rng.normal(size=3)
     angle_rad = turned_rad + settings.rotation_sigma_rad * rng.normal()
-    return Slip(
+    return PlacementError(
         angle_rad * axis / np.linalg.norm(axis),
         settings.lateral_sigma_arcmin * _ARCMIN * rng.normal(size=2),
         settings.depth_sigma * rng.normal(),
@@ -211,7 +213,7 @@ class Wearer:
         self._move: _Move | None = None
         self._task: tuple[int, tuple[Eye, ...]] | None = None
         self._match: CursorMatch | None = None
-        self._slip = self._slip_turned_by(0.0)
+        self._error = self._draw_error(0.0)
         self._confirmed_s = 0.0
         self._P_confirmed: Mapping[Eye, Float64] = {}
 
@@ -255,11 +257,11 @@ class Wearer:
             self._match = match_cursor(self._hand, cursor_m, self._T_W_hand)
         self._task = task
         turned_rad = self._settings.novice_rotation_rad if self._is_naive else 0.0
-        self._reach(view.t_s, self._slip_turned_by(turned_rad))
+        self._reach(view.t_s, self._draw_error(turned_rad))
 
-    def _reach(self, t_s: float, slip: Slip) -> None:
+    def _reach(self, t_s: float, error: PlacementError) -> None:
         self._phase = "reaching"
-        self._slip = slip
+        self._error = error
         start_s = t_s + self._settings.reaction_s
         self._move = _Move(self._T_W_hand, start_s, self._settings.movement_s)
 
@@ -280,12 +282,12 @@ class Wearer:
             if t_s < move.end_s + settings.dwell_s:
                 return False
             if view.guard_red and not self._is_naive:
-                self._reach(t_s, self._slip_turned_by(0.0))
+                self._reach(t_s, self._draw_error(0.0))
                 return False
             return self._press(view)
         if view.guard_red and t_s > self._confirmed_s + settings.reaction_s:
             self._is_naive = False
-            self._reach(t_s, self._slip_turned_by(0.0))
+            self._reach(t_s, self._draw_error(0.0))
             return False
         return t_s > self._confirmed_s + settings.patience_s and self._press(view)
 
@@ -304,15 +306,15 @@ class Wearer:
             drawn = view.P[eye] @ view.T_V_H[eye]
             views.append(view_through(display, shift_m, T_W_H, drawn, self._match.cursor_m))
             eyes_m.append(transform(invert(view_of_eye(display, T_W_H)), shift_m[None])[0])
-        turned = self._match.T_W_hand @ rigid(self._slip.rotation_rad)
+        turned = self._match.T_W_hand @ rigid(self._error.rotation_rad)
         placed = overlay_hand(self._match.surface_m, turned, views)
         if placed is None:
             return None
         eye_m = np.mean(eyes_m, axis=0)
-        return misplace(placed[0], eye_m, self._slip)
+        return apply_placement_error(placed[0], eye_m, self._error)
 
-    def _slip_turned_by(self, turned_rad: float) -> Slip:
-        return draw_slip(self._rng, self._settings, turned_rad)
+    def _draw_error(self, turned_rad: float) -> PlacementError:
+        return draw_placement_error(self._rng, self._settings, turned_rad)
 
     def _choose_place(self) -> Float64:
         """Return a pose for the raised hand, upright, the palm facing the eyes."""

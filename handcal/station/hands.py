@@ -66,7 +66,7 @@ class RecentHands:
         self._seen_ns = 0
 
     def add(self, cloud: HandCloud | None, t_host_ns: int) -> tuple[PlacedHand | None, str]:
-        """Take the cloud of a new frame, None if it shows no hand, and place what can be placed.
+        """Add the cloud of a new frame, None if it shows no hand, and place the clouds that can be.
 
         Returns
         -------
@@ -105,7 +105,7 @@ class RecentHands:
         since_ns = self._seen_ns - self._steady_ns
         before = [hand.middle_W_m for hand in self._placed if hand.t_host_ns <= since_ns]
         after = [hand.middle_W_m for hand in self._placed if hand.t_host_ns > since_ns]
-        # From the last one before, so that a slow camera gives enough of them too.
+        # Include the last hand before this period, so that a slow camera has enough of them.
         places = before[-1:] + after
         is_long_enough = bool(before and after)
         if is_long_enough and float(np.ptp(places, axis=0).max()) < self._steady_m:
@@ -139,7 +139,7 @@ class RecentHands:
         return PlacedHand(cloud, t_host_ns, T_W_D, points_W_m, middle_W_m)
 
     def _forget_old(self) -> None:
-        """Forget what is too old both for a confirmation and for judging steadiness."""
+        """Forget hands that are too old both for a confirmation and for the steadiness check."""
         oldest_ns = self._seen_ns - self._keep_ns
         while self._placed and self._placed[0].t_host_ns < oldest_ns:
             self._placed.popleft()

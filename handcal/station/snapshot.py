@@ -33,7 +33,7 @@ class Procedure:
     alignments: Mapping[int, Alignment]
     """By number, without deleted ones, including those that could not be written yet."""
     results: Results | None
-    """Of all alignments; None while there are none, or alignments have changed since."""
+    """Results of all alignments; None if there are none or the alignments have changed since."""
     applied_shift_m: Mapping[Eye, Float64]
     """each (3,); φ that the headset renders with."""
     is_applied: bool

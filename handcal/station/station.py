@@ -108,7 +108,7 @@ class Station(Closable):
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
         self._revision = self.session.revision
-        self._target_E_m: dict[Eye, Float64] = {}  # only of the eye that it is shown to
+        self._target_E_m: dict[Eye, Float64] = {}  # only for the eye to which it is shown
         self._views: dict[Eye, EyeView] = {}
         self._viewed: Eye = "right"
         self._next_view_s = 0.0

@@ -15,8 +15,6 @@ from handcal_gui.engine.worker import Worker
 _LOG = logging.getLogger(__name__)
 _STEPS = 1000
 
-Report = Callable[[str, float], object]
-IsCancelled = Callable[[], bool]
 Work = Callable[[Progress], object]
 
 

@@ -1,4 +1,4 @@
-"""What devices tell of themselves, told by a software device; no camera is attached."""
+"""Descriptions of devices, read from a software device; no camera is attached."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What librealsense cannot record; what it can is tested by playing it back."""
+"""Data that librealsense cannot record; the rest is tested by playback."""
 
 from __future__ import annotations
 

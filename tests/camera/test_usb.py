@@ -1,4 +1,4 @@
-"""What is on the USB, by folders like those in which Linux describes it."""
+"""Devices on the USB, listed from folders laid out like those of Linux."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import pytest
 
 from handcal.conventions import opengl_projection, openxr_view, unity_world_to_camera
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
-from handcal.export.outcome import Origin, SessionOutcome, load_outcome
+from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
 from handcal.session.session import SessionRecord
 from handcal.types import EYES, Eye, Rig
 
@@ -24,7 +24,7 @@ def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: SessionOut
     assert storage.getNode("handcal_calibration").real() == 1
     assert storage.getNode("wearer").string() == outcome.record.wearer
     assert outcome.results is not None
-    finals: dict[Eye, Origin] = {"left": "fine_tuned", "right": "solved"}
+    finals: dict[Eye, ShiftOrigin] = {"left": "fine_tuned", "right": "solved"}
     for eye, final in finals.items():
         node, display = storage.getNode(eye), outcome.record.rig.eyes[eye]
         covariance_m2 = outcome.results.eyes[eye].covariance_m2

@@ -1,4 +1,4 @@
-"""What is solved again, and which φ is final."""
+"""Choice of the alignments to solve again and of the final φ."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.export.outcome import Origin, SessionOutcome
+from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.export.tables import write_parameters, write_trials
 from handcal.types import Eye, Float64
 
@@ -90,7 +90,7 @@ def test_no_text_becomes_a_formula(tmp_path: Path, outcome: SessionOutcome, star
 
 
 def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcome) -> None:
-    shifts_m: dict[Eye, dict[Origin, Float64]] = {
+    shifts_m: dict[Eye, dict[ShiftOrigin, Float64]] = {
         "left": {"fine_tuned": np.full(3, -0.001), "offline": np.zeros(3)},
         "right": {},
     }

@@ -64,7 +64,7 @@ def any_value(kind: Any) -> st.SearchStrategy[Any]:
 
 
 def holds(stored: Any, given: Any) -> bool:
-    """Tell whether all that was given is stored."""
+    """Return whether all given values are stored."""
     if isinstance(given, dict):
         return all(holds(stored[name], value) for name, value in given.items())
     return bool(stored == given)

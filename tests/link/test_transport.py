@@ -1,4 +1,4 @@
-"""Where a headset is told to connect to."""
+"""The address that is shown for a headset to connect to."""
 
 from __future__ import annotations
 

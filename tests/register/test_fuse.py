@@ -54,7 +54,7 @@ def _prior_m2() -> Float64:
 
 
 def _wearer_m2() -> Float64:
-    """How exactly a wearer aligns at half a metre: 3′ across, 0.3 % along, 4/3 of that in φ."""
+    """Return the covariance of φ at half a metre: σ is 3′ across and 0.3 % along, times 4/3."""
     across_m = 4 / 3 * DEPTH_M * np.tan(np.radians(3 / 60))
     return np.diag([across_m, across_m, 4 / 3 * DEPTH_M * 0.003]) ** 2
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from handcal.display import update_matrix
 from handcal.geometry import project, transform
-from handcal.register.model import design, drawn, fit_shift, predict
+from handcal.register.model import cursor_displacement, design, fit_shift, predict
 
 SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3).map(np.array)
 DISTANCES = st.floats(1.0, 5.0)
@@ -56,7 +56,7 @@ def test_a_cursor_drawn_with_another_shift_looks_like_one_drawn_offline(
 ) -> None:
     cursor_m = HAND_M
     pixels = project(update_matrix(drawn_m, 2.0)[:3], cursor_m)
-    as_offline_m = transform(drawn(drawn_m, 2.0), cursor_m)
+    as_offline_m = transform(cursor_displacement(drawn_m, 2.0), cursor_m)
     np.testing.assert_allclose(project(np.eye(3, 4), as_offline_m), pixels, atol=1e-12)
     # A hand where the cursor is needs the very shift that the cursor is drawn with.
     found_m = fit_shift(as_offline_m, cursor_m, 2.0, exact=True)

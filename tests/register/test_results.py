@@ -1,4 +1,4 @@
-"""What a session reports, and that solving it again is solving the same."""
+"""Results of a session; solving it again gives the same results."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from handcal import solve_eye_shift
 from handcal.errors import HandError
 from handcal.geometry import invert, rigid, transform
 from handcal.lab.bench.trials import trial_alignment
-from handcal.register.model import drawn
+from handcal.register.model import cursor_displacement
 from handcal.register.solve import MAX_POINTS, check_cloud, solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
@@ -147,7 +147,7 @@ def test_a_cursor_drawn_with_an_earlier_solution(made: SimulatedAlignment, metho
     earlier_m = np.array([0.003, -0.002, 0.004])
     offline = _alignment(made, eyes=("left",))
     T_drawn = made.T_E_W.copy()
-    T_drawn = np.linalg.inv(drawn(earlier_m, 2.0) @ T_drawn) @ T_drawn
+    T_drawn = np.linalg.inv(cursor_displacement(earlier_m, 2.0) @ T_drawn) @ T_drawn
     cursor_m = transform(T_drawn, made.cursor_m)
     redrawn = replace(
         offline,

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import pytest
 from matplotlib.axes import Axes
 
-from handcal.report.document import Column, Figure, Report, Row, Section, Table, facts
+from handcal.report.document import Column, Figure, FigureRow, Report, Section, Table, facts
 
-ROWS: list[Row] = [
+ROWS: list[FigureRow] = [
     {"angle_deg": 0, "error_mm": 1.5, "method": "paper"},
     {"angle_deg": 9, "error_mm": None},
 ]

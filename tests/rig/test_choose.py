@@ -1,4 +1,4 @@
-"""Which moments of a moving board are kept."""
+"""Selection of the views of a moving board."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ RIG = example_rig()
 
 
 def differences(other: Rig) -> dict[str, float]:
-    """What is not nothing, by name."""
+    """Return the differences that are not zero, by name."""
     return {one.name: one.value for one in compare_rigs(RIG, other) if one.value > 1e-9}
 
 

@@ -36,7 +36,7 @@ R_E_C = rigid([0.05, -0.03, 0.1])[:3, :3]
 
 
 def seen(display: EyeDisplay, R_E_C: Float64, noise_px: float = 0.0, seed: int = 0) -> GridView:
-    """What an ideal detector finds of a grid on a display."""
+    """Return the corners of a display's grid that an ideal detector finds."""
     x, y = np.arange(80.0, SIZE[0], 80.0), np.arange(80.0, SIZE[1], 80.0)
     display_px = np.dstack(np.meshgrid(x, y)).reshape(-1, 2)
     homogeneous = np.column_stack([display_px, np.ones(len(display_px))])

@@ -11,7 +11,7 @@ from handcal.rig.board import Board
 from handcal.rig.camera import calibrate_camera
 from handcal.rig.formats import (
     FORMATS,
-    Format,
+    CalibrationFormat,
     camera_json,
     read_intrinsics,
     read_pose,
@@ -56,14 +56,16 @@ rectification_matrix:
 
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize("more", [(), (0.4, 0.5, 0.6)])
-def test_intrinsics_survive_exactly(tmp_path: Path, kind: Format, more: tuple[float, ...]) -> None:
+def test_intrinsics_survive_exactly(
+    tmp_path: Path, kind: CalibrationFormat, more: tuple[float, ...]
+) -> None:
     camera = Intrinsics(640, 480, 500.1, 501 / 3, 320.5, 239.5, FIVE + more)
     write_intrinsics(tmp_path / "camera", camera, kind)
     assert read_intrinsics(tmp_path / "camera") == camera
 
 
 @pytest.mark.parametrize("kind", ["opencv", "json"])
-def test_the_pose_survives_exactly(tmp_path: Path, kind: Format) -> None:
+def test_the_pose_survives_exactly(tmp_path: Path, kind: CalibrationFormat) -> None:
     write_pose(tmp_path / "pose", T_H_D, kind)
     np.testing.assert_array_equal(read_pose(tmp_path / "pose"), T_H_D)
 

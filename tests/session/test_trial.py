@@ -12,7 +12,7 @@ from handcal.session.trial import (
     calibration_numbers,
     make_trial,
     read_trial,
-    summarise,
+    summarise_trials,
     trial_json,
 )
 from handcal.types import EYES, Float64
@@ -102,7 +102,7 @@ def test_what_lacks_something_is_refused() -> None:
 def test_statistics_are_of_all_corners() -> None:
     trials = [trial(depth_m, ADJUSTED_M * factor) for depth_m in (0.6, 0.4) for factor in (1, 2)]
     trials.append(replace(trials[0], eye="right"))
-    statistics = summarise(trials)
+    statistics = summarise_trials(trials)
     assert statistics.total is not None
     px = np.concatenate([made.error_px for made in trials])
     arcmin = np.concatenate([made.error_arcmin for made in trials])
@@ -120,7 +120,7 @@ def test_statistics_are_of_all_corners() -> None:
 
 
 def test_no_trials_have_no_statistics() -> None:
-    statistics = summarise([])
+    statistics = summarise_trials([])
     assert statistics.total is None
     assert not statistics.by_eye
     assert not statistics.by_depth_m

@@ -10,7 +10,7 @@ from handcal.lab.bench.trials import trial_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.placement import Slip
+from handcal.sim.placement import PlacementError
 from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
@@ -34,7 +34,7 @@ def test_the_hand_covers_the_cursor_on_the_display() -> None:
 
 
 def test_a_cursor_drawn_rightly_lies_on_the_hand() -> None:
-    """With the true φ rendered, and no slip, the wearer puts the hand back where it was."""
+    """With the true φ rendered and no error, the wearer puts the hand back where it was."""
     true_m = {eye: np.array([0.010, -0.009, 0.006]) for eye in EYES}
     alignment = overlay_by_eye(
         np.random.default_rng(3), trial_hand(3), RIG, true_m, 2000, drawn_shift_m=true_m
@@ -43,11 +43,11 @@ def test_a_cursor_drawn_rightly_lies_on_the_hand() -> None:
     assert np.abs(moved_m).max() < 0.003  # both are sampled apart; 8 mm otherwise
 
 
-def test_a_slip_moves_and_turns_the_hand() -> None:
-    slip = Slip(np.array([0.0, 0.0, 0.05]), np.array([0.004, 0.0]), 0.02)
+def test_a_placement_error_moves_and_turns_the_hand() -> None:
+    error = PlacementError(np.array([0.0, 0.0, 0.05]), np.array([0.004, 0.0]), 0.02)
     true_m = dict.fromkeys(EYES, np.zeros(3))
     alignment = overlay_by_eye(
-        np.random.default_rng(4), trial_hand(4), RIG, true_m, 2000, slip=slip
+        np.random.default_rng(4), trial_hand(4), RIG, true_m, 2000, placement_error=error
     )
     assert np.linalg.norm(alignment.rotation_rad) == pytest.approx(0.05)
     moved_m = alignment.hand_m.mean(axis=0) - alignment.cursor_m.mean(axis=0)

@@ -9,10 +9,10 @@ from handcal.geometry import invert, rigid, transform
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.placement import (
-    EyeView,
-    Slip,
+    CursorView,
+    PlacementError,
+    apply_placement_error,
     match_cursor,
-    misplace,
     overlay_hand,
     view_through,
 )
@@ -38,7 +38,7 @@ def surface_m(hand: HandModel) -> Float64:
     return transform(invert(T_W_HAND) @ T_W_D, points_m)
 
 
-def _views(surface_m: Float64, shift_m: Sequence[float], eyes: tuple[Eye, ...]) -> list[EyeView]:
+def _views(surface_m: Float64, shift_m: Sequence[float], eyes: tuple[Eye, ...]) -> list[CursorView]:
     return [
         view_through(
             RIG.eyes[eye],
@@ -83,7 +83,7 @@ def test_both_eyes_shifted_alike_agree_on_the_hand(surface_m: Float64) -> None:
     assert placed[1] < 2.0  # a translated hand is not quite what a shifted eye sees
 
 
-def _seen_px(view: EyeView, points_m: Float64) -> Float64:
+def _seen_px(view: CursorView, points_m: Float64) -> Float64:
     homogeneous = np.column_stack([points_m, np.ones(len(points_m))]) @ view.seen.T
     return homogeneous[:, :2] / homogeneous[:, 2:]
 
@@ -108,13 +108,13 @@ def test_noisy_cursor_with_flying_pixels_finds_the_hand(
     assert np.median(np.linalg.norm(match.surface_m - surface_m, axis=1)[regular]) < 0.001
 
 
-def test_misplace_turns_the_line_of_sight_and_scales_it() -> None:
+def test_a_placement_error_turns_the_line_of_sight_and_scales_it() -> None:
     eye_m = np.array([0.1, -0.2, 0.0])
     line_m = T_W_HAND[:3, 3] - eye_m
-    aside = (
-        misplace(T_W_HAND, eye_m, Slip(np.zeros(3), np.array([0.003, 0.004]), 0.0))[:3, 3] - eye_m
-    )
+    sideways = PlacementError(np.zeros(3), np.array([0.003, 0.004]), 0.0)
+    aside = apply_placement_error(T_W_HAND, eye_m, sideways)[:3, 3] - eye_m
     cosine = aside @ line_m / np.linalg.norm(aside) / np.linalg.norm(line_m)
     assert np.arccos(cosine) == pytest.approx(0.005, rel=1e-3)
-    longer = misplace(T_W_HAND, eye_m, Slip(np.zeros(3), np.zeros(2), 0.01))[:3, 3] - eye_m
+    farther = PlacementError(np.zeros(3), np.zeros(2), 0.01)
+    longer = apply_placement_error(T_W_HAND, eye_m, farther)[:3, 3] - eye_m
     np.testing.assert_allclose(longer, 1.01 * line_m)

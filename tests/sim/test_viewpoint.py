@@ -15,7 +15,7 @@ SHARP = PictureSettings(blur_px=0.3, noise=0.0, samples=2)
 
 @pytest.mark.parametrize("shift_m", [[0.0, 0.0, 0.0], [0.004, -0.003, 0.006]])
 def test_a_pixel_is_seen_where_a_point_of_the_focal_plane_is(shift_m: list[float]) -> None:
-    """What hangs on S at z(C0→S) is drawn at one pixel for every eye, and seen there."""
+    """A point on S at z(C0→S) is drawn at the same pixel for every eye, and seen there."""
     point_E_m = np.array([[0.2, -0.12, DISPLAY.z_C0_S_m]])
     homogeneous = eye_projection(DISPLAY) @ [*point_E_m[0], 1.0]
     u, v = homogeneous[:2] / homogeneous[2]

@@ -530,7 +530,7 @@ def shows_offline_projections(shown: HeadsetState) -> bool:
 
 
 def shows_projection(shown: HeadsetState, eye: Eye, shift_m: Float64) -> bool:
-    """Tell whether the newest projection, if one has arrived by now, is that of a shift."""
+    """Return whether the newest projection, if one has arrived, is that of a shift."""
     P = projection_matrix(RIG.eyes[eye], shift_m)
     return eye in shown.projections and np.array_equal(shown.projections[eye].P, P)
 
@@ -866,7 +866,7 @@ def test_what_is_deleted_while_the_disk_is_full_is_deleted_later(
 
 
 def resumed(stage: Stage, session: Session) -> tuple[Stage, Session]:
-    """Go on with what a session holds, as after a crash: nothing is told to the old calibration."""
+    """Resume a session as after a crash: the old calibration receives no message."""
     session.close()
     again = Session(session.path)
     return Stage(stage.server, stage.client, again, Session.open(session.path)), again

@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured
 from handcal.link.client import HeadsetClient
@@ -26,7 +26,7 @@ def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
     for done, loss in enumerate(_LOSSES, 1):
         durations_ms = _cursor_durations_ms(loss, settings)
         median_ms = float(np.median(durations_ms))
-        figures.append(Figure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
+        figures.append(BenchFigure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
         worst_ms[f"{loss:g}"] = max(durations_ms)
         progress.at(done / len(_LOSSES))
     return Measured(figures, {"worst_ms_at_loss": worst_ms})

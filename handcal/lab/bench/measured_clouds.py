@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import (
     Errors,
@@ -44,8 +44,8 @@ def measure_cuts(settings: BenchSettings, progress: Progress) -> Measured:
     what = "other cut, noise: mean |Δφ|"
     return Measured(
         [
-            Figure(f"{what} at 0°", straight["consistent_mean_mm"], "mm", at_most=1.0),
-            Figure(f"{what} above floor", excess_mm, "mm", at_most=0.5),
+            BenchFigure(f"{what} at 0°", straight["consistent_mean_mm"], "mm", at_most=1.0),
+            BenchFigure(f"{what} above floor", excess_mm, "mm", at_most=0.5),
         ],
         rows,
     )
@@ -68,7 +68,7 @@ def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
     squares = run_trials(solve, range(settings.covariance_trials), progress)
     mean = float(np.mean(squares))
     return Measured(
-        [Figure("normalised squared error, mean", mean, "", at_least=2.4, at_most=3.6)],
+        [BenchFigure("normalised squared error, mean", mean, "", at_least=2.4, at_most=3.6)],
         {"trials": len(squares), "mean": mean, "median": float(np.median(squares))},
     )
 

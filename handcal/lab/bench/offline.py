@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.display import view_of_eye
 from handcal.geometry import image_points, invert, rigid
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
 from handcal.lab.bench.trials import Measured
@@ -96,7 +96,7 @@ def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
     ratios = _stand_in_ratios([run.rig for run in runs], settings.offline_wearers, progress)
     progress.at(1.0)
     figures = [
-        Figure(what, max(scale * getattr(run, name) for run in runs), unit, at_most=target)
+        BenchFigure(what, max(scale * getattr(run, name) for run in runs), unit, at_most=target)
         for what, name, scale, unit, target in _FIGURES
         if runs
     ]
@@ -104,9 +104,9 @@ def measure_offline(settings: BenchSettings, progress: Progress) -> Measured:
         worst = max(ratios, key=lambda one: one.mean)
         what = "offline: reprojection error, calibrated / true rig"
         figures += [
-            Figure(what, worst.mean, "", at_most=_MOST_RATIO),
-            Figure(f"{what}: least by 95 %", worst.low, ""),
-            Figure(f"{what}: most by 95 %", worst.high, ""),
+            BenchFigure(what, worst.mean, "", at_most=_MOST_RATIO),
+            BenchFigure(f"{what}: least by 95 %", worst.low, ""),
+            BenchFigure(f"{what}: most by 95 %", worst.high, ""),
         ]
     rows = [
         {name: getattr(run, name) for _, name, *_ in _FIGURES} | {"reprojection_ratio": asdict(one)}

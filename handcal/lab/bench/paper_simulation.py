@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import (
     Errors,
@@ -66,7 +66,7 @@ def _floor(data: str) -> str:
     return f"floor for {data}"
 
 
-def _published(by_angle: Mapping[float, Errors]) -> list[Figure]:
+def _published(by_angle: Mapping[float, Errors]) -> list[BenchFigure]:
     """Return the largest angle at which ``paper`` reaches the published accuracy."""
 
     def reach_deg(measure_mm: Callable[[Float64], float]) -> float:
@@ -78,16 +78,16 @@ def _published(by_angle: Mapping[float, Errors]) -> list[Figure]:
         "mean |Δφi|": lambda errors_m: float(np.mean(_components_mm(errors_m))),
     }
     return [
-        Figure(f"paper: {name} ≤ 4 mm up to (published: 9°)", reach_deg(measure), "°")
+        BenchFigure(f"paper: {name} ≤ 4 mm up to (published: 9°)", reach_deg(measure), "°")
         for name, measure in measures.items()
     ]
 
 
-def _compare(data: str, by_angle: Sequence[Errors]) -> list[Figure]:
+def _compare(data: str, by_angle: Sequence[Errors]) -> list[BenchFigure]:
     """Compare ``consistent`` with the floor and with ``paper``, in the worst case."""
     limits = {_floor(data): _FLOOR_RATIO, "paper": 1.0}
     return [
-        Figure(
+        BenchFigure(
             f"worst consistent / {name.split()[0]}, {data}",
             max(_ratio(errors["consistent"], errors[name]) for errors in by_angle),
             "",

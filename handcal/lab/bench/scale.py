@@ -7,12 +7,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured
 from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
 from handcal.lab.study.run import Study, run_study
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.progress import Progress
 
 # Each process makes its own hands; in a whole study this time is negligible.
@@ -41,13 +41,15 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
     solved = sum(row["method"] != FLOOR for row in rows)
     return Measured(
         [
-            Figure(
+            BenchFigure(
                 "noise study: alignments solved a minute, two workers",
                 60.0 * solved / together_s,
                 "",
                 at_least=_PER_MINUTE,
             ),
-            Figure("noise study: two workers / one", alone_s / together_s, "", at_least=_SPEED_UP),
+            BenchFigure(
+                "noise study: two workers / one", alone_s / together_s, "", at_least=_SPEED_UP
+            ),
         ],
         {
             "alignments": len(study.cases),
@@ -58,7 +60,7 @@ def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
     )
 
 
-def _timed(study: Study, workers: int, progress: Progress) -> tuple[float, list[Row]]:
+def _timed(study: Study, workers: int, progress: Progress) -> tuple[float, list[StudyRow]]:
     with TemporaryDirectory() as folder:
         start_s = perf_counter()
         rows = run_study(study, Path(folder), workers=workers, progress=progress)

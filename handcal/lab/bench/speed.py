@@ -14,7 +14,7 @@ from handcal.geometry import rigid
 from handcal.hand.roi import Detector, RoiFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.hand.shipped import load_detector
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured, trial_hand
 from handcal.progress import Progress
@@ -59,7 +59,7 @@ def _noisy_alignment(trial: int, points: int) -> Alignment:
     return overlay_by_eye(rng, hand, rig, true_shift_m, points, _SIGMA_M)
 
 
-def _segmentation(repeats: int) -> list[Figure]:
+def _segmentation(repeats: int) -> list[BenchFigure]:
     """Time the segmentation of one simulated frame, 1280x720, and the tracking of its ROI."""
     frame = simulated_frame()
     segmenting = SegmentSettings()
@@ -68,9 +68,9 @@ def _segmentation(repeats: int) -> list[Figure]:
     [alone_ms] = _medians_ms([frame] * repeats, lambda f: segment_hand(f, segmenting))
     roi_ms = following_ms(load_detector(), frame)
     return [
-        Figure("ROI of a followed hand, mean a frame", roi_ms, "ms", at_most=_ROI_MS),
-        Figure("segmentation, 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
-        Figure("segmentation, 1280x720, no ROI", alone_ms, "ms"),
+        BenchFigure("ROI of a followed hand, mean a frame", roi_ms, "ms", at_most=_ROI_MS),
+        BenchFigure("segmentation, 1280x720, ROI given", with_roi_ms, "ms", at_most=_SEGMENT_MS),
+        BenchFigure("segmentation, 1280x720, no ROI", alone_ms, "ms"),
     ]
 
 
@@ -102,7 +102,7 @@ def following_ms(detector: Detector, frame: Frame) -> float:
     return 1e3 * (thread_time() - started_s) / _FRAMES
 
 
-def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
+def _registration(alignments: Sequence[Alignment], repeats: int) -> list[BenchFigure]:
     """Time the guard, and a whole registration beside Open3D's if it is installed."""
     guards = [(RotationGuard(a.cursor_m, a.cursor_is_cut), a) for a in alignments]
     [guard_ms] = _medians_ms(
@@ -115,13 +115,13 @@ def _registration(alignments: Sequence[Alignment], repeats: int) -> list[Figure]
         *([icp] if icp else []),
     )
     figures = [
-        Figure("guard update", guard_ms, "ms", at_most=_GUARD_MS),
-        Figure("rotation_between", own_ms, "ms"),
+        BenchFigure("guard update", guard_ms, "ms", at_most=_GUARD_MS),
+        BenchFigure("rotation_between", own_ms, "ms"),
     ]
     for baseline_ms in icp_ms:
         figures += [
-            Figure("Open3D's ICP, same clouds", baseline_ms, "ms"),
-            Figure("rotation_between / Open3D's ICP", own_ms / baseline_ms, "", at_most=1.0),
+            BenchFigure("Open3D's ICP, same clouds", baseline_ms, "ms"),
+            BenchFigure("rotation_between / Open3D's ICP", own_ms / baseline_ms, "", at_most=1.0),
         ]
     return figures
 
@@ -143,16 +143,16 @@ def _open3d_icp() -> Callable[[tuple[Float64, Float64]], object] | None:
     return register
 
 
-def _solving(alignments: Sequence[Alignment], repeats: int) -> list[Figure]:
+def _solving(alignments: Sequence[Alignment], repeats: int) -> list[BenchFigure]:
     """Time solving both eyes by the default and the published method, on the same alignments."""
     rig = example_rig()
     [consistent_ms] = _medians_ms([*alignments] * repeats, lambda a: solve_alignment(a, rig))
     [paper_ms] = _medians_ms(alignments, lambda a: solve_alignment(a, rig, "paper"))
     speed_up = paper_ms / consistent_ms
     return [
-        Figure("solve both eyes", consistent_ms, "ms", at_most=_SOLVE_MS),
-        Figure("solve both eyes, paper", paper_ms, "ms"),
-        Figure("solve both eyes: paper / consistent", speed_up, "", at_least=_SPEED_UP),
+        BenchFigure("solve both eyes", consistent_ms, "ms", at_most=_SOLVE_MS),
+        BenchFigure("solve both eyes, paper", paper_ms, "ms"),
+        BenchFigure("solve both eyes: paper / consistent", speed_up, "", at_least=_SPEED_UP),
     ]
 
 

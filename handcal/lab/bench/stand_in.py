@@ -10,7 +10,7 @@ from handcal.progress import Progress
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_slip
+from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
 from handcal.statistics import MeanInterval, mean_interval
 from handcal.types import EYES, Float64, Rig
 
@@ -37,12 +37,19 @@ def reprojection_of_wearers(rig: Rig, worn_rig: Rig, wearers: int, progress: Pro
     def reprojection(number: int) -> float:
         rng = np.random.default_rng(number)
         true_m = draw_eyes(rng, placement)
-        slip = draw_slip(rng, placement)
-        while np.linalg.norm(slip.rotation_rad) > GuardSettings().limit_rad:
-            slip = draw_slip(rng, placement)
+        error = draw_placement_error(rng, placement)
+        while np.linalg.norm(error.rotation_rad) > GuardSettings().limit_rad:
+            error = draw_placement_error(rng, placement)
         hand = trial_hand(number)
         alignment = overlay_by_eye(
-            rng, hand, rig, true_m, _POINTS, _DEPTH_SIGMA_M, slip=slip, worn_rig=worn_rig
+            rng,
+            hand,
+            rig,
+            true_m,
+            _POINTS,
+            _DEPTH_SIGMA_M,
+            placement_error=error,
+            worn_rig=worn_rig,
         )
         solved = solve_alignment(alignment, rig)
         solved_m = {eye: solved[eye].shift_m for eye in EYES}

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.study.trials import study_hand
 from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment, simulate_alignment
@@ -20,7 +20,7 @@ from handcal.types import Float64
 
 Task = TypeVar("Task")
 Case = TypeVar("Case")
-Outcome = TypeVar("Outcome")
+Result = TypeVar("Result")
 
 
 Errors: TypeAlias = Mapping[str, Float64]
@@ -33,13 +33,13 @@ _HANDS = 10
 class Measured:
     """The result of a part of the benchmark: headline figures, and details as JSON."""
 
-    figures: list[Figure]
+    figures: list[BenchFigure]
     details: Any
 
 
 def run_trials(
-    trial: Callable[[Task], Outcome], tasks: Sequence[Task], progress: Progress
-) -> list[Outcome]:
+    trial: Callable[[Task], Result], tasks: Sequence[Task], progress: Progress
+) -> list[Result]:
     """Run a trial for every task, with one thread per core; the order is kept."""
     outcomes = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Errors, Measured, collect_errors, trial_hand
 from handcal.progress import Progress
@@ -46,8 +46,8 @@ def measure_wearer(settings: BenchSettings, progress: Progress) -> Measured:
     )
     return Measured(
         [
-            Figure("bias at φ3 = ±10 mm", bias_mm, "mm", at_most=_BIAS_MM),
-            Figure("share of φ3 that paper misses", 100 * float(missed), "%"),
+            BenchFigure("bias at φ3 = ±10 mm", bias_mm, "mm", at_most=_BIAS_MM),
+            BenchFigure("share of φ3 that paper misses", 100 * float(missed), "%"),
         ],
         rows,
     )

@@ -19,8 +19,8 @@ from handcal.io.files import read_json
 from handcal.io.images import read_image
 from handcal.types import Bool, Float64, UInt8
 
-_CORNER = 0.5  # the image's upper left corner, counted so
-_REACH = 10.0  # so many image sides away a box may end
+_CORNER = 0.5  # the image's upper left corner in these coordinates
+_REACH = 10.0  # largest distance of a box from the image, in image sides
 
 
 @dataclass(frozen=True, slots=True, eq=False)

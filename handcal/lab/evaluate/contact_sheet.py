@@ -22,7 +22,7 @@ _MISSED, _FALSE, _FOUND = (255, 60, 60), (255, 200, 0), (60, 220, 60)
 def contact_sheet(
     photos: Sequence[Photo], results: Sequence[ImageResult], score_min: float, tiles: int = 36
 ) -> UInt8:
-    """Draw the photographs in which the most went wrong, each hand missed or falsely seen marked.
+    """Draw the photographs with the worst failures; mark missed hands and false detections.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ def contact_sheet(
     results : sequence of ImageResult
         One for each photograph.
     score_min : float
-        Detections below it are not looked at.
+        Detections with a lower score are ignored.
     tiles : int
-        At most so many photographs.
+        Maximum number of photographs.
 
     Returns
     -------
@@ -57,9 +57,9 @@ def contact_sheet(
 def write_contact_sheet(
     path: Path, photos: Sequence[Photo], results: Sequence[ImageResult]
 ) -> None:
-    """Write a `contact_sheet` of what the detector shows by default, as PNG.
+    """Write a `contact_sheet` at the detector's default threshold, as PNG.
 
-    It is black where nothing went wrong.
+    Without failures it is one black tile.
 
     Raises
     ------

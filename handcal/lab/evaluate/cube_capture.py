@@ -1,4 +1,4 @@
-"""The captures of a cube test taken with a camera, one after the other, a person beside it."""
+"""Capture of a cube test's images with a camera, one after the other, with an operator."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.grid import Grid, find_grid
 from handcal.types import UInt8
 
-# What a camera has waiting was seen before the person was ready.
+# Images buffered by the camera were taken before the operator was ready.
 _STALE_IMAGES = 5
 _WHAT_TO_DO = {
     GRID: "show the grid on the display, darken the room",
@@ -41,7 +41,7 @@ def instruction(capture: PlannedCapture) -> str:
 def keep_capture(
     image: UInt8, folder: Path, capture: PlannedCapture, cube: Cube, grid: Grid
 ) -> str:
-    """Write an image if it shows what it should, in place of an earlier one.
+    """Write an image if it shows the expected object; it replaces an earlier one.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def keep_capture(
     Returns
     -------
     str
-        What is seen.
+        Description of the objects found.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def take_captures(
     ask: Callable[[str], None],
     say: Callable[[str], None],
 ) -> None:
-    """Take the missing captures; one in which nothing is found is explained and taken again.
+    """Take the missing captures; explain and repeat one in which nothing is found.
 
     Parameters
     ----------
@@ -95,9 +95,9 @@ def take_captures(
     cube : Cube
     grid : Grid
     ask : callable
-        Given what to do; returns once that is done, or raises to give up.
+        Called with the instruction; returns when it is done, or raises to cancel.
     say : callable
-        Given what became of it.
+        Called with the result.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def judge_captures(
     grid: Grid,
     progress: Progress = Progress(),
 ) -> CubeTest:
-    """Find and compare the cubes in all captures; what is missing or not seen is left out.
+    """Find and compare the cubes in all captures; missing and failed ones are left out.
 
     Captures are undistorted and, where the position has an image of the display's grid, turned to
     the display's axes (Hu et al. 2021), as an eye is: errors are along these.
@@ -56,12 +56,12 @@ def judge_captures(
     Parameters
     ----------
     folder : Path
-        As `handcal.lab.evaluate.cube_folder` tells.
+        Laid out as in `handcal.lab.evaluate.cube_folder`.
     cube : Cube
     camera : Intrinsics
         The eye-replacement camera, lens included.
     grid : Grid
-        What the display shows in the images of it.
+        The grid that the display shows in the grid images.
     progress : Progress
 
     Raises
@@ -116,7 +116,7 @@ def cube_row(found: CubeMisalignment) -> CubeRow:
 
 @contextmanager
 def _noted(left_out: dict[str, str], name: str) -> Iterator[None]:
-    """Note why something cannot be used, and go on after it."""
+    """Record the reason of a HandcalError, and continue after the block."""
     try:
         yield
     except _UNUSABLE as error:

@@ -20,7 +20,7 @@ from handcal.lab.evaluate.precision import (
 from handcal.progress import Progress
 
 EVALUATED = DetectSettings(score_min=CANDIDATE_SCORE_MIN)
-"""A precision/recall curve wants the doubtful detections too."""
+"""A precision/recall curve needs the uncertain detections too."""
 
 _CURVE_POINTS = 200
 
@@ -48,8 +48,8 @@ def summary(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str
 
     The keys are ``ap50``, ``ap50_large`` (the data set's own rule), and ``ap50_rel15`` and
     ``ap50_rel25`` (hands whose box's share of the image is that number squared, or more). None
-    where there is no such hand. As in COCO's area ranges, of the last two a smaller box that is on
-    no hand is not false either.
+    where there is no such hand. For the last two, smaller boxes on no hand are ignored, as in
+    COCO's area ranges.
     """
     return _averages(_curves(photos, results))
 

@@ -11,7 +11,7 @@ from handcal.hand.detect import overlaps
 from handcal.types import Bool, Float64
 
 MATCH_OVERLAP = 0.5
-"""Intersection over union from which on a box is taken to be on a hand."""
+"""Minimum intersection over union for a detection to count as a hit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +45,7 @@ def precision_recall(results: Iterable[tuple[ImageResult, Bool]]) -> PrecisionRe
     Parameters
     ----------
     results : iterable of (ImageResult, (M,) bool)
-        With each image which of its hands count; finding another is neither right nor wrong.
+        For each image, a mask of the hands that count; detections of other hands are ignored.
     """
     scores, hits, hands = [], [], 0
     for result, counted in results:
@@ -67,7 +67,7 @@ def precision_recall(results: Iterable[tuple[ImageResult, Bool]]) -> PrecisionRe
 
 
 def _matches(result: ImageResult, counted: Bool) -> Float64:
-    """Return for each box 1 if it is a hand's best, 0 if false, NaN if on one that counts not."""
+    """Return for each box 1 if it is a hand's best, 0 if false, NaN if on an ignored hand."""
     overlap = overlaps(result.boxes, result.hands)
     free = counted.copy()
     hit = np.zeros(len(result.boxes))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from handcal.errors import FileError
-from handcal.export.tables import trial_rows
+from handcal.export.tables import corner_rows
 from handcal.progress import Progress
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import calibration_numbers
@@ -27,10 +27,10 @@ from handcal.statistics import (
 )
 
 CornerRow: TypeAlias = dict[str, Any]
-"""One corner of one trial: the columns of `trial_rows`, and whose it is."""
+"""One corner of one trial: the columns of `corner_rows`, and whose it is."""
 
 Unit: TypeAlias = Literal["wearer", "calibration"]
-"""The unit that an interval takes for independent."""
+"""The unit that an interval treats as independent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class UserTest:
     """The trials of all sessions."""
 
     sessions: Mapping[str, SessionRecord]
-    """Those with trials, by a name of their own."""
+    """Sessions with trials, by unique names."""
     left_out: Mapping[str, str]
     """Reasons why the others are left out, by their folders."""
     corners: Sequence[CornerRow]
@@ -116,7 +116,7 @@ def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> 
 def evaluate_user_test(test: UserTest) -> UserTestResult:
     """Return the errors of all trials, and of each wearer, eye and distance.
 
-    Intervals take wearers for independent; those of a single wearer, calibrations.
+    Intervals treat wearers as independent; for a single wearer, calibrations.
     """
     wearers = [row["wearer"] for row in test.corners]
     unit: Unit = "wearer" if len(set(wearers)) > 1 else "calibration"
@@ -155,7 +155,7 @@ def _corners(name: str, record: SessionRecord) -> Iterator[CornerRow]:
     """Yield the rows of a session; a wearer without name is one of their own."""
     calibrations = calibration_numbers(record.trials)
     whose = {"wearer": record.wearer or f"not named, {name}", "session": name}
-    for row in trial_rows(record.trials):
+    for row in corner_rows(record.trials):
         yield {**whose, "calibration": calibrations[row["trial"]], **row}
 
 

@@ -1,4 +1,4 @@
-"""The figures of a user test, each drawn into axes that it is given."""
+"""The figures of a user test, each drawn into given axes."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from handcal.lab.evaluate.user_test import GroupErrors, UserTest, UserTestResult
 from handcal.lab.evaluate.user_test_figures import draw_corners, draw_wearers
 from handcal.lab.methods.published import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
-from handcal.report.document import Column, Figure, Item, Report, Row, Section, Table, facts
+from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
 from handcal.session.trial import calibration_numbers
 from handcal.statistics import INTERVAL_METHOD
@@ -203,7 +203,7 @@ def _table(of: str, groups: Mapping[str, GroupErrors]) -> Table:
     return Table(columns, rows, "Interval of the mean, median, quartiles and extremes in arcmin.")
 
 
-def _wearer_rows(shown: Mapping[str, GroupErrors]) -> Iterator[Row]:
+def _wearer_rows(shown: Mapping[str, GroupErrors]) -> Iterator[FigureRow]:
     for wearer, group in shown.items():
         interval = group.interval_arcmin
         yield {

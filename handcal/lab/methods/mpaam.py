@@ -2,8 +2,9 @@
 
 Azimi, Qian, Navab & Kazanzides 2017, "Alignment of the virtual scene to the tracking space of a
 mixed reality head-mounted display" (arXiv 1703.05834): four alignments of five corners. The headset
-is a black box that shows 3D points somewhere; the method solves for the map from tracked to shown
-points. Known to us second hand, from Hu et al. 2021; the three models of the map are from memory.
+is treated as a black box that shows 3D points at unknown places; the method solves for the map from
+tracked to shown points. Known to us second hand, from Hu et al. 2021; the three models of the map
+are from memory.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Studies on simulated wearers: thousands of trials, in many processes, and what they add up to."""
+"""Studies on simulated wearers: thousands of trials, in many processes, and their reports."""

@@ -1,6 +1,7 @@
 """Comparison of calibration methods on the same simulated wearers: errors, and the wearers' time.
 
-Every case is a wearer, who does all that every method asks. `docs/methods.md` says what is assumed.
+Every case is a wearer, who does the alignments of every method. `docs/methods.md` lists the
+assumptions.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from handcal.lab.methods.mpaam import FEWEST_PAIRS, solve_mpaam
 from handcal.lab.methods.spaam import solve_spaam
 from handcal.lab.methods.stereo_spaam import solve_stereo_spaam
 from handcal.lab.study.run import Case, Study
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearers import StudyWearer, align_cube, align_hand, align_points, draw_wearer
 from handcal.register.fuse import FuseSettings, fuse_alignments
 from handcal.register.solve import solve_alignment
@@ -76,7 +77,7 @@ QUICK_METHODS = MethodSettings(wearers=3, points=300)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
+class MethodCalibration:
     """The calibration of one wearer by one method."""
 
     method: str
@@ -99,7 +100,7 @@ def methods_study(settings: MethodSettings) -> Study:
     return Study("methods", settings, cases, compare_methods)
 
 
-def compare_methods(settings: MethodSettings, case: Case) -> list[Row]:
+def compare_methods(settings: MethodSettings, case: Case) -> list[StudyRow]:
     """Calibrate one wearer by every method; a row for each and each distance of the target.
 
     The errors in arcmin are of the target's four corners in each eye, as the paper's user test has
@@ -107,21 +108,23 @@ def compare_methods(settings: MethodSettings, case: Case) -> list[Row]:
     corners of |x|, |y|, |z| in the headset's axes.
     """
     wearer, placement = study_wearer(settings, case)
-    # A method's wearer errs the same whatever other methods there are.
+    # A wearer's errors with one method do not depend on the other methods.
     seeds = np.random.SeedSequence([settings.seed, int(case["wearer"]), 1]).spawn(4)
     generators = [np.random.default_rng(seed) for seed in seeds]
     calibrations = [
-        Calibration("no calibration", 0, 0.0, rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))),
+        MethodCalibration(
+            "no calibration", 0, 0.0, rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))
+        ),
         *_by_points(wearer, generators[0], settings),
         *_by_cubes(wearer, generators[1], placement, settings),
         *_by_both_eyes(wearer, generators[2], placement, settings),
         *_by_each_eye(wearer, generators[3], placement, settings),
     ]
-    return [row for found in calibrations for row in judge(wearer, found, case)]
+    return [row for found in calibrations for row in method_rows(wearer, found, case)]
 
 
 def study_wearer(settings: MethodSettings, case: Case) -> tuple[StudyWearer, WearerSettings]:
-    """Return a case's wearer and how far the wearer's overlays miss."""
+    """Return a case's wearer and the errors of the wearer's overlays."""
     number = int(case["wearer"])
     usual = WearerSettings()
     placement = replace(
@@ -160,9 +163,9 @@ def target_errors(wearer: StudyWearer, projections: Projections, depth_m: float)
     return errors
 
 
-def judge(wearer: StudyWearer, found: Calibration, case: Case) -> list[Row]:
-    """Return a row for each distance of the target: what a calibration errs there."""
-    row: Row = {
+def method_rows(wearer: StudyWearer, found: MethodCalibration, case: Case) -> list[StudyRow]:
+    """Return a row for each distance of the target, with the errors of a calibration there."""
+    row: StudyRow = {
         **case,
         "method": found.method,
         "alignments": found.alignments,
@@ -188,7 +191,7 @@ def _meet(eyes_m: Sequence[Float64], rays: Sequence[Float64]) -> Float64:
 
 
 def rendered(wearer: StudyWearer, shift_m: Mapping[Eye, Float64]) -> Projections:
-    """Return what the rig renders with for given eye shifts φ, (3,) each."""
+    """Return the rig's projections for given eye shifts φ, (3,) each."""
     return {
         eye: eye_projection(wearer.rig.eyes[eye], shift_m[eye]) @ wearer.T_E_H(eye) for eye in EYES
     }
@@ -206,27 +209,27 @@ def _seconds(alignments: int, *, by_hand: bool = False) -> float:
 
 def _by_points(
     wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
-) -> Iterator[Calibration]:
+) -> Iterator[MethodCalibration]:
     """SPAAM, Stereo-SPAAM, fingertips, and INDICA."""
     sigma_arcmin = settings.pointing_sigma_arcmin
     for count in _SPAAM_COUNTS:
         pairs = {eye: align_points(wearer, rng, count, [eye], sigma_arcmin, 0.0) for eye in EYES}
         solved = _spaam(pairs)
-        yield Calibration(f"SPAAM, {count}", 2 * count, _seconds(2 * count), solved)
+        yield MethodCalibration(f"SPAAM, {count}", 2 * count, _seconds(2 * count), solved)
     for count in _STEREO_COUNTS:
         points_m, pixels = align_points(wearer, rng, count, EYES, sigma_arcmin, 0.0)
         try:
             stereo: Projections | None = solve_stereo_spaam(points_m, pixels)
         except ValueError:
             stereo = None
-        yield Calibration(f"Stereo-SPAAM, {count}", count, _seconds(count), stereo)
+        yield MethodCalibration(f"Stereo-SPAAM, {count}", count, _seconds(count), stereo)
     yield from _by_fingertips(wearer, rng, settings)
-    yield Calibration("INDICA, recycled", 0, 0.0, _indica(wearer, rng, settings))
+    yield MethodCalibration("INDICA, recycled", 0, 0.0, _indica(wearer, rng, settings))
 
 
 def _by_fingertips(
     wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
-) -> Iterator[Calibration]:
+) -> Iterator[MethodCalibration]:
     """SPAAM of fingertips, and the eye alone from some of them."""
     tips = {
         eye: align_points(
@@ -240,7 +243,9 @@ def _by_fingertips(
         for eye in EYES
     }
     count = 2 * _MOSER_COUNT
-    yield Calibration(f"fingertip SPAAM, {_MOSER_COUNT}", count, _seconds(count), _spaam(tips))
+    yield MethodCalibration(
+        f"fingertip SPAAM, {_MOSER_COUNT}", count, _seconds(count), _spaam(tips)
+    )
     eyes_m = {}
     for eye, (points_m, pixels) in tips.items():
         # Every third: as few, over the same depths.
@@ -250,7 +255,7 @@ def _by_fingertips(
         eyes_m[eye] = solve_eye_from_points(points_E_m, found_px, wearer.rig.eyes[eye])
     count = 2 * _JUN_COUNT
     found = rendered(wearer, eyes_m)
-    yield Calibration(f"fingertip, eye only, {_JUN_COUNT}", count, _seconds(count), found)
+    yield MethodCalibration(f"fingertip, eye only, {_JUN_COUNT}", count, _seconds(count), found)
 
 
 def _spaam(pairs: Mapping[Eye, tuple[Float64, Mapping[Eye, Float64]]]) -> Projections | None:
@@ -279,7 +284,7 @@ def _by_cubes(
     rng: np.random.Generator,
     placement: WearerSettings,
     settings: MethodSettings,
-) -> Iterator[Calibration]:
+) -> Iterator[MethodCalibration]:
     """MPAAM with each of its maps, of the same alignments."""
     cubes = [
         align_cube(wearer, rng, placement, settings.corner_sigma_m) for _ in range(_MPAAM_CUBES)
@@ -289,7 +294,7 @@ def _by_cubes(
     for model in FEWEST_PAIRS:
         T = solve_mpaam(tracked_m, shown_m, model)
         found = {eye: P @ T for eye, P in offline.items()}
-        yield Calibration(
+        yield MethodCalibration(
             f"MPAAM, {model}, {_MPAAM_CUBES} × 5", _MPAAM_CUBES, _seconds(_MPAAM_CUBES), found
         )
 
@@ -299,7 +304,7 @@ def _by_both_eyes(
     rng: np.random.Generator,
     placement: WearerSettings,
     settings: MethodSettings,
-) -> Iterator[Calibration]:
+) -> Iterator[MethodCalibration]:
     """Run the paper's method, and handcal with both eyes open: the first alignment is the same."""
     fused = _align_in_turn(wearer, rng, [EYES] * max(_HAND_COUNTS), placement, settings)
     for count, (alignment, shift_m) in enumerate(fused, 1):
@@ -307,11 +312,11 @@ def _by_both_eyes(
             solved = solve_alignment(alignment, wearer.rig, "paper")
             found = rendered(wearer, {eye: solved[eye].shift_m for eye in EYES})
             seconds = _seconds(1, by_hand=True) + _PAPER_SOLVES_S
-            yield Calibration(PAPER, 1, seconds, found)
+            yield MethodCalibration(PAPER, 1, seconds, found)
         if count in _HAND_COUNTS:
             seconds = _seconds(count, by_hand=True)
             found = rendered(wearer, shift_m)
-            yield Calibration(f"{HANDCAL_BOTH} {count}", count, seconds, found)
+            yield MethodCalibration(f"{HANDCAL_BOTH} {count}", count, seconds, found)
 
 
 def _by_each_eye(
@@ -319,7 +324,7 @@ def _by_each_eye(
     rng: np.random.Generator,
     placement: WearerSettings,
     settings: MethodSettings,
-) -> Iterator[Calibration]:
+) -> Iterator[MethodCalibration]:
     """Handcal with one eye open at a time: as many alignments of each."""
     order: list[tuple[Eye, ...]] = [("left",), ("right",)] * max(_HAND_COUNTS)
     for done, (_, shift_m) in enumerate(_align_in_turn(wearer, rng, order, placement, settings), 1):
@@ -327,7 +332,7 @@ def _by_each_eye(
         if not half and count in _HAND_COUNTS:
             seconds = _seconds(done, by_hand=True)
             found = rendered(wearer, shift_m)
-            yield Calibration(f"{HANDCAL_EACH} {count}", done, seconds, found)
+            yield MethodCalibration(f"{HANDCAL_EACH} {count}", done, seconds, found)
 
 
 def _align_in_turn(

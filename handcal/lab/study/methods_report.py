@@ -13,7 +13,7 @@ from handcal.display import TARGET_DEPTHS_M
 from handcal.export.figures import COLORS, name_axes
 from handcal.lab.methods.published import MISALIGNMENT, REPROJECTION
 from handcal.lab.study.methods import HANDCAL_BOTH, HANDCAL_EACH, PAPER, MethodSettings
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
 from handcal.rig.example import example_rig
@@ -38,7 +38,7 @@ _ROW_MM, _FIGURE_MM = 4.2, 12.0
 _NAMES_MM = 42.0
 
 
-def methods_report(settings: MethodSettings, rows: Sequence[Row]) -> Report:
+def methods_report(settings: MethodSettings, rows: Sequence[StudyRow]) -> Report:
     """Return the report of a method comparison."""
     first = _population(rows, settings.eye_distance_sigmas_m[0])
     paper, one, three, each = (
@@ -54,7 +54,7 @@ def methods_report(settings: MethodSettings, rows: Sequence[Row]) -> Report:
     )
 
 
-def _sections(settings: MethodSettings, rows: Sequence[Row]) -> Iterator[Section]:
+def _sections(settings: MethodSettings, rows: Sequence[StudyRow]) -> Iterator[Section]:
     yield Section("", [facts(made_with()), _MODEL, _TIME, _REFUSED])
     for sigma_m in settings.eye_distance_sigmas_m:
         found = _population(rows, sigma_m)
@@ -73,7 +73,7 @@ def _sections(settings: MethodSettings, rows: Sequence[Row]) -> Iterator[Section
     yield Section("Settings", settings_items(asdict(settings), "study.json"))
 
 
-def _reprojection_table(rows: Sequence[Row]) -> Table:
+def _reprojection_table(rows: Sequence[StudyRow]) -> Table:
     columns = [Column("method", "left")] + [
         Column(title)
         for title in (
@@ -107,7 +107,7 @@ def _reprojection_table(rows: Sequence[Row]) -> Table:
     return Table(columns, cells, "Reprojection error over all corners, eyes and distances.")
 
 
-def _misalignment_table(rows: Sequence[Row]) -> Table:
+def _misalignment_table(rows: Sequence[StudyRow]) -> Table:
     columns = [Column("method", "left")] + [
         Column(f"{axis} at {depth_m} m, mm") for depth_m in TARGET_DEPTHS_M for axis in "xyz"
     ]
@@ -123,8 +123,8 @@ def _misalignment_table(rows: Sequence[Row]) -> Table:
     return Table(columns, cells, "Misalignment in space.")
 
 
-def _eye_distance(settings: MethodSettings, rows: Sequence[Row]) -> Section:
-    """Compare what a varying eye distance costs with what one displacement for two eyes must."""
+def _eye_distance(settings: MethodSettings, rows: Sequence[StudyRow]) -> Section:
+    """Compare the errors that a varying eye distance causes, by method, with the prediction."""
     sigma_m = settings.eye_distance_sigmas_m[1]
     depth_m = TARGET_DEPTHS_M[1]
     columns = [Column("method", "left"), Column("rms, set, arcmin"), Column("rms, varying, arcmin")]
@@ -148,9 +148,9 @@ def _eye_distance(settings: MethodSettings, rows: Sequence[Row]) -> Section:
 
 
 def predicted_cost_arcmin(sigma_m: float, depth_m: float) -> float:
-    """Return the rms error that an unseen eye distance leaves in each eye.
+    """Return the rms error in each eye that an unknown eye distance causes.
 
-    Half the deviation, seen at the target's depth against the display's.
+    It is the parallax of half the deviation between the depths of the target and the display.
     """
     distance_m = example_rig().eyes["left"].z_C0_S_m
     return float(60.0 * np.degrees(0.5 * sigma_m * (1.0 / depth_m - 1.0 / distance_m)))
@@ -179,7 +179,7 @@ def _published() -> Section:
     )
 
 
-def _figure(rows: Sequence[Row], name: str) -> Figure:
+def _figure(rows: Sequence[StudyRow], name: str) -> Figure:
     return Figure(
         name,
         "Boxes: quartiles and median over all corners; whiskers: 5th and 95th percentile.",
@@ -190,7 +190,7 @@ def _figure(rows: Sequence[Row], name: str) -> Figure:
     )
 
 
-def _draw(rows: Sequence[Row], axes: Sequence[Axes]) -> None:
+def _draw(rows: Sequence[StudyRow], axes: Sequence[Axes]) -> None:
     (ax,) = axes
     names = _methods(rows)
     errors = [_arcmin(_of(rows, name)) for name in names]
@@ -209,27 +209,27 @@ def _draw(rows: Sequence[Row], axes: Sequence[Axes]) -> None:
     name_axes(ax, "reprojection error", "arcmin", "")
 
 
-def _methods(rows: Sequence[Row]) -> list[str]:
+def _methods(rows: Sequence[StudyRow]) -> list[str]:
     return list(dict.fromkeys(str(row["method"]) for row in rows))
 
 
-def _population(rows: Sequence[Row], sigma_m: float) -> list[Row]:
+def _population(rows: Sequence[StudyRow], sigma_m: float) -> list[StudyRow]:
     return [row for row in rows if row["eye_distance_sigma_mm"] == 1e3 * sigma_m]
 
 
-def _of(rows: Sequence[Row], name: str) -> list[Row]:
+def _of(rows: Sequence[StudyRow], name: str) -> list[StudyRow]:
     return [row for row in rows if row["method"] == name]
 
 
-def _at(rows: Sequence[Row], depth_m: float) -> list[Row]:
+def _at(rows: Sequence[StudyRow], depth_m: float) -> list[StudyRow]:
     return [row for row in rows if row["depth_m"] == depth_m]
 
 
-def _arcmin(rows: Sequence[Row]) -> Float64:
+def _arcmin(rows: Sequence[StudyRow]) -> Float64:
     """Return (N, 8) errors of the rows that are not refused: each eye's four corners."""
     errors = [[row[name] for name in ARCMIN_COLUMNS] for row in rows if not row["refused"]]
     return np.array(errors, dtype=np.float64).reshape(-1, len(ARCMIN_COLUMNS))
 
 
-def _numbers(rows: Sequence[Row], name: str, depth_m: float) -> Float64:
+def _numbers(rows: Sequence[StudyRow], name: str, depth_m: float) -> Float64:
     return np.array([row[name] for row in _at(rows, depth_m)], dtype=np.float64)

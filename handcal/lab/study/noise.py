@@ -13,22 +13,22 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from handcal.lab.study.run import Case, Study
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import floor_error_m, solve_trial, study_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.placement import Slip
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_slip
+from handcal.sim.placement import PlacementError
+from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
 from handcal.types import EYES, METHODS, Float64, Intrinsics, Method
 
 FLOOR = "known pairs"
-"""Stands for a method: least squares with the true pairs, which only a turned hand disturbs."""
+"""Name of the lower bound: least squares with the true pairs, disturbed only by a rotated hand."""
 ERRORS_MM = "error_1_mm", "error_2_mm", "error_3_mm"
 """The columns of φ's error."""
 HANDS = "hand shape"
-"""The section whose values are people."""
+"""The section in which the hand varies."""
 
 # A D415's smaller images, which are drawn three times as fast, show enough points.
 _CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
@@ -50,7 +50,7 @@ class NoiseSettings:
     """The first so many of them, but for the section of hand shapes, are solved by ``linear``, and
     by ``paper``, which is slow."""
     hands: int = 20
-    """People, who come again; errors of one are not independent of one another."""
+    """Number of people, each with several alignments; the errors of one person are correlated."""
     points: int = 1000
     """Of each cloud."""
     depth_sigma_m: float = 0.001
@@ -97,7 +97,7 @@ _Making: TypeAlias = "tuple[AlignmentSettings, float]"
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class NoiseSection:
     """A part of the study, in which one thing varies."""
 
     name: str
@@ -119,55 +119,57 @@ def _measured(settings: NoiseSettings, **changes: Any) -> _Making:
     return replace(usual, **changes), settings.angle_deg
 
 
-SECTIONS: Mapping[str, Section] = {
+SECTIONS: Mapping[str, NoiseSection] = {
     section.name: section
     for section in (
-        Section(
+        NoiseSection(
             "rotation",
             lambda settings: sorted({*settings.coarse_deg, *settings.fine_deg}),
             lambda settings, angle: (AlignmentSettings(settings.points, exact=False), angle),
             "rotation, °",
         ),
-        Section(
+        NoiseSection(
             "rotation, size kept",
             lambda settings: settings.kept_deg,
             lambda settings, angle: (AlignmentSettings(settings.points), angle),
             "rotation, °",
         ),
-        Section(
+        NoiseSection(
             "eye box",
             lambda settings: settings.shift_max_m,
             lambda settings, shift: _measured(settings, shift_max_m=shift),
             "each component of φ within ±, mm",
             1e3,
         ),
-        Section(
+        NoiseSection(
             "depth noise",
             lambda settings: settings.depth_sigmas_m,
             lambda settings, sigma: _measured(settings, depth_sigma_m=sigma),
             "σ of each point's depth, mm",
             1e3,
         ),
-        Section(
+        NoiseSection(
             "forearm",
             lambda settings: settings.forearms_m,
             lambda settings, forearm: _measured(settings, hand_forearm_m=forearm),
             "forearm of the hand's cloud, mm",
             1e3,
         ),
-        Section(
+        NoiseSection(
             "points",
             lambda settings: settings.counts,
             lambda settings, count: _measured(settings, count=int(count)),
             "points of each cloud",
         ),
-        Section(
+        NoiseSection(
             HANDS,
             lambda settings: range(settings.shapes),
             lambda settings, _hand: _measured(settings),
             "hand",
         ),
-        Section("wearer", lambda settings: settings.slips, None, "wearer's errors, × the usual"),
+        NoiseSection(
+            "wearer", lambda settings: settings.slips, None, "wearer's errors, × the usual"
+        ),
     )
 }
 
@@ -183,8 +185,8 @@ def noise_study(settings: NoiseSettings) -> Study:
     return Study("noise", settings, cases, noise_trial)
 
 
-def noise_trial(settings: NoiseSettings, case: Case) -> list[Row]:
-    """Simulate one alignment and solve it by every method that its number is for.
+def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
+    """Simulate one alignment and solve it by every method that uses this trial number.
 
     Returns
     -------
@@ -204,7 +206,7 @@ def noise_trial(settings: NoiseSettings, case: Case) -> list[Row]:
         if section.making is None
         else _solve(*section.making(settings, float(case["value"])), rng, hand, methods)
     )
-    rows: list[Row] = []
+    rows: list[StudyRow] = []
     for method, iterations, error_m in solved:
         errors_mm = dict(zip(ERRORS_MM, (1e3 * error_m).tolist(), strict=True))
         rows.append({**case, "hand": hand, "method": method, "iterations": iterations, **errors_mm})
@@ -230,7 +232,7 @@ def _solve(
 
 def _solve_wearer(
     settings: NoiseSettings,
-    slip: float,
+    error_scale: float,
     rng: np.random.Generator,
     hand: int,
     trial: int,
@@ -239,7 +241,7 @@ def _solve_wearer(
     """Solve one eye's alignment by a wearer who looks through the displays."""
     rig, usual, eye = example_rig(), WearerSettings(), EYES[trial // settings.hands % 2]
     true_m = draw_eyes(rng, usual)[eye]
-    drawn = draw_slip(rng, usual)
+    drawn = draw_placement_error(rng, usual)
     alignment = overlay_by_eye(
         rng,
         study_hand(hand),
@@ -247,7 +249,11 @@ def _solve_wearer(
         {eye: true_m},
         settings.points,
         settings.depth_sigma_m,
-        slip=Slip(slip * drawn.rotation_rad, slip * drawn.lateral_rad, slip * drawn.depth_ratio),
+        placement_error=PlacementError(
+            error_scale * drawn.rotation_rad,
+            error_scale * drawn.lateral_rad,
+            error_scale * drawn.depth_ratio,
+        ),
     )
     for method in methods:
         found = solve_alignment(alignment, rig, method)[eye]

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from handcal.export.figures import name_axes
 from handcal.lab.study.noise import ERRORS_MM, FLOOR, HANDS, SECTIONS, NoiseSettings
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
 from handcal.statistics import INTERVAL_METHOD, MeanInterval, mean_interval
@@ -21,7 +21,7 @@ from handcal.types import Float64
 
 LINE_MM = 4.0
 _PUBLISHED_DEG = 9.0
-# Where rcICP and ICP are compared.
+# Rotations at which rcICP and ICP are compared.
 _COMPARED_DEG = 5.0, 9.0, 20.0, 40.0, 60.0
 _COLORS = {
     "consistent": "#0072b2",
@@ -75,7 +75,7 @@ class _Point:
 _Mean: TypeAlias = Callable[[_Point], float]
 
 
-def noise_report(settings: NoiseSettings, rows: Sequence[Row]) -> Report:
+def noise_report(settings: NoiseSettings, rows: Sequence[StudyRow]) -> Report:
     """Return the report of a noise study from all its rows."""
     sections = {name: _points([row for row in rows if row["section"] == name]) for name in SECTIONS}
     alignments = len({(row["section"], row["value"], row["trial"]) for row in rows})
@@ -93,7 +93,7 @@ def noise_report(settings: NoiseSettings, rows: Sequence[Row]) -> Report:
     )
 
 
-def _counts(settings: NoiseSettings, rows: Sequence[Row]) -> dict[str, str]:
+def _counts(settings: NoiseSettings, rows: Sequence[StudyRow]) -> dict[str, str]:
     solved = {
         method: f"{sum(row['method'] == method for row in rows):,}"
         for method in _COLORS
@@ -107,15 +107,15 @@ def _counts(settings: NoiseSettings, rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
-def _points(rows: Sequence[Row]) -> list[_Point]:
+def _points(rows: Sequence[StudyRow]) -> list[_Point]:
     """Return the errors by method and value."""
-    groups: dict[tuple[str, float], list[Row]] = {}
+    groups: dict[tuple[str, float], list[StudyRow]] = {}
     for row in rows:
         groups.setdefault((str(row["method"]), _number(row["value"])), []).append(row)
     return [_point(value, method, group) for (method, value), group in groups.items()]
 
 
-def _point(value: float, method: str, rows: Sequence[Row]) -> _Point:
+def _point(value: float, method: str, rows: Sequence[StudyRow]) -> _Point:
     errors_mm = np.array([[_number(row[name]) for name in ERRORS_MM] for row in rows])
     hands = [row["hand"] for row in rows]
     length, *components = (
@@ -164,7 +164,7 @@ def _lead(points: Sequence[_Point]) -> str:
 
 
 def _published(points: Sequence[_Point]) -> Table:
-    """Return what the paper found, and what is found here."""
+    """Return the paper's findings beside those of this study."""
     reach = f"within {LINE_MM:g} mm up to"
     rows = [
         (f"{method}: {what} {reach}", published, f"{_reach_deg(points, method, mean):g}°")
@@ -216,7 +216,7 @@ def _section(settings: NoiseSettings, name: str, points: Sequence[_Point]) -> Se
 def _shown(
     settings: NoiseSettings, name: str, points: Sequence[_Point]
 ) -> tuple[Sequence[_Point], Sequence[_Point]]:
-    """Return what the figure's left axes show, and its right ones."""
+    """Return the curves of the figure's left and right axes."""
     right = [point for point in points if point.method != "icp"]
     if name != "rotation":
         return points, right
@@ -271,8 +271,8 @@ def _draw(
     ax.set_ylim(bottom=0.0)
 
 
-def _figure_row(name: str, point: _Point) -> Row:
-    row: Row = {
+def _figure_row(name: str, point: _Point) -> StudyRow:
+    row: StudyRow = {
         "section": name,
         "value": point.value,
         "method": point.method,

@@ -1,4 +1,4 @@
-"""SPAAM and INDICA on recorded calibrations: what real wearers' alignments say.
+"""SPAAM and INDICA on recorded calibrations of real wearers.
 
 The data set of Itoh & Klinker 2014 (github.com/YutaItoh/HMD-Calibration, MIT): a base recording and
 ten more of one display, each with 2D–3D alignments, eye positions from a tracker, and the
@@ -68,7 +68,7 @@ class RecordedResult:
     authors_spaam_px: float
     """Of SPAAM on its own alignments, ours and the authors'."""
     difference_px: float
-    """Largest difference, in x or y, between where the two draw a marker."""
+    """Largest difference, in x or y, between the markers drawn with the two."""
     base_px: float
     """Of the base recording's SPAAM, as it is."""
     recycled_px: float
@@ -110,7 +110,7 @@ def read_recordings(folder: Path) -> RecordedSet:
         )
     try:
         display = loadmat(_checked(folder / "display_param_nonlinear.mat"))
-        # Stored with y and z the other way.
+        # Stored with y and z inverted.
         T_S_W = np.column_stack([display["R_WS"], display["t_WS"]]) * [[1.0], [-1.0], [1.0]]
         size_px = np.array([display["w"].item(), display["h"].item()], dtype=np.float64)
         return RecordedSet(recordings, T_S_W, display["alpha"].item(), 0.5 * size_px - 0.5)
@@ -124,7 +124,7 @@ def evaluate_recordings(data: RecordedSet) -> dict[str, RecordedResult]:
     Raises
     ------
     FileError
-        If a recording's alignments do not tell a projection.
+        If a recording's alignments do not determine a projection.
     """
     P_base = _solve(BASE, data.recordings[BASE])
     K, R, viewpoint_m = split_projection(P_base)
@@ -183,7 +183,7 @@ def _errors_px(P: Float64, recording: Recording) -> Float64:
 
 
 def _forward(P: Float64, points_m: Float64) -> Float64:
-    """Return a projection with the sign that gives what was aligned a positive weight."""
+    """Return a projection with the sign that gives the aligned points a positive weight."""
     weights = points_m @ P[2, :3] + P[2, 3]
     return P if np.median(weights) > 0.0 else -P
 

@@ -13,12 +13,12 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias
 
 from handcal.errors import CancelledError
-from handcal.lab.study.store import Row, StudyFolder, holds_study
+from handcal.lab.study.store import StudyFolder, StudyRow, holds_study
 from handcal.lab.study.workers import open_workers
 from handcal.progress import Progress
 
 Case: TypeAlias = dict[str, float | int | str]
-"""Names a cell of the study, and the wearer or trial in it: JSON-able."""
+"""Identifies a cell of the study and a wearer or trial in it; JSON-able."""
 
 RUNNING = "Running the trials"
 """The activity that `run_study` reports."""
@@ -35,7 +35,7 @@ class Study:
     settings: Any
     """A frozen dataclass of JSON-able fields, which can be pickled."""
     cases: Sequence[Case]
-    trial: Callable[[Any, Case], list[Row]]
+    trial: Callable[[Any, Case], list[StudyRow]]
     """Gives the rows of one case from `settings` and the case, its random numbers from these alone.
     A function of a module, so that other processes can import it; no number in its rows is NaN or
     infinite."""
@@ -48,7 +48,7 @@ def run_study(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress = Progress(),
-) -> list[Row]:
+) -> list[StudyRow]:
     """Run the cases of a study that are left, and return the rows of all cases in their order.
 
     The rows do not depend on the number of workers. Completed chunks of cases are kept in `folder`,
@@ -58,7 +58,7 @@ def run_study(
     ----------
     study : Study
     folder : Path
-        Of this study alone; may hold part of it.
+        A folder for this study only; may contain completed parts of it.
     workers : int, optional
         Processes; one per core by default, and no other process than this one for 1.
     scheduler : str, optional
@@ -108,9 +108,9 @@ def resumable() -> Iterator[None]:
 
 
 def share_done(study: Study, folder: Path) -> float:
-    """Return which share of a study a folder holds, 0..1.
+    """Return the completed share of a study in a folder, 0..1.
 
-    A damaged chunk counts, though it will be done again: files are not read, so that this is quick.
+    A damaged chunk counts, although it will be repeated: to be quick, no file is read.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def _run_chunks(
     chunks: Mapping[int, Sequence[Case]],
     executor: Executor,
     progress: Progress,
-) -> Iterator[tuple[int, list[list[Row]]]]:
+) -> Iterator[tuple[int, list[list[StudyRow]]]]:
     """Yield the number of each chunk, and the rows of its cases, once all of them are done."""
     places = {
         executor.submit(_run_case, study.trial, study.settings, case): (number, place)
@@ -145,7 +145,7 @@ def _run_chunks(
     finished: SimpleQueue[Future[str]] = SimpleQueue()
     for future in places:
         future.add_done_callback(finished.put)
-    parts: dict[int, dict[int, list[Row]]] = {number: {} for number in chunks}
+    parts: dict[int, dict[int, list[StudyRow]]] = {number: {} for number in chunks}
     while parts:
         progress.check()
         try:
@@ -159,8 +159,8 @@ def _run_chunks(
             yield number, [part[place] for place in range(len(part))]
 
 
-def _run_case(trial: Callable[[Any, Case], list[Row]], settings: Any, case: Case) -> str:
-    """Return the rows of a case as JSON: what is read again is just what is returned at once."""
+def _run_case(trial: Callable[[Any, Case], list[StudyRow]], settings: Any, case: Case) -> str:
+    """Return the rows of a case as JSON, so that stored rows and new ones are identical."""
     try:
         return json.dumps(trial(settings, case), allow_nan=False)
     except Exception as error:

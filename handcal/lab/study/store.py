@@ -18,7 +18,7 @@ from handcal.errors import FileError
 from handcal.io.files import make_folder, read_json, write_atomic, write_json
 from handcal.report.rows import rows_csv
 
-Row: TypeAlias = dict[str, float | int | str | bool | None]
+StudyRow: TypeAlias = dict[str, float | int | str | bool | None]
 """One row of a study's table; None for an empty cell."""
 
 _STUDY = "study.json"
@@ -26,7 +26,7 @@ _LIBRARIES = "handcal", "numpy", "scipy", "opencv-python-headless"
 
 
 def holds_study(folder: Path) -> bool:
-    """Return whether a folder is that of a study."""
+    """Return whether a folder contains a study."""
     return (folder / _STUDY).exists()
 
 
@@ -49,7 +49,7 @@ class StudyFolder:
     Parameters
     ----------
     path : Path
-        Made if it is not there.
+        Created if missing.
     name : str
     settings : dict
         JSON-able.
@@ -96,21 +96,21 @@ class StudyFolder:
         """Return at once whether a chunk is there, complete or damaged."""
         return self._file(number).exists()
 
-    def read_chunk(self, number: int) -> list[list[Row]] | None:
+    def read_chunk(self, number: int) -> list[list[StudyRow]] | None:
         """Return the rows of each case of a chunk; None if it is not there, or damaged."""
         file = self._file(number)
         try:
             stored = read_json(file)
         except FileError:
             return None
-        rows: list[list[Row]] | None = stored.get("rows")
+        rows: list[list[StudyRow]] | None = stored.get("rows")
         return rows if stored.get("sha256") == _sha256(rows) else None
 
-    def write_chunk(self, number: int, rows: list[list[Row]]) -> None:
+    def write_chunk(self, number: int, rows: list[list[StudyRow]]) -> None:
         """Store the rows of each case of a chunk."""
         write_json(self._file(number), {"sha256": _sha256(rows), "rows": rows})
 
-    def write_rows(self, rows: Sequence[Row]) -> None:
+    def write_rows(self, rows: Sequence[StudyRow]) -> None:
         """Write ``rows.csv``."""
         write_atomic(self._path / "rows.csv", rows_csv(rows))
 
@@ -123,7 +123,7 @@ def _sha256(value: object) -> str:
 
 
 def _differences(stored: Mapping[str, Any], study: Mapping[str, Any]) -> str:
-    """Return what the two differ in, as one line: empty if they are the same."""
+    """Return the differences as one line; empty if there are none."""
     parts = []
     for key in study:
         old, new = stored.get(key), study[key]

@@ -13,7 +13,7 @@ from handcal.lab.study.methods_report import methods_report
 from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
 from handcal.lab.study.noise_report import noise_report
 from handcal.lab.study.run import Study, resumable, run_study
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
 from handcal.progress import Progress
 from handcal.report.document import Report
@@ -69,7 +69,7 @@ def method_cases(settings: MethodComparisonSettings) -> Study:
 
 def run_and_report(
     study: Study,
-    report_of: Callable[[Any, Sequence[Row]], Report],
+    report_of: Callable[[Any, Sequence[StudyRow]], Report],
     settings: NoiseStudySettings | MethodComparisonSettings,
     progress: Progress,
 ) -> StudyResult:

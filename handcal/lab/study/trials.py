@@ -1,4 +1,4 @@
-"""One simulated alignment: whose hand it is, and what each method makes of it."""
+"""One simulated alignment: the hand of the person, and the solution of each method."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Search of the wearers' errors with which the paper's method errs as in the paper's user test.
 
-A method comparison is worth no more than its wearers. Theirs err in what they overlay by multiples
-of `WearerSettings`' errors: across, in size and in rotation alike.
+A method comparison is only as good as its simulated wearers. Their overlay errors are multiples of
+`WearerSettings`' errors: across, in size and in rotation alike.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class NoiseFit:
 def fit_noise(settings: MethodSettings, wearers: int, progress: Progress = Progress()) -> NoiseFit:
     """Search for the scale at which the paper's method errs by 10.79′ on the mean.
 
-    By Brent's method; a wearer's slips are the same at every scale but for their size. Eye
+    By Brent's method; a wearer's errors differ between scales only in size. Eye
     distances are the rig's, as the paper's headset was set to its users.
 
     Parameters

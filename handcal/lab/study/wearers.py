@@ -1,7 +1,7 @@
 """A simulated wearer who does what each calibration method asks: hands, points, a cube.
 
-What is aligned with what, and how far it misses, is made by rays through the displays; no method's
-equation takes part.
+Alignments and their errors are simulated by rays through the displays, without any method's
+equations.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from handcal.register.guard import GuardSettings
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.placement import misplace, overlay_hand, view_through
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_slip
+from handcal.sim.placement import apply_placement_error, overlay_hand, view_through
+from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
 from handcal.types import EYES, Alignment, Eye, Float64, Rig
 
 _REACH_M = 0.35, 0.70
@@ -35,7 +35,7 @@ _MPAAM_CORNERS = (0, 2, 4, 6, 7)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StudyWearer:
-    """Somebody who wears the example rig."""
+    """A person who wears the example rig."""
 
     rig: Rig
     hand: HandModel
@@ -47,7 +47,7 @@ class StudyWearer:
         return view_of_eye(self.rig.eyes[eye], np.eye(4))
 
     def sees(self, eye: Eye) -> Float64:
-        """Return (3, 4): on which pixel an eye sees a point of H, by the truth."""
+        """Return the true projection (3, 4) of an eye: pixels from points in H."""
         return eye_projection(self.rig.eyes[eye], self.true_shift_m[eye]) @ self.T_E_H(eye)
 
     def eye_m(self, eye: Eye) -> Float64:
@@ -87,9 +87,9 @@ def align_hand(
     depth_sigma_m : float
         Of each point.
     """
-    slip = draw_slip(rng, placement)
-    while np.linalg.norm(slip.rotation_rad) > GuardSettings().limit_rad:
-        slip = draw_slip(rng, placement)
+    error = draw_placement_error(rng, placement)
+    while np.linalg.norm(error.rotation_rad) > GuardSettings().limit_rad:
+        error = draw_placement_error(rng, placement)
     return overlay_by_eye(
         rng,
         wearer.hand,
@@ -97,7 +97,7 @@ def align_hand(
         {eye: wearer.true_shift_m[eye] for eye in eyes},
         points,
         depth_sigma_m,
-        slip=slip,
+        placement_error=error,
         drawn_shift_m=drawn_shift_m,
     )
 
@@ -156,7 +156,7 @@ def align_cube(
     wearer : StudyWearer
     rng : numpy.random.Generator
     placement : WearerSettings
-        How far the overlay misses, the same as a hand's.
+        Errors of the overlay, the same as those of a hand.
     tracking_sigma_m : float
         Of each corner, each axis.
 
@@ -165,7 +165,7 @@ def align_cube(
     tracked_m, shown_m : (5, 3) float64
         Corners of the real cube, and of the virtual one in the virtual scene; in H.
     """
-    slip = draw_slip(rng, placement)
+    error = draw_placement_error(rng, placement)
     middle_m = np.mean([invert(wearer.T_E_H(eye))[:3, 3] for eye in EYES], axis=0)
     aside_m = rng.uniform(-_CUBE_ASIDE_M, _CUBE_ASIDE_M, 2)
     T_H_shown = rigid(
@@ -183,9 +183,11 @@ def align_cube(
         )
         for eye in EYES
     ]
-    placed = overlay_hand(edges_m, T_H_shown @ rigid(slip.rotation_rad), views)
+    placed = overlay_hand(edges_m, T_H_shown @ rigid(error.rotation_rad), views)
     assert placed is not None, "the cube is on the displays"
-    T_H_cube = misplace(placed[0], np.mean([wearer.eye_m(eye) for eye in EYES], axis=0), slip)
+    T_H_cube = apply_placement_error(
+        placed[0], np.mean([wearer.eye_m(eye) for eye in EYES], axis=0), error
+    )
     corners_m = _CORNERS_M[list(_MPAAM_CORNERS)]
     tracked_m = transform(T_H_cube, corners_m)
     return tracked_m + rng.normal(0.0, tracking_sigma_m, (5, 3)), transform(T_H_shown, corners_m)

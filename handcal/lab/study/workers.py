@@ -27,7 +27,7 @@ _THREAD_LIMITS = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 @contextmanager
 def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executor]:
-    """Yield an executor; functions that have not begun when the context is left are not run.
+    """Yield an executor; at the end of the context, functions not yet started are discarded.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 def _processes(workers: int) -> Iterator[Executor]:
     if sys.platform == "win32":
         workers = min(workers, _MOST_ON_WINDOWS)
-    # More than one thread of linear algebra in each process would only be in the others' way.
+    # One thread of linear algebra per process: more would compete with the other processes.
     before = {name: os.environ.get(name) for name in _THREAD_LIMITS}
     os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
     context = multiprocessing.get_context("spawn")

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from handcal.display import TARGET_DEPTHS_M
 from handcal.session.session import SessionRecord
-from handcal.session.trial import summarise
+from handcal.session.trial import summarise_trials
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
@@ -115,7 +115,7 @@ class TrialsPanel(QWidget):
         """Show the trials of a session."""
         before, self._record = self._record, record
         if before is None or trials_id(before) != trials_id(record):
-            statistics = summarise(record.trials.values())
+            statistics = summarise_trials(record.trials.values())
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(statistics))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(statistics))

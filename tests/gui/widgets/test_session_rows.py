@@ -9,7 +9,7 @@ import pytest
 from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
-from handcal.session.trial import Trial, make_trial, summarise
+from handcal.session.trial import Trial, make_trial, summarise_trials
 from handcal.types import Alignment, Eye
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
@@ -86,7 +86,7 @@ def test_trials_as_text(record: SessionRecord) -> None:
 
 def test_statistics_as_text() -> None:
     trials = [trial("left", 0.4, 0.001), trial("right", 0.6, 0.002)]
-    statistics = summarise(trials)
+    statistics = summarise_trials(trials)
     rows = {row.label: row.cells for row in statistics_rows(statistics)}
     assert list(rows) == ["All", "Left eye", "Right eye", "0.4 m", "0.6 m"]
     assert {len(cells) for cells in rows.values()} == {len(STATISTICS_COLUMNS)}
@@ -97,8 +97,8 @@ def test_statistics_as_text() -> None:
 
 
 def test_statistics_of_nothing() -> None:
-    assert statistics_rows(summarise([])) == []
-    assert statistics_text(summarise([])) == "No trials yet"
+    assert statistics_rows(summarise_trials([])) == []
+    assert statistics_text(summarise_trials([])) == "No trials yet"
 
 
 def test_deletions_in_their_order(record: SessionRecord) -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from handcal.lab.bench.figure import Figure
+from handcal.lab.bench.figure import BenchFigure
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ from handcal.lab.bench.figure import Figure
 def test_a_figure_is_judged_by_its_target(
     at_least: float | None, at_most: float | None, target: str, met: bool | None
 ) -> None:
-    figure = Figure("speed", 30.0, "mm", at_least, at_most)
+    figure = BenchFigure("speed", 30.0, "mm", at_least, at_most)
     assert figure.to_json() == {
         "what": "speed",
         "value": 30.0,
@@ -29,4 +29,4 @@ def test_a_figure_is_judged_by_its_target(
 
 
 def test_what_could_not_be_measured_meets_no_target() -> None:
-    assert Figure("speed", float("nan"), "mm", at_most=1.0).to_json()["met"] is False
+    assert BenchFigure("speed", float("nan"), "mm", at_most=1.0).to_json()["met"] is False

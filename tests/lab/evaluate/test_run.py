@@ -24,8 +24,6 @@ from handcal.sim.cube_captures import CaptureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA
 from handcal.types import EYES, Rig
 
-Report = Callable[[str, float], None]
-
 
 @pytest.fixture
 def sessions(tmp_path: Path) -> Path:
@@ -100,7 +98,9 @@ def test_a_cube_test_without_captures_renders_them(
     told: list[tuple[str, float]] = []
     asked: list[CaptureSettings] = []
 
-    def render(folder: Path, rig: Rig, settings: CaptureSettings, report: Report) -> None:
+    def render(
+        folder: Path, rig: Rig, settings: CaptureSettings, report: Callable[[str, float], None]
+    ) -> None:
         assert not any(folder.iterdir())
         asked.append(settings)
         report("centre, pose 1", 0.5)

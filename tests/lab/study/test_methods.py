@@ -10,10 +10,10 @@ from handcal.lab.study import wearer_noise
 from handcal.lab.study.methods import (
     HANDCAL_EACH,
     PAPER,
-    Calibration,
+    MethodCalibration,
     MethodSettings,
     compare_methods,
-    judge,
+    method_rows,
     methods_study,
     rendered,
     study_wearer,
@@ -21,7 +21,7 @@ from handcal.lab.study.methods import (
 )
 from handcal.lab.study.methods_report import ARCMIN_COLUMNS, methods_report, predicted_cost_arcmin
 from handcal.lab.study.run import Case
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearer_noise import PAPER_MEAN_ARCMIN, fit_noise
 from handcal.lab.study.wearers import align_cube, align_points
 from handcal.progress import Progress
@@ -41,17 +41,17 @@ CASE: Case = {"eye_distance_sigma_mm": 2.0, "wearer": 3}
 
 
 @pytest.fixture(scope="module")
-def errorless_rows() -> list[Row]:
+def errorless_rows() -> list[StudyRow]:
     return compare_methods(ERRORLESS, CASE)
 
 
-def mean_arcmin(rows: list[Row], method: str) -> float:
+def mean_arcmin(rows: list[StudyRow], method: str) -> float:
     of = [row for row in rows if row["method"] == method]
     assert len(of) == 3, method
     return float(np.mean([[float(row[name] or 0.0) for name in ARCMIN_COLUMNS] for row in of]))
 
 
-def test_wearers_who_err_nowhere_are_calibrated_exactly(errorless_rows: list[Row]) -> None:
+def test_wearers_who_err_nowhere_are_calibrated_exactly(errorless_rows: list[StudyRow]) -> None:
     """By every method whose equations are exact and which needs no depth camera."""
     for method in (
         *("SPAAM, 6", "SPAAM, 12", "SPAAM, 25", "Stereo-SPAAM, 12", "Stereo-SPAAM, 25"),
@@ -60,12 +60,12 @@ def test_wearers_who_err_nowhere_are_calibrated_exactly(errorless_rows: list[Row
         assert mean_arcmin(errorless_rows, method) < 1e-6
 
 
-def test_depth_clouds_alone_cost_little(errorless_rows: list[Row]) -> None:
+def test_depth_clouds_alone_cost_little(errorless_rows: list[StudyRow]) -> None:
     assert mean_arcmin(errorless_rows, f"{HANDCAL_EACH} 3") < 4.0
     assert mean_arcmin(errorless_rows, "no calibration") > 5.0
 
 
-def test_every_method_has_a_row_at_each_distance(errorless_rows: list[Row]) -> None:
+def test_every_method_has_a_row_at_each_distance(errorless_rows: list[StudyRow]) -> None:
     methods = {row["method"] for row in errorless_rows}
     assert len(errorless_rows) == 3 * len(methods)
     assert PAPER in methods
@@ -75,7 +75,7 @@ def test_every_method_has_a_row_at_each_distance(errorless_rows: list[Row]) -> N
         assert all(float(row[f"{axis}_mm"] or 0.0) >= 0.0 for axis in "xyz")
 
 
-def test_the_same_case_gives_the_same_rows(errorless_rows: list[Row]) -> None:
+def test_the_same_case_gives_the_same_rows(errorless_rows: list[StudyRow]) -> None:
     assert compare_methods(ERRORLESS, CASE) == errorless_rows
 
 
@@ -119,8 +119,8 @@ def test_a_wrong_eye_distance_is_seen_in_depth() -> None:
 
 def test_a_projection_that_puts_the_target_behind_the_eye_counts_as_refused() -> None:
     wearer, _ = study_wearer(ERRORLESS, CASE)
-    behind = Calibration("behind", 1, 1.0, {eye: -wearer.sees(eye) for eye in EYES})
-    rows = judge(wearer, behind, CASE)
+    behind = MethodCalibration("behind", 1, 1.0, {eye: -wearer.sees(eye) for eye in EYES})
+    rows = method_rows(wearer, behind, CASE)
     assert [row["refused"] for row in rows] == [True] * 3
 
 
@@ -170,7 +170,7 @@ def test_noise_that_cannot_explain_the_paper_is_refused(monkeypatch: pytest.Monk
         fit_noise(MethodSettings(), 2)
 
 
-def test_the_report_tells_every_method(errorless_rows: list[Row]) -> None:
+def test_the_report_tells_every_method(errorless_rows: list[StudyRow]) -> None:
     settings = MethodSettings(wearers=2)
     rows = [
         row | {"eye_distance_sigma_mm": 1e3 * sigma_m, "wearer": wearer}

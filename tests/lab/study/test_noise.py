@@ -15,7 +15,7 @@ from handcal.lab.study.noise import (
     noise_trial,
 )
 from handcal.lab.study.run import Case
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.types import METHODS, Float64
 
 SETTINGS = replace(QUICK_NOISE, hands=1, depth_sigma_m=0.0)
@@ -86,13 +86,13 @@ def test_more_noise_is_a_larger_error() -> None:
 
 
 def test_a_wearer_is_solved_as_well_as_the_hand_is_put() -> None:
-    steady, clumsy = (lengths_mm("wearer", slip, QUIET) for slip in (0.0, 4.0))
+    steady, clumsy = (lengths_mm("wearer", scale, QUIET) for scale in (0.0, 4.0))
     assert FLOOR not in steady
     assert steady["consistent"] < 1.0
     assert clumsy["consistent"] > 3.0 * steady["consistent"]
 
 
-def methods_of(rows: list[Row]) -> set[object]:
+def methods_of(rows: list[StudyRow]) -> set[object]:
     return {row["method"] for row in rows}
 
 

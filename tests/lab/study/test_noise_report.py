@@ -7,7 +7,7 @@ from matplotlib.figure import Figure as Canvas
 
 from handcal.lab.study.noise import ERRORS_MM, HANDS, QUICK_NOISE
 from handcal.lab.study.noise_report import LINE_MM, noise_report
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.report.document import Report, Table
 from handcal.statistics import mean_interval
 
@@ -16,7 +16,7 @@ SETTINGS = replace(QUICK_NOISE, coarse_deg=(0.0, 5.0, 10.0, 20.0), fine_deg=(0.0
 SLOPES_MM = {"paper": 0.4, "consistent": 0.2, "icp": 4.0, "linear": 1.0}
 
 
-def made(section: str, value: float, method: str, trial: int, error_1_mm: float) -> Row:
+def made(section: str, value: float, method: str, trial: int, error_1_mm: float) -> StudyRow:
     return {
         "section": section,
         "value": value,
@@ -29,7 +29,7 @@ def made(section: str, value: float, method: str, trial: int, error_1_mm: float)
 
 
 @pytest.fixture(scope="module")
-def rows() -> list[Row]:
+def rows() -> list[StudyRow]:
     """Return errors along φ1, as large as the rotation says, beside ± 0.1 mm."""
     turned = [
         made("rotation", angle, method, trial, slope * angle + sign * 0.1 * (angle > 0))
@@ -46,7 +46,7 @@ def rows() -> list[Row]:
 
 
 @pytest.fixture(scope="module")
-def report(rows: list[Row]) -> Report:
+def report(rows: list[StudyRow]) -> Report:
     return noise_report(SETTINGS, rows)
 
 

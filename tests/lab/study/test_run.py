@@ -13,7 +13,7 @@ import pytest
 
 from handcal.errors import CancelledError, FileError, HandcalError
 from handcal.lab.study.run import Case, Study, run_study, share_done
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.progress import Progress
 from tests.helpers import ROOT
 
@@ -30,7 +30,7 @@ class Settings:
     folder: str = ""
 
 
-def trial(settings: Settings, case: Case) -> list[Row]:
+def trial(settings: Settings, case: Case) -> list[StudyRow]:
     number = int(case["number"])
     if settings.log:
         with Path(settings.log).open("a") as file:
@@ -38,7 +38,7 @@ def trial(settings: Settings, case: Case) -> list[Row]:
     if settings.kills and number == MIDDLE:
         kill_once(settings)
     value = settings.scale * np.random.default_rng(number).normal()
-    row: Row = {**case, "value": value, "is_even": number % 2 == 0, "gap": None}
+    row: StudyRow = {**case, "value": value, "is_even": number % 2 == 0, "gap": None}
     return [row] * (number % 3)
 
 
@@ -51,23 +51,23 @@ def kill_once(settings: Settings) -> None:
         os.kill(os.getpid() if settings.kills == "self" else os.getppid(), signal.SIGKILL)
 
 
-def threads(settings: Settings, case: Case) -> list[Row]:
+def threads(settings: Settings, case: Case) -> list[StudyRow]:
     return [{"OMP_NUM_THREADS": os.environ["OMP_NUM_THREADS"]}]
 
 
-def fail_at_three(settings: Settings, case: Case) -> list[Row]:
+def fail_at_three(settings: Settings, case: Case) -> list[StudyRow]:
     if case["number"] == 3:
         raise ValueError("no such thing")
     return trial(settings, case)
 
 
-def sleep(settings: Settings, case: Case) -> list[Row]:
+def sleep(settings: Settings, case: Case) -> list[StudyRow]:
     Path(settings.log).touch()
     time.sleep(600.0)
     return []
 
 
-def nan(settings: Settings, case: Case) -> list[Row]:
+def nan(settings: Settings, case: Case) -> list[StudyRow]:
     return [{"value": np.nan}]
 
 

@@ -1,4 +1,4 @@
-"""Who does a study's trials; what they do is tested in `test_run`."""
+"""The workers that run a study's trials; `test_run` tests the trials themselves."""
 
 from __future__ import annotations
 

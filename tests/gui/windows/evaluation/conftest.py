@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 from handcal.errors import HandcalError
 from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import Case, Study
-from handcal.lab.study.store import Row
+from handcal.lab.study.store import StudyRow
 from handcal.lab.study.studies import StudyResult, run_and_report
 from handcal.progress import Progress
 from handcal.report.document import Column, Figure, Report, Section, Table
@@ -57,7 +57,7 @@ class Numbers:
     def _order(self, entries: NoiseStudySettings, progress: Progress) -> StudyResult:
         return run_and_report(self.study(entries), self._describe, entries, progress)
 
-    def _square(self, _settings: Any, case: Case) -> list[Row]:
+    def _square(self, _settings: Any, case: Case) -> list[StudyRow]:
         number = int(case["number"])
         if self.fails:
             raise HandcalError("numbers are out of stock")
@@ -66,7 +66,7 @@ class Numbers:
         self.squared.append(number)
         return [{**case, "square": number**2}]
 
-    def _describe(self, settings: Settings, rows: Sequence[Row]) -> Report:
+    def _describe(self, settings: Settings, rows: Sequence[StudyRow]) -> Report:
         cells = [(str(row["number"]), str(row["square"])) for row in rows]
         table = Table([Column("number"), Column("square")], cells, "All of them.")
         squares = [int(str(row["square"])) for row in rows]
