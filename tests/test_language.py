@@ -1,23 +1,16 @@
-"""Plain English in docstrings, comments, messages and the documentation.
-
-`tests/data/not_rewritten.txt` lists the files that have yet to be rewritten. A file that has become
-clean must leave the list: delete its line, or run this test once with ``HANDCAL_LANGUAGE=write``,
-which removes such lines and never adds one.
-"""
+"""Plain English in docstrings, comments, messages and the documentation: no banned words."""
 
 from __future__ import annotations
 
 import ast
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.helpers import DATA, ROOT
+from tests.helpers import ROOT
 
-NOT_REWRITTEN = DATA / "not_rewritten.txt"
 QUESTION = re.compile(r"(What|Whether|How|Where|Which|Who|When|Why)\b")
 BANNED = [
     "lest", "anew", "amid", "whoever", "thereof", "as it were", "gone on with", "broken off",
@@ -29,9 +22,11 @@ WORDS = re.compile(rf"\b({'|'.join(BANNED).replace(' ', BETWEEN.pattern)})\b", r
 
 
 def sources() -> list[Path]:
-    packages = [path for name in ("handcal", "handcal_gui") for path in (ROOT / name).rglob("*.py")]
-    texts = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "tests").rglob("*.py")]
-    return sorted(path for path in packages + texts if not path.stem.endswith("_pb2"))
+    """Return the files to check: code, tests, examples and pages."""
+    folders = "handcal", "handcal_gui", "examples", "tests"
+    code = [path for name in folders for path in (ROOT / name).rglob("*.py")]
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    return sorted(path for path in code + pages if not path.stem.endswith("_pb2"))
 
 
 def docstrings(source: str) -> Iterator[tuple[int, str]]:
@@ -61,39 +56,14 @@ def complaints(source: str, kind: str) -> list[str]:
     return [f"{line}: {complaint}" for line, complaint in sorted(found)]
 
 
-@pytest.fixture(scope="module")
-def unclean() -> dict[str, list[str]]:
-    """Return the complaints about each file that has any, by its path in the project."""
-    found = {}
+def test_files_are_in_plain_english() -> None:
+    wrong = []
     for path in sources():
         name = path.relative_to(ROOT).as_posix()
         kind = "text" if path.suffix == ".md" else "tests" if name[:6] == "tests/" else "package"
-        if about := complaints(path.read_text("utf-8"), kind):
-            found[name] = about
-    return found
-
-
-def not_rewritten() -> list[str]:
-    return NOT_REWRITTEN.read_text("utf-8").splitlines() if NOT_REWRITTEN.exists() else []
-
-
-def test_files_are_in_plain_english(unclean: dict[str, list[str]]) -> None:
-    wrong = [
-        f"{name}:{complaint}"
-        for name in sorted(unclean.keys() - set(not_rewritten()))
-        for complaint in unclean[name]
-    ]
+        found = complaints(path.read_text("utf-8"), kind)
+        wrong += [f"{name}:{complaint}" for complaint in found]
     assert wrong == []
-
-
-def test_the_list_of_files_to_rewrite_only_shrinks(unclean: dict[str, list[str]]) -> None:
-    listed = not_rewritten()
-    if os.environ.get("HANDCAL_LANGUAGE") == "write":
-        NOT_REWRITTEN.write_text("".join(f"{name}\n" for name in listed if name in unclean))
-        listed = not_rewritten()
-    clean = [name for name in listed if name not in unclean]
-    assert clean == [], f"remove these lines from {NOT_REWRITTEN.relative_to(ROOT)}"
-    assert listed == sorted(set(listed))
 
 
 @pytest.mark.parametrize(
