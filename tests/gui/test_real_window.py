@@ -274,7 +274,7 @@ def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
         time.sleep(2.0)
 
         def is_resumed() -> bool:
-            window.press("alt+g")
+            window.press("alt+r")
             time.sleep(1.0)
             return not find_offers(sessions, ()).unfinished[0].is_enabled
 
