@@ -27,19 +27,15 @@ from handcal.camera.camera import Camera
 from handcal.geometry import rigid
 from handcal.io.closable import Closable
 from handcal.lab.bench.figure import BenchFigure
+from handcal.lab.bench.speed import noisy_frames
 from handcal.link.pairing import new_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
-from handcal.rig.example import example_rig
-from handcal.sim.hand import make_hand
-from handcal.sim.render import World, render
-from handcal.sim.room import make_room
-from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import Float64, Frame
+from handcal.types import Frame
 from handcal_gui.app import keep_window_quick
 from handcal_gui.pages.wizard.steps import Action
 from handcal_gui.preferences import PreferencesFile
@@ -102,26 +98,8 @@ class _Film:
 
     def __init__(self) -> None:
         self.is_turned = False
-        world = World(make_hand(1), make_room(1))
-        self.frames = [_shoot(world, T) for T in (_T_D_CURSOR, _T_D_CURSOR @ _TURN)]
-
-
-def _shoot(world: World, T_D_hand: Float64) -> list[Frame]:
-    camera, sensor = example_rig().depth_intrinsics, SensorSettings()
-    depth_m, color = render(world, np.eye(4), T_D_hand, camera)
-    return [
-        Frame(
-            index=0,
-            t_camera_ns=0,
-            t_host_ns=0,
-            depth=sense_depth(depth_m, camera.fx, np.random.default_rng(seed), sensor),
-            depth_scale_m=sensor.depth_scale_m,
-            depth_intrinsics=camera,
-            color=color,
-            color_intrinsics=camera,
-        )
-        for seed in range(_NOISES)
-    ]
+        poses = (_T_D_CURSOR, _T_D_CURSOR @ _TURN)
+        self.frames = [noisy_frames(T_D_hand, _NOISES) for T_D_hand in poses]
 
 
 class _FilmStation(Station):

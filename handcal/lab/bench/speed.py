@@ -22,10 +22,12 @@ from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.camera import SyntheticCamera
+from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.render import World
+from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
+from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.types import EYES, Alignment, Float64, Frame
 
 Input = TypeVar("Input")
@@ -80,6 +82,32 @@ def simulated_frame() -> Frame:
     world = World(trial_hand(0), make_room(0))
     with SyntheticCamera(world, lambda: SceneState(0, T_W_D, T_W_hand)) as camera:
         return camera.read()
+
+
+def noisy_frames(T_D_hand: Float64, count: int) -> list[Frame]:
+    """Return frames of one view of a hand in a room that differ in the sensor's noise.
+
+    Parameters
+    ----------
+    T_D_hand : (4, 4) float64
+        From the hand's frame to the depth camera's.
+    count : int
+    """
+    camera, sensor = example_rig().depth_intrinsics, SensorSettings()
+    depth_m, color = render(World(make_hand(1), make_room(1)), np.eye(4), T_D_hand, camera)
+    return [
+        Frame(
+            index=0,
+            t_camera_ns=0,
+            t_host_ns=0,
+            depth=sense_depth(depth_m, camera.fx, np.random.default_rng(seed), sensor),
+            depth_scale_m=sensor.depth_scale_m,
+            depth_intrinsics=camera,
+            color=color,
+            color_intrinsics=camera,
+        )
+        for seed in range(count)
+    ]
 
 
 def following_ms(detector: Detector, frame: Frame) -> float:
