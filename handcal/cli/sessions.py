@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, fail, number
-from handcal.errors import FileError
 from handcal.export.formats import FORMATS
 from handcal.types import METHODS
 
@@ -26,17 +24,12 @@ def solve(arguments: argparse.Namespace) -> None:
 
     from handcal.register.results import results_json
     from handcal.session.session import Session
-    from handcal.station.solve_again import solve_again, stored_solve_settings
+    from handcal.station import solve_again
 
     record = Session.open(arguments.session)
     if record.torn_bytes:
         console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
-    settings = stored_solve_settings(record)
-    if arguments.method:
-        settings = replace(settings, method=arguments.method)
-    results = solve_again(record, settings)
-    if results is None:
-        raise FileError(f"{arguments.session} holds no alignment to solve")
+    results = solve_again.solve(record, method=arguments.method)
     save(arguments.json, results_json(results))
     shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.eyes.items():
