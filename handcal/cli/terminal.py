@@ -135,6 +135,8 @@ def _flush() -> None:
 
 def _discard_output() -> None:
     """Discard buffered output: flushing it at exit would fail again, with exit code 120."""
+    if sys.stdout is None:  # closed: nothing is buffered
+        return
     sink = os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, sys.stdout.fileno())
     os.close(sink)
