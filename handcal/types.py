@@ -119,6 +119,56 @@ class Intrinsics:
     distortion: tuple[float, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class CameraIdentity:
+    """The depth camera that gave the frames, as its driver reports it; empty texts if unknown."""
+
+    model: str = ""
+    serial_number: str = ""
+    firmware: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadsetView:
+    """One eye's rendering camera V, as the headset's runtime reports it."""
+
+    T_V_H: Float64
+    """(4, 4); from the headset rig to V."""
+    tangents: Float64
+    """(4,); left, right, up and down edge of the field of view: x/z or y/z in V."""
+    width_px: int
+    height_px: int
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        freeze(self, "T_V_H", np.float64, 4, 4)
+        freeze(self, "tangents", np.float64, 4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadsetIdentity:
+    """A headset, as it introduces itself on the link; empty texts and None if unknown."""
+
+    device_id: str
+    """Identity of this one device, in hexadecimal; it never changes."""
+    name: str = ""
+    """Name given by its owner, for people to read."""
+    runtime: str = ""
+    app: str = ""
+    """Name and version of the headset's runtime, and of the app that speaks the link."""
+    protocol: int = 0
+    """Version of the link's protocol."""
+    views: Mapping[Eye, HeadsetView] = field(default_factory=dict)
+    eye_distance_m: float | None = None
+    """The wearer's eye distance as the headset measures it."""
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "views", MappingProxyType(dict(self.views)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One depth image and, if the camera has one, its colour image."""
