@@ -86,7 +86,10 @@ _RIG: Mapping[str, Entry] = {
         "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
     ),
     "compare": Entry("Compare two rig files, and show how far apart they draw.", "rig_files"),
-    "migrate": Entry("Convert a rig file of any known version to the newest.", "rig_files"),
+    "migrate": Entry(
+        "Convert a rig file of any known version to the newest, and list what it does not say.",
+        "rig_files",
+    ),
 }
 
 COMMANDS: Mapping[str, Entry] = {

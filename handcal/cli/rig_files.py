@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.output import console, save, table
 from handcal.cli.rig import (
     BOARD_OPTIONS,
@@ -176,7 +177,8 @@ def display(arguments: argparse.Namespace) -> None:
         "--depth-intrinsics",
         type=Path,
         metavar="FILE",
-        help="intrinsics of the depth imager, if the stereo images are the colour imager's",
+        help="intrinsics of the depth imager, if the stereo images are the colour imager's; "
+        "depth-imager.json of 'handcal rig take' also holds the camera's serial number",
     ),
     arg(
         "--depth-to-color",
@@ -191,7 +193,7 @@ def make(arguments: argparse.Namespace) -> None:
     """Put the depth camera's pose, a stereo calibration, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
-    from handcal.rig.steps import intrinsics_in, pose_in
+    from handcal.rig.steps import identity_in, intrinsics_in, pose_in
 
     stereo = read_stereo(arguments.stereo)
     show_verdict(stereo.verdict)
@@ -200,6 +202,7 @@ def make(arguments: argparse.Namespace) -> None:
         stereo,
         depth_intrinsics=intrinsics_in(arguments.depth_intrinsics),
         T_C_D=pose_in(arguments.depth_to_color),
+        depth_camera=identity_in(arguments.depth_intrinsics),
     )
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
 
@@ -241,10 +244,40 @@ def compare(arguments: argparse.Namespace) -> None:
 @command(
     arg("input", type=Path, help="rig file"),
     arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+    arg(
+        "--camera",
+        metavar="SOURCE",
+        help="realsense, or a recording by the rig's depth camera: stores its model, serial number "
+        "and firmware",
+    ),
+    *REALSENSE_OPTIONS,
 )
 def migrate(arguments: argparse.Namespace) -> None:
-    """Convert a rig file of any known version to the newest."""
-    _write(arguments.output, _read_rig(arguments.input))
+    """Convert a rig file of any known version to the newest, and list what it does not say."""
+    from handcal.rig.report import missing_parts
+
+    rig = _read_rig(arguments.input)
+    if arguments.camera is not None:
+        rig = _with_identity(rig, arguments)
+    _write(arguments.output, rig)
+    for line in missing_parts(rig):
+        console.print(f"missing: {line}", markup=False)
+
+
+def _with_identity(rig: Rig, arguments: argparse.Namespace) -> Rig:
+    """Return the rig with the identity of its depth camera; HandcalError if it is another one."""
+    from handcal.rig.compare import compare_camera
+
+    with open_source(arguments.camera, realsense_of(arguments)) as camera:
+        identity = camera.identity
+        differences = compare_camera(rig, identity, camera.depth_intrinsics)
+    if not identity.serial_number:
+        raise HandcalError(f"{camera.name} does not tell its serial number; use another source")
+    if differences:
+        raise HandcalError(
+            f"{camera.name} is not the depth camera of this rig: {'; '.join(differences)}"
+        )
+    return replace(rig, depth_camera=identity)
 
 
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:

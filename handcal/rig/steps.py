@@ -18,13 +18,13 @@ from handcal.rig.display import (
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
+from handcal.rig.formats import read_identity, read_intrinsics, read_pose, read_stereo
 from handcal.rig.grid import grid_on, on_display
 from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 from handcal.rig.views import View, used
-from handcal.types import Eye, Float64, Intrinsics, Rig
+from handcal.types import CameraIdentity, Eye, Float64, Intrinsics, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +144,11 @@ def calibrate_eye_display(
 def intrinsics_in(path: Path | None) -> Intrinsics | None:
     """Return the intrinsics in a file; None without one."""
     return None if path is None else read_intrinsics(path)
+
+
+def identity_in(path: Path | None) -> CameraIdentity:
+    """Return the identity of the camera in a file of its intrinsics; empty without one."""
+    return CameraIdentity() if path is None else read_identity(path)
 
 
 def pose_in(path: Path | None) -> Float64 | None:

@@ -13,6 +13,7 @@ from handcal.rig.formats import (
     FORMATS,
     CalibrationFormat,
     camera_json,
+    read_identity,
     read_intrinsics,
     read_pose,
     read_stereo,
@@ -24,7 +25,7 @@ from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.storage import MAX_STORAGE_BYTES
 from handcal.rig.views import View
 from handcal.sim.boards import board_poses, board_view
-from handcal.types import Intrinsics
+from handcal.types import CameraIdentity, Intrinsics
 
 FIVE = (0.1, -0.2, 1 / 3 * 1e-3, 0.002, 0.03)
 CAMERA = Intrinsics(640, 480, 500.1, 501 / 3, 320.5, 239.5, FIVE)
@@ -52,6 +53,20 @@ rectification_matrix:
   cols: 3
   data: [1., 0., 0., 0., 1., 0., 0., 0., 1.]
 """
+
+
+def test_the_identity_of_a_camera_is_kept_as_json(tmp_path: Path) -> None:
+    path, identity = tmp_path / "c.json", CameraIdentity("Intel RealSense D415", "123", "5.16")
+    write_intrinsics(path, CAMERA, "json", identity)
+    assert read_intrinsics(path) == CAMERA
+    assert read_identity(path) == identity
+    for kind in FORMATS:
+        write_intrinsics(path, CAMERA, kind)
+        assert read_identity(path) == CameraIdentity()
+    for bad in (3, {"model": 3}, {"serial_number": "1\n2"}, {"firmware": "x" * 1000}):
+        path.write_text(json.dumps({"device": bad}))
+        with pytest.raises(FileError, match=r"c\.json: device"):
+            read_identity(path)
 
 
 @pytest.mark.parametrize("kind", FORMATS)

@@ -16,6 +16,7 @@ from handcal.rig.steps import (
     calibrate_depth_camera,
     calibrate_eye_display,
     calibrate_viewpoint,
+    identity_in,
     intrinsics_in,
     pose_in,
 )
@@ -63,6 +64,7 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
         stereo=result,
         depth_intrinsics=intrinsics_in(entered_path(entries.imager_intrinsics)),
         T_C_D=pose_in(entered_path(entries.depth_to_color)),
+        depth_camera=identity_in(entered_path(entries.imager_intrinsics)),
     )
     return Solved(
         result.verdict,

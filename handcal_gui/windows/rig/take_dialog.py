@@ -64,7 +64,7 @@ class TakeDialog(QDialog):
         self._cameras = LiveCameras(
             tuple(folders),
             realsense,
-            lambda title, frame: keep_imager(folders[title], frame),
+            lambda title, frame, identity: keep_imager(folders[title], frame, identity),
             open_source,
         )
         self._found = FindingLine("taken")
