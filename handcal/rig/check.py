@@ -21,7 +21,7 @@ from handcal.types import (
     Rig,
 )
 
-MAX_SIDE_PX = 16384
+MAX_DEVICE_SIDE_PX = 16384
 MAX_NAME, MAX_TEXT = 200, 500
 MAX_PARAMETERS = 12
 MAX_RANGES = 20
@@ -196,8 +196,8 @@ def _check_camera(name: str, K: Float64) -> None:
 
 def _check_size(name: str, width: int, height: int) -> None:
     require(
-        1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX,
-        f"{name}: width_px and height_px must lie between 1 and {MAX_SIDE_PX}, "
+        1 <= width <= MAX_DEVICE_SIDE_PX and 1 <= height <= MAX_DEVICE_SIDE_PX,
+        f"{name}: width_px and height_px must lie between 1 and {MAX_DEVICE_SIDE_PX}, "
         f"got {width} and {height}",
     )
 

@@ -28,7 +28,7 @@ from handcal.rig.views import WorstView
 from handcal.types import CameraIdentity, Float64, Intrinsics
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
-FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
+CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
 JSON_VERSION = 1
 MAX_BYTES = 2**20
 _MAX_REACH_M = 10.0
@@ -38,7 +38,7 @@ Value = TypeVar("Value")
 
 
 def read_intrinsics(path: Path) -> Intrinsics:
-    """Read a camera's intrinsics in any of `FORMATS`, recognised by the file's content.
+    """Read a camera's intrinsics in any of `CALIBRATION_FORMATS`, recognised by the file's content.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from handcal.geometry import rigid
 from handcal.rig.board import Board
 from handcal.rig.camera import calibrate_camera
 from handcal.rig.formats import (
-    FORMATS,
+    CALIBRATION_FORMATS,
     CalibrationFormat,
     camera_json,
     read_identity,
@@ -23,7 +23,7 @@ from handcal.rig.formats import (
 )
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.storage import MAX_STORAGE_BYTES
-from handcal.rig.views import View
+from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
 from handcal.types import CameraIdentity, Intrinsics
 
@@ -60,7 +60,7 @@ def test_the_identity_of_a_camera_is_kept_as_json(tmp_path: Path) -> None:
     write_intrinsics(path, CAMERA, "json", identity)
     assert read_intrinsics(path) == CAMERA
     assert read_identity(path) == identity
-    for kind in FORMATS:
+    for kind in CALIBRATION_FORMATS:
         write_intrinsics(path, CAMERA, kind)
         assert read_identity(path) == CameraIdentity()
     for bad in (3, {"model": 3}, {"serial_number": "1\n2"}, {"firmware": "x" * 1000}):
@@ -69,7 +69,7 @@ def test_the_identity_of_a_camera_is_kept_as_json(tmp_path: Path) -> None:
             read_identity(path)
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", CALIBRATION_FORMATS)
 @pytest.mark.parametrize("more", [(), (0.4, 0.5, 0.6)])
 def test_intrinsics_survive_exactly(
     tmp_path: Path, kind: CalibrationFormat, more: tuple[float, ...]
@@ -114,8 +114,8 @@ def test_a_whole_calibration_survives(tmp_path: Path) -> None:
     plain = Intrinsics(640, 480, 500.0, 500.0, 319.5, 239.5)
     pairs = [
         (
-            View(f"d{number}", board_view(board, T, plain, rng, 0.1), dropped=number == 2),
-            View(f"h{number}", board_view(board, T_H_D @ T, plain, rng, 0.1)),
+            BoardImage(f"d{number}", board_view(board, T, plain, rng, 0.1), dropped=number == 2),
+            BoardImage(f"h{number}", board_view(board, T_H_D @ T, plain, rng, 0.1)),
         )
         for number, T in enumerate(board_poses(board, plain, 8, rng))
     ]
