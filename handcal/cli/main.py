@@ -82,6 +82,10 @@ _RIG: Mapping[str, Entry] = {
     "make": Entry(
         "Put the depth camera's pose, a stereo calibration, into a rig file.", "rig_files"
     ),
+    "depth": Entry(
+        "Check the depth camera against a board at several distances, and put it into a rig file.",
+        "rig_files",
+    ),
     "check": Entry(
         "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
     ),

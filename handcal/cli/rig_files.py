@@ -1,14 +1,15 @@
-"""``handcal rig grid, display, make, check, compare, migrate``: displays and rig files."""
+"""``handcal rig grid, display, make, depth, check, compare, migrate``: displays and rig files."""
 
 from __future__ import annotations
 
 import argparse
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
-from handcal.cli.output import console, save, table
+from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.rig import (
     BOARD_OPTIONS,
     GRID_OPTION,
@@ -24,6 +25,7 @@ from handcal.io.files import make_folder
 from handcal.types import EYES
 
 if TYPE_CHECKING:
+    from handcal.camera.camera import Camera
     from handcal.rig.viewpoint import ViewpointPose
     from handcal.types import Intrinsics, Rig
 
@@ -207,6 +209,52 @@ def make(arguments: argparse.Namespace) -> None:
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
 
 
+@command(
+    arg("source", help="a recording of the board with depth and colour, or realsense"),
+    arg(
+        "--stills",
+        action="store_true",
+        help="every frame of the recording is a still image: use all that show the board",
+    ),
+    *_RIG_AND_OUTPUT,
+    *BOARD_OPTIONS,
+    *REALSENSE_OPTIONS,
+)
+def depth(arguments: argparse.Namespace) -> None:
+    """Check the depth camera against a board at several distances, and put it into a rig file."""
+    import numpy as np
+
+    from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
+    from handcal.rig.depth import explain_depth
+    from handcal.rig.report import depth_finding
+
+    rig, board = _read_rig(arguments.rig), board_of(arguments)
+    with ExitStack() as stack:
+        source = open_source(arguments.source, realsense_of(arguments))
+        camera = stack.enter_context(source)
+        _require_own(rig, camera)
+        is_stopped = stack.enter_context(until_interrupted())
+        progress = stack.enter_context(show_progress(is_stopped))
+        settings = STILLS if arguments.stills else DepthSettings()
+        measured = run_depth_check(camera, board, settings, progress)
+    scale_sigma, offset_sigma_m = np.sqrt(np.diag(measured.covariance))
+    console.print(
+        f"Scale {measured.scale:.4f} ± {scale_sigma:.4f}, offset {1e3 * measured.offset_m:+.1f} ± "
+        f"{1e3 * offset_sigma_m:.1f} mm"
+    )
+    shown = table("range, m", "flatness, mm")
+    for (near_m, far_m), flat_m, sigma_m in zip(
+        measured.ranges_m, measured.flatness_m, measured.flatness_sigma_m, strict=True
+    ):
+        shown.add_row(f"{near_m:.1f} to {far_m:.1f}", f"{1e3 * flat_m:.2f} ± {1e3 * sigma_m:.2f}")
+    console.print(shown)
+    finding = depth_finding(measured)
+    console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}", markup=False)
+    if not finding.is_fine:
+        console.print(explain_depth(measured) or "add views, at more distances", markup=False)
+    _write(arguments.output, replace(rig, depth_check=measured))
+
+
 @command(arg("input", type=Path, help="rig file"), json=True)
 def check(arguments: argparse.Namespace) -> None:
     """Check a rig file: every field, its plausibility, and how it was calibrated."""
@@ -266,18 +314,22 @@ def migrate(arguments: argparse.Namespace) -> None:
 
 def _with_identity(rig: Rig, arguments: argparse.Namespace) -> Rig:
     """Return the rig with the identity of its depth camera; HandcalError if it is another one."""
+    with open_source(arguments.camera, realsense_of(arguments)) as camera:
+        if not camera.identity.serial_number:
+            raise HandcalError(f"{camera.name} does not tell its serial number; use another source")
+        _require_own(rig, camera)
+        return replace(rig, depth_camera=camera.identity)
+
+
+def _require_own(rig: Rig, camera: Camera) -> None:
+    """Raise HandcalError, with the differences, if a camera is not the rig's depth camera."""
     from handcal.rig.compare import compare_camera
 
-    with open_source(arguments.camera, realsense_of(arguments)) as camera:
-        identity = camera.identity
-        differences = compare_camera(rig, identity, camera.depth_intrinsics)
-    if not identity.serial_number:
-        raise HandcalError(f"{camera.name} does not tell its serial number; use another source")
+    differences = compare_camera(rig, camera.identity, camera.depth_intrinsics)
     if differences:
         raise HandcalError(
             f"{camera.name} is not the depth camera of this rig: {'; '.join(differences)}"
         )
-    return replace(rig, depth_camera=identity)
 
 
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:

@@ -19,6 +19,7 @@ _LEAST_SEEN = 0.95
 _HAND_DEPTHS_M = (0.4, 0.5, 0.6)
 _LARGEST_BIAS_M = 0.005
 _IDENTIFY = "handcal rig migrate FILE --output NEW --camera realsense"
+_CHECK_DEPTH = "handcal rig depth RECORDING --rig FILE --output NEW"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,10 @@ def missing_parts(rig: Rig) -> tuple[str, ...]:
             "them; nothing else in the file depends on them"
         )
     if rig.depth_check is None:
-        lines.append("the depth of the depth camera has not been checked")
+        lines.append(
+            "the depth of the depth camera has not been checked: record the board at several "
+            f"distances and run '{_CHECK_DEPTH}'"
+        )
     lines += [
         f"the origin of {part} is not known: calibrate it again to know its uncertainty"
         for part in RIG_PARTS
@@ -97,7 +101,7 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         if headset
         else "not told in this file",
     )
-    yield _depth_finding(rig.depth_check)
+    yield depth_finding(rig.depth_check)
     for part in RIG_PARTS:
         yield _origin_finding(rig, part)
 
@@ -150,8 +154,8 @@ def _seen_by_depth_camera(rig: Rig, display: EyeDisplay) -> float:
     return float(seen.mean())
 
 
-def _depth_finding(check: DepthCheck | None) -> RigFinding:
-    """Return the bias of measured depth where hands are held, and whether it is small for sure."""
+def depth_finding(check: DepthCheck | None) -> RigFinding:
+    """Return the largest bias of depth where hands are held; it is fine if it is surely small."""
     what = "Depth check"
     if check is None:
         return RigFinding(what, "not told in this file")

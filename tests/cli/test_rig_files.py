@@ -24,6 +24,7 @@ from handcal.rig.views import ViewsError
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
 from handcal.types import CameraIdentity, Frame, Intrinsics
+from tests import board_frames
 from tests.helpers import DATA
 
 RIG = example_rig()
@@ -158,6 +159,33 @@ def test_the_serial_number_is_taken_from_the_rig_s_own_camera_only(tmp_path: Pat
         with pytest.raises(HandcalError, match=problem):
             run("migrate", rig, "--output", new, "--camera", source)
     assert new.read_bytes() == before
+
+
+def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    painter = BoardPainter(board_frames.BOARD, board_frames.COLOR, PICTURES)
+    made = board_frames.frames(
+        board_frames.poses(6, rng, 0.33, 0.52), rng, offset_m=0.01, painter=painter
+    )
+    record_folder(tmp_path / "take", made)
+    rig, new = tmp_path / "rig.yaml", tmp_path / "new.yaml"
+    write_rig(rig, replace(RIG, depth_intrinsics=board_frames.DEPTH))
+    board = ("--squares", 8, 6, "--square-mm", 30, "--marker-mm", 22)
+    run("depth", tmp_path / "take", "--stills", *board, "--rig", rig, "--output", new)
+    check = read_rig(new).depth_check
+    assert check is not None
+    assert check.views == 6
+    assert check.bias_m(0.5)[0] == pytest.approx(0.01, abs=0.0015)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "doubtful: +" in said
+    assert "calibrate the sensor" in said
+    with pytest.raises(HandcalError, match="1 of 17 findings"):
+        run("check", new)
+    with pytest.raises(HandcalError, match=r"not the depth camera of this rig: images of 640x360"):
+        run("depth", tmp_path / "take", "--stills", "--output", tmp_path / "other.yaml")
+    assert not (tmp_path / "other.yaml").exists()
 
 
 def test_a_display_too_small_for_the_squares_is_one_line(tmp_path: Path) -> None:
