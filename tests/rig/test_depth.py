@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.geometry import rigid
 from handcal.rig.board import BoardError
 from handcal.rig.depth import DepthView, depth_view, explain_depth, fit_depth
 from handcal.rig.report import depth_finding
 from handcal.rig.views import ViewsError
 from handcal.types import DepthCheck, Float64
-from tests.board_frames import frames, poses, seen
+from tests.board_frames import COLOR, T_C_D, frames, poses, seen
 
 MADE = "2026-11-23T02:00:00+00:00"
 
@@ -75,6 +76,34 @@ def test_a_good_camera_raises_no_doubt_and_a_bias_of_10_mm_does() -> None:
             assert "mm at every distance: check the pose of the depth imager" in explain_depth(
                 check
             )
+
+
+def check_of_a_factory_calibration(seed: int, offset_m: float) -> DepthCheck:
+    """Return the check of a camera whose colour calibration has errors, as a factory's has."""
+    rng = np.random.default_rng(seed)
+    made = poses(10, rng)
+    fx, fy = rng.normal(1.0, 0.001, 2) * [COLOR.fx, COLOR.fy]
+    cx, cy = rng.normal([COLOR.cx, COLOR.cy], 0.3)
+    known = replace(COLOR, fx=fx, fy=fy, cx=cx, cy=cy)
+    T = rigid(rng.normal(0.0, 0.0005, 3), rng.normal(0.0, 0.0002, 3)) @ T_C_D
+    return fit_depth(
+        [
+            depth_view(seen(T_D_B, rng), replace(frame, color_intrinsics=known, T_C_D=T))
+            for T_D_B, frame in zip(made, frames(made, rng, offset_m=offset_m), strict=True)
+        ]
+    )
+
+
+@pytest.mark.campaign
+def test_of_100_cameras_none_raises_a_false_alarm_and_each_bias_of_10_mm_is_found() -> None:
+    off_m = []
+    for seed in range(100):
+        for offset_m in (0.0, 0.01 * (-1) ** seed):
+            check = check_of_a_factory_calibration(seed, offset_m)
+            assert depth_finding(check).is_fine is (offset_m == 0.0), seed
+            off_m.append(check.bias_m(0.5)[0] - offset_m)
+    assert np.sqrt(np.mean(np.square(off_m))) < 0.0005
+    assert np.abs(off_m).max() < 0.0015
 
 
 def test_a_wrong_side_of_the_squares_is_told_from_an_offset() -> None:
