@@ -12,7 +12,7 @@ from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError
 from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.depth import DepthView, depth_view, fit_depth
-from handcal.rig.views import ViewsError
+from handcal.rig.views import MAX_VIEWS, ViewsError
 from handcal.types import DepthCheck, Frame
 
 _SILENT_S = 5.0
@@ -28,7 +28,9 @@ class DepthSettings:
     """Views may be more alike than for intrinsics: their distances matter, not their places."""
 
 
-STILLS = DepthSettings(every_s=0.0, choose=ChooseSettings(rest_share=None, apart_share=0.0))
+STILLS = DepthSettings(
+    every_s=0.0, choose=ChooseSettings(most=MAX_VIEWS, rest_share=None, apart_share=0.0)
+)
 """For recordings in which every frame is a still image."""
 
 

@@ -17,8 +17,8 @@ from handcal.display import (
 from handcal.geometry import image_points, invert, project, transform
 from handcal.types import EYES, CameraIdentity, Eye, EyeDisplay, Float64, Intrinsics, Rig
 
-# Solved intrinsics differ from the maker's by less, and another camera's usually by more. At 0.5 m
-# and 0.1 m beside the axis, half a percent moves a point by 0.5 mm, and 3 px by 1.5 mm.
+# Room for intrinsics that were solved from images. At 0.5 m, 0.1 m beside the axis, the first moves
+# a point by 0.5 mm, the second by 1.5 mm. Another camera of the same model may lie within both.
 _SAME_FOCAL = 0.005
 _SAME_PX = 3.0
 

@@ -52,7 +52,7 @@ def missing_parts(rig: Rig) -> tuple[str, ...]:
     if rig.headset is None:
         lines.append(
             "the headset's identity and views are not known: only the headset itself can report "
-            "them; nothing else in the file depends on them"
+            "them; no calibrated part depends on them"
         )
     if rig.depth_check is None:
         lines.append(

@@ -228,7 +228,7 @@ def test_damaged_bytes_give_a_plausible_rig_or_a_file_error(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     path = tmp_path_factory.mktemp("rig") / "rig.yaml"
-    write_rig(path, example_rig())
+    write_rig(path, data.draw(st.sampled_from([example_rig(), FULL])))
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 3))):
         start = data.draw(st.integers(0, len(content)))
