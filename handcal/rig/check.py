@@ -124,7 +124,7 @@ def _check_headset(headset: HeadsetIdentity) -> None:
     )
     for field in ("name", "runtime", "app"):
         _check_line(f"headset.{field}", getattr(headset, field), MAX_NAME, may_be_empty=True)
-    require(headset.protocol >= 0, "headset.protocol must not be negative")
+    require(0 <= headset.protocol < 2**16, "headset.protocol must lie between 0 and 65535")
     require(
         headset.eye_distance_m is None or 0.03 <= headset.eye_distance_m <= 0.1,
         "headset.eye_distance_m must lie between 0.03 and 0.1 (metres)",

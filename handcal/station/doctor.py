@@ -73,6 +73,7 @@ def examine(rig: Path | None = None) -> list[Finding]:
         _hand_detector(),
         _network(),
         _pairing(),
+        *_rig(rig),
         *_cameras(rig),
         _screen(),
         _disk(),
@@ -132,6 +133,12 @@ def _pairing() -> Finding:
         advice = "only handcal headset needs it; the desktop program has a key of its own"
         return Finding("Pairing key", Health.LIMITED, str(error), advice)
     return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
+
+
+def _rig(path: Path | None) -> list[Finding]:
+    if path is None:
+        return []
+    return [_try("Rig file", lambda: read_rig(path).name, "choose another rig file")]
 
 
 def _cameras(rig: Path | None) -> list[Finding]:

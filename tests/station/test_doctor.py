@@ -133,6 +133,10 @@ def test_another_camera_than_the_rig_s_is_told(
     write_rig(path, replace(example_rig(), depth_camera=CameraIdentity("D435", "456")))
     assert of("Camera", path).health is Health.LIMITED
     assert "another model: D415, not D435; another serial number" in of("Camera", path).found
+    assert of("Rig file", path).health is Health.GOOD
+    path.write_text("")
+    assert of("Rig file", path).health is Health.BROKEN
+    assert of("Camera", path).health is Health.GOOD
 
 
 def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
