@@ -23,7 +23,7 @@ from handcal.rig.grid import Grid, on_display
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import viewpoint_from_tracked
-from handcal.rig.views import View, image_files, pair_views, read_views, used
+from handcal.rig.views import BoardImage, image_files, pair_views, read_views, used
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, write_photographs
 from handcal.types import EYES
 
@@ -40,7 +40,7 @@ def main() -> None:
     truth = replace(example_rig(), depth_intrinsics=DEPTH_CAMERA)
     write_photographs(images, truth, views=arguments.views, rng=np.random.default_rng(0))
 
-    def views_of(name: str) -> tuple[View, ...]:
+    def views_of(name: str) -> tuple[BoardImage, ...]:
         return read_views(image_files([images / name]), BOARD)
 
     # The depth camera's place on the headset, from pairs of images of one board.

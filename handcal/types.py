@@ -446,6 +446,43 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class DepthCheck:
+    """Measured depth compared with that of a board whose pose is known from colour images.
+
+    ``measured depth = scale * true depth + offset_m``, along the depth camera's axis.
+    """
+
+    made: str
+    """Date and time, ISO 8601."""
+    views: int
+    """Number of views of the board."""
+    scale: float
+    offset_m: float
+    covariance: Float64
+    """(2, 2); of `scale` and `offset_m`, in 1, m and m²."""
+    ranges_m: Float64
+    """(N, 2); nearest and farthest true depth of each range, ascending."""
+    flatness_m: Float64
+    """(N,); RMS distance of the measured points from the plane through them, by range."""
+    flatness_sigma_m: Float64
+    """(N,); its standard deviation."""
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        freeze(self, "covariance", np.float64, 2, 2)
+        freeze(self, "ranges_m", np.float64, None, 2)
+        freeze(self, "flatness_m", np.float64, len(self.ranges_m))
+        freeze(self, "flatness_sigma_m", np.float64, len(self.ranges_m))
+
+    def bias_m(self, depth_m: float) -> tuple[float, float]:
+        """Return measured minus true depth at a true depth, and its standard deviation."""
+        slope = np.array([depth_m, 1.0])
+        variance_m2 = float(slope @ self.covariance @ slope)
+        return (self.scale - 1.0) * depth_m + self.offset_m, float(np.sqrt(variance_m2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Rig:
     """The offline calibration: both eye displays and the pose of the depth camera."""
 
@@ -456,6 +493,10 @@ class Rig:
     depth_intrinsics: Intrinsics
     origins: Mapping[RigPart, Origin] = field(default_factory=dict)
     """Origin of each of `RIG_PARTS`, where it is known."""
+    depth_camera: CameraIdentity = CameraIdentity()
+    headset: HeadsetIdentity | None = None
+    depth_check: DepthCheck | None = None
+    """The devices of the rig and the check of its depth; empty or None if unknown."""
 
     __repr__ = brief
 

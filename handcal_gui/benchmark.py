@@ -35,7 +35,7 @@ from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import Frame
+from handcal.types import CameraIdentity, Frame
 from handcal_gui.app import keep_window_quick
 from handcal_gui.pages.wizard.steps import Action
 from handcal_gui.preferences import PreferencesFile
@@ -74,6 +74,7 @@ class _FilmCamera(Closable):
     """Plays frames from memory at the camera's rate, as its SDK would deliver them."""
 
     name = "Film"
+    identity = CameraIdentity()
 
     def __init__(self, film: _Film) -> None:
         self._film = film

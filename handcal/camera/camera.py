@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Protocol, Self
 
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
 
 
 class Camera(Protocol):
@@ -15,6 +15,8 @@ class Camera(Protocol):
     """
 
     name: str
+    identity: CameraIdentity
+    """Device that gives the frames, or gave them to a recording; empty where it is not known."""
     depth_intrinsics: Intrinsics
 
     def read(self, timeout_s: float = 1.0) -> Frame:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 from handcal.camera.camera import Camera
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError
-from handcal.types import Frame, UInt8
+from handcal.types import CameraIdentity, Frame, UInt8
+
+Tell: TypeAlias = Callable[[Frame, CameraIdentity], object]
+"""Called with the first frame with colour, and the identity of its camera."""
 
 _MOST_WITHOUT = 30
 """Most consecutive frames without colour; cameras pair their first images badly."""
@@ -21,15 +25,14 @@ class ColorCamera(ViewpointCamera):
     camera : Camera
         An open camera, on whose clock the images' times are.
     tell : callable
-        Called with the first frame with colour, which gives the pose of the depth imager.
+        Called with the first frame with colour, which gives the pose of the depth imager, and with
+        the camera's identity.
     """
 
-    def __init__(
-        self, camera: Camera, tell: Callable[[Frame], object] = lambda _frame: None
-    ) -> None:
+    def __init__(self, camera: Camera, tell: Tell = lambda _frame, _identity: None) -> None:
         self.name = camera.name
         self._camera = camera
-        self._tell: Callable[[Frame], object] | None = tell
+        self._tell: Tell | None = tell
 
     def read(self) -> tuple[UInt8, int]:
         """Return the next colour image and its time; CameraTimeoutError if none arrives in time."""
@@ -37,7 +40,7 @@ class ColorCamera(ViewpointCamera):
             frame = self._camera.read()
             if frame.color is not None:
                 if self._tell is not None:
-                    self._tell(frame)
+                    self._tell(frame, self._camera.identity)
                     self._tell = None
                 return frame.color, frame.t_camera_ns
         raise CameraError(f"{self.name} delivers no colour images, in which boards are found")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from handcal.camera.camera import Camera
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.closable import Closable
-from handcal.types import Frame
+from handcal.types import CameraIdentity, Frame
 
 _RATE_WINDOW_S = 1.0
 
@@ -27,6 +27,8 @@ class CameraStatus:
     """Number of frames in the last second."""
     dropped: int = 0
     """Frames missing from the camera's own count since it was opened."""
+    identity: CameraIdentity = CameraIdentity()
+    """The camera opened last; empty before, and if it is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,7 @@ class CameraFeed(Closable):
         self._settings = settings or FeedSettings()
         self._camera: Camera | None = None
         self._name = "Camera"
+        self._identity = CameraIdentity()
         self._problem = ""
         self._dropped = 0
         self._last_index: int | None = None
@@ -72,7 +75,7 @@ class CameraFeed(Closable):
         while self._arrived_s and self._arrived_s[0] < oldest_s:
             self._arrived_s.popleft()
         rate_hz = len(self._arrived_s) / _RATE_WINDOW_S
-        return CameraStatus(self._name, self._problem, rate_hz, self._dropped)
+        return CameraStatus(self._name, self._problem, rate_hz, self._dropped, self._identity)
 
     def read(self) -> Frame | None:
         """Return the next frame, or None if none arrives in time; `status` says why."""
@@ -111,7 +114,7 @@ class CameraFeed(Closable):
             raise CameraError(self._problem)
         self._next_open_s = now_s + self._settings.reopen_s
         self._camera = self._open_camera()
-        self._name = self._camera.name
+        self._name, self._identity = self._camera.name, self._camera.identity
         self._heard_s = time.monotonic()
 
     def _note(self, frame: Frame) -> None:

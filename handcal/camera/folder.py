@@ -29,7 +29,8 @@ from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.errors import CameraEndError, CameraError, FileError
 from handcal.geometry import is_rigid
 from handcal.io.files import make_folder, read_json, read_limited, write_json
-from handcal.types import Float64, Frame
+from handcal.rig.check import identity_from_json
+from handcal.types import CameraIdentity, Float64, Frame
 
 DESCRIPTION = "recording.json"
 LIST = "frames.csv"
@@ -89,6 +90,10 @@ class FolderCamera(PlayedCamera):
         self._color_intrinsics = None if color is None else intrinsics_from(color, path)
         self._depth_scale_m = number_from(values, path, "depth_scale", *DEPTH_SCALES_M)
         self._T_C_D = _rigid_from(values.get("T_C_D"), path)
+        try:
+            self.identity = identity_from_json(values.get("device"), "device")
+        except ValueError as error:
+            raise FileError(f"{path}: {error}") from error
 
     def _next(self, timeout_s: float) -> Frame:  # noqa: ARG002 (files do not keep one waiting)
         if self._place == len(self._frames):
@@ -117,7 +122,9 @@ class FolderCamera(PlayedCamera):
         self._place = next(later, len(self._frames))
 
 
-def record_folder(folder: Path, frames: Iterable[Frame]) -> int:
+def record_folder(
+    folder: Path, frames: Iterable[Frame], identity: CameraIdentity = CameraIdentity()
+) -> int:
     """Record frames of one camera as a folder of images, without loss.
 
     Parameters
@@ -127,6 +134,8 @@ def record_folder(folder: Path, frames: Iterable[Frame]) -> int:
     frames : iterable of Frame
         Frames of one camera, with the same intrinsics, depth scale and extrinsics. If the first has
         colour, later ones may lack it.
+    identity : CameraIdentity
+        Of that camera, where it is known.
 
     Returns
     -------
@@ -152,6 +161,7 @@ def record_folder(folder: Path, frames: Iterable[Frame]) -> int:
             "depth": asdict(first.depth_intrinsics),
             "color": None if first.color_intrinsics is None else asdict(first.color_intrinsics),
             "T_C_D": first.T_C_D.tolist(),
+            "device": asdict(identity),
         },
     )
     try:

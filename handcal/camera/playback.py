@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.closable import Closable
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
 
 _LATE_S = 0.05
 
@@ -31,6 +31,7 @@ class PlayedCamera(Closable):
     """
 
     name: str
+    identity: CameraIdentity
     depth_intrinsics: Intrinsics
 
     def __init__(self, settings: PlaybackSettings | None) -> None:

@@ -56,6 +56,7 @@ class RealSenseCamera(Closable):
         handles = sdk_devices()
         devices = [describe_device(handle) for handle in handles]
         self._device = choose_device(devices, settings.serial)
+        self.identity = self._device.identity
         handle = handles[devices.index(self._device)]
         self._sensors: list[Any] = []
         self._syncer = librealsense().syncer(_QUEUE_FRAMES)

@@ -80,7 +80,7 @@ def record(
     first = next(take.frames, None)
     if first is None:
         raise CameraError(f"nothing was recorded: {take.stop_reason}")
-    count = record_frames(path, chain([first], take.frames))
+    count = record_frames(path, chain([first], take.frames), camera.identity)
     return Recorded(count, take.dropped, take.duration_s, take.stop_reason)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.camera.sdk_devices import librealsense
+from handcal.camera.sdk_devices import describe_device, librealsense
 from handcal.camera.sdk_frames import (
     apart_ms,
     extrinsics_between,
@@ -17,7 +17,7 @@ from handcal.camera.sdk_frames import (
     with_color,
 )
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
-from handcal.types import Float64, Frame
+from handcal.types import CameraIdentity, Float64, Frame
 
 _BEGINNINGS = (b"SQLite format 3\0", b"#ROSBAG V")  # .db3, .bag
 _POLL_MS = 100
@@ -84,6 +84,7 @@ class RecordingCamera(PlayedCamera):
                 T_C_D = extrinsics_between(self._depth.profile, color)
                 self._color = _ColorTrack(_Playback(rs, self._path, rs.stream.color), T_C_D)
             self.depth_intrinsics = intrinsics_of(self._depth.profile)
+            self.identity = self._depth.identity()
         except (CameraError, RuntimeError) as error:
             self.close()
             raise CameraError(
@@ -125,6 +126,10 @@ class _Playback:
         self._playback = self._device.as_playback()
         self._playback.set_real_time(False)  # before it starts, or the first frames are lost
         self.profile = self._pipeline.start(config).get_stream(stream)
+
+    def identity(self) -> CameraIdentity:
+        """Return the recorded device's identity, as far as the recording tells it."""
+        return describe_device(self._device).identity
 
     def recorded_profile(self, stream: Any) -> Any | None:
         """Return the profile of any stream in the recording."""

@@ -9,7 +9,7 @@ from handcal.camera.folder import FolderCamera, record_folder
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.camera.recording import RecordingCamera
 from handcal.camera.sdk_recorder import record_db3
-from handcal.types import Frame
+from handcal.types import CameraIdentity, Frame
 
 RECORDING_SUFFIXES = (".db3", ".bag")
 """Suffixes of librealsense's recordings."""
@@ -26,8 +26,12 @@ def open_recording(path: Path, settings: PlaybackSettings | None = None) -> Play
     return FolderCamera(path, settings) if path.is_dir() else RecordingCamera(path, settings)
 
 
-def record_frames(path: Path, frames: Iterable[Frame]) -> int:
+def record_frames(
+    path: Path, frames: Iterable[Frame], identity: CameraIdentity = CameraIdentity()
+) -> int:
     """Record frames as a ``.db3`` file or a folder, by the suffix of `path`; return their number.
+
+    The recording keeps the camera's `identity`.
 
     Raises
     ------
@@ -36,4 +40,5 @@ def record_frames(path: Path, frames: Iterable[Frame]) -> int:
     ValueError
         If there is no frame, or they are not all of one camera.
     """
-    return record_folder(path, frames) if path.suffix == "" else record_db3(path, frames)
+    record = record_folder if path.suffix == "" else record_db3
+    return record(path, frames, identity)

@@ -9,6 +9,9 @@ from typing import Any
 
 from handcal.camera.usb import explain_absence
 from handcal.errors import CameraError
+from handcal.types import CameraIdentity
+
+_MOST_CHARACTERS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +27,11 @@ class Device:
     """Firmware recommended by this version of the SDK."""
     temperature_c: float | None = None
     """Temperature of its processor; None if unknown."""
+
+    @property
+    def identity(self) -> CameraIdentity:
+        """Model, serial number and firmware."""
+        return CameraIdentity(*map(_line, (self.name, self.serial, self.firmware)))
 
     @property
     def is_slow(self) -> bool:
@@ -122,6 +130,11 @@ def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
             return device
     there = ", ".join(f"{device.name} {device.serial}" for device in devices)
     raise CameraError(f"the RealSense with serial {serial} is not connected; there is {there}")
+
+
+def _line(text: str) -> str:
+    """Return what a device or a recording says as a printable line of limited length."""
+    return "".join(filter(str.isprintable, text))[:_MOST_CHARACTERS]
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,18 @@ import numpy as np
 from handcal.camera.one_camera import of_one_camera
 from handcal.camera.sdk_devices import librealsense
 from handcal.errors import CameraError
-from handcal.types import Float64, Frame, Intrinsics
+from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
 
 _RATE_HZ = 30
 _COEFFICIENTS = 5
+_IDENTITY = ("name", "serial_number", "firmware_version")
 _BACKLOG_BYTES = 64 * 2**20
 _DISK_TIMEOUT_S = 10.0
 
 
-def record_db3(path: Path, frames: Iterable[Frame]) -> int:
+def record_db3(
+    path: Path, frames: Iterable[Frame], identity: CameraIdentity = CameraIdentity()
+) -> int:
     """Record frames of one camera as a ``.db3`` file that librealsense plays.
 
     Parameters
@@ -30,6 +34,8 @@ def record_db3(path: Path, frames: Iterable[Frame]) -> int:
     frames : iterable of Frame
         Frames of one camera, with the same intrinsics, depth scale and extrinsics. If the first has
         colour, later ones may lack it.
+    identity : CameraIdentity
+        Of that camera, where it is known.
 
     Returns
     -------
@@ -48,7 +54,7 @@ def record_db3(path: Path, frames: Iterable[Frame]) -> int:
     unfinished = path.with_name(f".{path.stem}.unfinished.db3")
     unfinished.unlink(missing_ok=True)
     try:
-        count = _record(unfinished, frames)
+        count = _record(unfinished, frames, identity)
         unfinished.replace(path)
     except (RuntimeError, OSError) as error:
         raise CameraError(f"{path} cannot be recorded: {error}") from error
@@ -57,10 +63,13 @@ def record_db3(path: Path, frames: Iterable[Frame]) -> int:
     return count
 
 
-def _record(path: Path, frames: Iterable[Frame]) -> int:
+def _record(path: Path, frames: Iterable[Frame], identity: CameraIdentity) -> int:
     rs = librealsense()
     first, frames = of_one_camera(frames)
     device = rs.software_device()
+    for what, text in zip(_IDENTITY, astuple(identity), strict=True):
+        if text:
+            device.register_info(getattr(rs.camera_info, what), text)
     outlets = [_Outlet(rs, device, "Stereo Module", rs.stream.depth, first.depth_intrinsics)]
     outlets[0].sensor.add_read_only_option(rs.option.depth_units, first.depth_scale_m)
     if first.color_intrinsics is not None:

@@ -18,7 +18,7 @@ from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
 from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.formats import write_intrinsics, write_pose
-from handcal.types import Frame, UInt8
+from handcal.types import CameraIdentity, Frame, UInt8
 
 IMAGER, DEPTH_TO_COLOR = "depth-imager.json", "depth-to-color.json"
 """Files with the calibration of a depth camera, beside its colour images."""
@@ -121,10 +121,10 @@ def keep_images(images: Sequence[UInt8], folders: Sequence[Path]) -> tuple[str, 
     return names
 
 
-def keep_imager(folder: Path, frame: Frame) -> None:
-    """Write the pose and intrinsics of a depth imager beside its colour images."""
+def keep_imager(folder: Path, frame: Frame, identity: CameraIdentity) -> None:
+    """Write the pose, intrinsics and identity of a depth imager beside its colour images."""
     make_folder(folder)
-    write_intrinsics(folder / IMAGER, frame.depth_intrinsics, "json")
+    write_intrinsics(folder / IMAGER, frame.depth_intrinsics, "json", identity)
     write_pose(folder / DEPTH_TO_COLOR, frame.T_C_D, "json")
 
 

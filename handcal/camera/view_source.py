@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from handcal.camera.color import ColorCamera
+from handcal.camera.color import ColorCamera, Tell
 from handcal.camera.folder import DESCRIPTION
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera, open_viewpoint
-from handcal.types import Frame
 
 REALSENSE = "realsense"
 
@@ -21,7 +19,7 @@ def open_view_source(
     source: str,
     realsense: RealSenseSettings | None = None,
     playback: PlaybackSettings | None = None,
-    tell: Callable[[Frame], object] = lambda _frame: None,
+    tell: Tell = lambda _frame, _identity: None,
 ) -> ViewpointCamera:
     """Open an image source.
 
@@ -34,7 +32,8 @@ def open_view_source(
     playback : PlaybackSettings, optional
         Playback of a recording or video.
     tell : callable
-        Called with the first frame of a source with depth, which gives the depth imager's pose.
+        Called with the first frame of a source with depth, which gives the depth imager's pose, and
+        with the camera's identity.
 
     Raises
     ------

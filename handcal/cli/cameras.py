@@ -93,7 +93,10 @@ def record(arguments: argparse.Namespace) -> None:
     from handcal.camera.record import record as record_camera
 
     settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
-    with _open_source(arguments) as camera, until_interrupted() as is_stopped:
+    with (
+        open_source(arguments.source, realsense_of(arguments), arguments.seed) as camera,
+        until_interrupted() as is_stopped,
+    ):
         said = f"Recording {camera.name}; press Ctrl+C to stop and keep the recording."
         console.print(said, markup=False)
         try:
@@ -181,8 +184,8 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
 
 
-def _open_source(arguments: argparse.Namespace) -> Camera:
-    """Open the camera that a command's ``--source`` names."""
+def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Camera:
+    """Open the camera that an option names: realsense, simulator or the path of a recording."""
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
     from handcal.sim.camera import SyntheticCamera
@@ -191,12 +194,12 @@ def _open_source(arguments: argparse.Namespace) -> Camera:
     from handcal.sim.room import make_room
     from handcal.sim.sway import swaying_hand
 
-    match arguments.source:
+    match source:
         case "simulator":
-            world = World(make_hand(arguments.seed), make_room(arguments.seed))
-            return SyntheticCamera(world, swaying_hand, seed=arguments.seed)
+            world = World(make_hand(seed), make_room(seed))
+            return SyntheticCamera(world, swaying_hand, seed=seed)
         case "realsense":
-            return RealSenseCamera(realsense_of(arguments))
+            return RealSenseCamera(realsense)
         case path:
             return open_recording(Path(path))
 

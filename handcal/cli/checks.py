@@ -6,6 +6,7 @@ import argparse
 import json
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 from handcal.cli.output import console, save, show_progress, table
@@ -43,12 +44,14 @@ def bench(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
 
 
-@command()
-def doctor(_arguments: argparse.Namespace) -> None:
+@command(
+    arg("--rig", type=Path, metavar="FILE", help="rig file to compare the connected cameras with"),
+)
+def doctor(arguments: argparse.Namespace) -> None:
     """Check the installation and the camera, with advice for each problem."""
     from handcal.station.doctor import Health, examine
 
-    findings = examine()
+    findings = examine(arguments.rig)
     for finding in findings:
         advice = f"\n         → {finding.advice}" if finding.advice else ""
         console.print(f"{finding.health.value:8} {finding.what}: {finding.found}{advice}")

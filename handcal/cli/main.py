@@ -82,11 +82,18 @@ _RIG: Mapping[str, Entry] = {
     "make": Entry(
         "Put the depth camera's pose, a stereo calibration, into a rig file.", "rig_files"
     ),
+    "depth": Entry(
+        "Check the depth camera against a board at several distances, and put it into a rig file.",
+        "rig_files",
+    ),
     "check": Entry(
         "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
     ),
     "compare": Entry("Compare two rig files, and show how far apart they draw.", "rig_files"),
-    "migrate": Entry("Convert a rig file of any known version to the newest.", "rig_files"),
+    "migrate": Entry(
+        "Convert a rig file of any known version to the newest, and list what it does not say.",
+        "rig_files",
+    ),
 }
 
 COMMANDS: Mapping[str, Entry] = {

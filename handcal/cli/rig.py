@@ -20,7 +20,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.board import Board, BoardKind
 from handcal.rig.camera import LensModel
-from handcal.rig.formats import FORMATS
+from handcal.rig.formats import CALIBRATION_FORMATS
 from handcal.rig.print_page import PAPERS
 from handcal.rig.views import MAX_VIEWS
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from handcal.rig.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
-    from handcal.rig.views import View, WorstView
+    from handcal.rig.views import BoardImage, WorstView
 
 
 _BOARD = Board()
@@ -75,7 +75,7 @@ _CALIBRATION_OPTIONS = (
     arg("--output", type=Path, metavar="FILE", help="file for the result (default: only print it)"),
     arg(
         "--format",
-        choices=FORMATS,
+        choices=CALIBRATION_FORMATS,
         default="json",
         help="format of the result; only json holds all of it",
     ),
@@ -287,7 +287,7 @@ def stereo(arguments: argparse.Namespace) -> None:
 @command(
     arg("input", type=Path, help="file in any of the formats"),
     arg("output", type=Path, help="file to write"),
-    arg("--format", choices=FORMATS, required=True, help="format of the output"),
+    arg("--format", choices=CALIBRATION_FORMATS, required=True, help="format of the output"),
 )
 def convert(arguments: argparse.Namespace) -> None:
     """Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal."""
@@ -332,7 +332,9 @@ def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Gri
     return grid_on(width_px, height_px, arguments.square_px)
 
 
-def views_of(paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()) -> tuple[View, ...]:
+def views_of(
+    paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()
+) -> tuple[BoardImage, ...]:
     """Look for a board in images, with progress; leave those out that are dropped."""
     from handcal.rig.views import drop, image_files, read_views
 
@@ -341,7 +343,7 @@ def views_of(paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()) -
     return drop(views, dropped)
 
 
-def show_views(views: Iterable[View], residuals_px: Mapping[str, float]) -> None:
+def show_views(views: Iterable[BoardImage], residuals_px: Mapping[str, float]) -> None:
     """Print the corners found in each image, and their residuals."""
     shown = table("image", "corners", "residual, px", "blur, px")
     for view in views:

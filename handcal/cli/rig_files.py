@@ -1,13 +1,15 @@
-"""``handcal rig grid, display, make, check, compare, migrate``: displays and rig files."""
+"""``handcal rig grid, display, make, depth, check, compare, migrate``: displays and rig files."""
 
 from __future__ import annotations
 
 import argparse
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.output import console, save, table
+from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
+from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.rig import (
     BOARD_OPTIONS,
     GRID_OPTION,
@@ -23,6 +25,7 @@ from handcal.io.files import make_folder
 from handcal.types import EYES
 
 if TYPE_CHECKING:
+    from handcal.camera.camera import Camera
     from handcal.rig.viewpoint import ViewpointPose
     from handcal.types import Intrinsics, Rig
 
@@ -176,7 +179,8 @@ def display(arguments: argparse.Namespace) -> None:
         "--depth-intrinsics",
         type=Path,
         metavar="FILE",
-        help="intrinsics of the depth imager, if the stereo images are the colour imager's",
+        help="intrinsics of the depth imager, if the stereo images are the colour imager's; "
+        "depth-imager.json of 'handcal rig take' also holds the camera's serial number",
     ),
     arg(
         "--depth-to-color",
@@ -191,7 +195,7 @@ def make(arguments: argparse.Namespace) -> None:
     """Put the depth camera's pose, a stereo calibration, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
-    from handcal.rig.steps import intrinsics_in, pose_in
+    from handcal.rig.steps import identity_in, intrinsics_in, pose_in
 
     stereo = read_stereo(arguments.stereo)
     show_verdict(stereo.verdict)
@@ -200,8 +204,55 @@ def make(arguments: argparse.Namespace) -> None:
         stereo,
         depth_intrinsics=intrinsics_in(arguments.depth_intrinsics),
         T_C_D=pose_in(arguments.depth_to_color),
+        depth_camera=identity_in(arguments.depth_intrinsics),
     )
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
+
+
+@command(
+    arg("source", help="a recording of the board with depth and colour, or realsense"),
+    arg(
+        "--stills",
+        action="store_true",
+        help="every frame of the recording is a still image: use all that show the board",
+    ),
+    *_RIG_AND_OUTPUT,
+    *BOARD_OPTIONS,
+    *REALSENSE_OPTIONS,
+)
+def depth(arguments: argparse.Namespace) -> None:
+    """Check the depth camera against a board at several distances, and put it into a rig file."""
+    import numpy as np
+
+    from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
+    from handcal.rig.depth import explain_depth
+    from handcal.rig.report import depth_finding
+
+    rig, board = _read_rig(arguments.rig), board_of(arguments)
+    with ExitStack() as stack:
+        source = open_source(arguments.source, realsense_of(arguments))
+        camera = stack.enter_context(source)
+        _require_own(rig, camera)
+        is_stopped = stack.enter_context(until_interrupted())
+        progress = stack.enter_context(show_progress(is_stopped))
+        settings = STILLS if arguments.stills else DepthSettings()
+        measured = run_depth_check(camera, board, settings, progress)
+    scale_sigma, offset_sigma_m = np.sqrt(np.diag(measured.covariance))
+    console.print(
+        f"Scale {measured.scale:.4f} ± {scale_sigma:.4f}, offset {1e3 * measured.offset_m:+.1f} ± "
+        f"{1e3 * offset_sigma_m:.1f} mm"
+    )
+    shown = table("range, m", "flatness, mm")
+    for (near_m, far_m), flat_m, sigma_m in zip(
+        measured.ranges_m, measured.flatness_m, measured.flatness_sigma_m, strict=True
+    ):
+        shown.add_row(f"{near_m:.1f} to {far_m:.1f}", f"{1e3 * flat_m:.2f} ± {1e3 * sigma_m:.2f}")
+    console.print(shown)
+    finding = depth_finding(measured)
+    console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}", markup=False)
+    if not finding.is_fine:
+        console.print(explain_depth(measured) or "add views, at more distances", markup=False)
+    _write(arguments.output, replace(rig, depth_check=measured))
 
 
 @command(arg("input", type=Path, help="rig file"), json=True)
@@ -241,10 +292,44 @@ def compare(arguments: argparse.Namespace) -> None:
 @command(
     arg("input", type=Path, help="rig file"),
     arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+    arg(
+        "--camera",
+        metavar="SOURCE",
+        help="realsense, or a recording by the rig's depth camera: stores its model, serial number "
+        "and firmware",
+    ),
+    *REALSENSE_OPTIONS,
 )
 def migrate(arguments: argparse.Namespace) -> None:
-    """Convert a rig file of any known version to the newest."""
-    _write(arguments.output, _read_rig(arguments.input))
+    """Convert a rig file of any known version to the newest, and list what it does not say."""
+    from handcal.rig.report import missing_parts
+
+    rig = _read_rig(arguments.input)
+    if arguments.camera is not None:
+        rig = _with_identity(rig, arguments)
+    _write(arguments.output, rig)
+    for line in missing_parts(rig):
+        console.print(f"missing: {line}", markup=False)
+
+
+def _with_identity(rig: Rig, arguments: argparse.Namespace) -> Rig:
+    """Return the rig with the identity of its depth camera; HandcalError if it is another one."""
+    with open_source(arguments.camera, realsense_of(arguments)) as camera:
+        if not camera.identity.serial_number:
+            raise HandcalError(f"{camera.name} does not tell its serial number; use another source")
+        _require_own(rig, camera)
+        return replace(rig, depth_camera=camera.identity)
+
+
+def _require_own(rig: Rig, camera: Camera) -> None:
+    """Raise HandcalError, with the differences, if a camera is not the rig's depth camera."""
+    from handcal.rig.compare import compare_camera
+
+    differences = compare_camera(rig, camera.identity, camera.depth_intrinsics)
+    if differences:
+        raise HandcalError(
+            f"{camera.name} is not the depth camera of this rig: {'; '.join(differences)}"
+        )
 
 
 def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:

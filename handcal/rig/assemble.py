@@ -17,7 +17,7 @@ from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import ViewsError
-from handcal.types import Eye, Float64, Intrinsics, Origin, Rig, RigPart
+from handcal.types import CameraIdentity, Eye, Float64, Intrinsics, Origin, Rig, RigPart
 
 STEREO_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m")
 """Parameters of the covariance of T_H_D."""
@@ -63,8 +63,11 @@ def with_stereo(
     *,
     depth_intrinsics: Intrinsics | None = None,
     T_C_D: Float64 | None = None,
+    depth_camera: CameraIdentity = CameraIdentity(),
 ) -> Rig:
     """Return `rig` with the pose of the depth camera calibrated.
+
+    A depth check of `rig` is removed: it may be of another camera.
 
     Parameters
     ----------
@@ -76,6 +79,8 @@ def with_stereo(
         Required if the stereo calibration is of the depth camera's colour imager and depth is not
         aligned to it: the depth imager's own intrinsics, and the transform from the depth to the
         colour imager, as the device reports them.
+    depth_camera : CameraIdentity
+        Of the camera that took the images, where it is known.
 
     Raises
     ------
@@ -95,7 +100,14 @@ def with_stereo(
     )
     T_H_D = stereo.T_H_D if T_C_D is None else stereo.T_H_D @ T_C_D
     intrinsics = stereo.depth if depth_intrinsics is None else depth_intrinsics
-    return _with_origin(replace(rig, T_H_D=T_H_D, depth_intrinsics=intrinsics), "T_H_D", origin)
+    calibrated = replace(
+        rig,
+        T_H_D=T_H_D,
+        depth_intrinsics=intrinsics,
+        depth_camera=depth_camera,
+        depth_check=None,
+    )
+    return _with_origin(calibrated, "T_H_D", origin)
 
 
 def _origin(

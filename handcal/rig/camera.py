@@ -19,8 +19,8 @@ from handcal.rig.board import BoardView
 from handcal.rig.fit import marginal_covariance, rms
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import (
+    BoardImage,
     Coverage,
-    View,
     ViewsError,
     WorstView,
     coverage,
@@ -107,7 +107,7 @@ class CameraCalibration:
 
 
 def calibrate_camera(
-    views: Sequence[View], settings: CameraSettings | None = None
+    views: Sequence[BoardImage], settings: CameraSettings | None = None
 ) -> CameraCalibration:
     """Solve a camera's intrinsics from views of a board.
 

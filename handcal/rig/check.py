@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, fields
+from string import hexdigits
+
 import numpy as np
 
 from handcal.geometry import is_rigid
-from handcal.types import EYES, RIG_PARTS, EyeDisplay, Float64, Intrinsics, Origin, Rig
+from handcal.types import (
+    EYES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    EyeDisplay,
+    Float64,
+    HeadsetIdentity,
+    Intrinsics,
+    Origin,
+    Rig,
+)
 
-MAX_SIDE_PX = 16384
+MAX_DEVICE_SIDE_PX = 16384
 MAX_NAME, MAX_TEXT = 200, 500
 MAX_PARAMETERS = 12
+MAX_RANGES = 20
+MAX_ID = 128
 
 
 def check_rig(rig: Rig) -> None:
@@ -19,6 +35,11 @@ def check_rig(rig: Rig) -> None:
         _check_display(eye, rig.eyes[eye])
     _check_rigid("T_H_D", rig.T_H_D)
     check_intrinsics("depth_camera", rig.depth_intrinsics)
+    check_identity("depth_camera", rig.depth_camera)
+    if rig.headset is not None:
+        _check_headset(rig.headset)
+    if rig.depth_check is not None:
+        _check_depth_check(rig.depth_check)
     for part, origin in rig.origins.items():
         require(part in RIG_PARTS, f"origins may be of {', '.join(RIG_PARTS)}, not of {part}")
         _check_origin(f"origins.{part}", origin)
@@ -34,6 +55,27 @@ def check_intrinsics(name: str, intrinsics: Intrinsics) -> None:
         and bool(np.isfinite(intrinsics.distortion).all()),
         f"{name}.distortion must hold 0, 4, 5, 8, 12 or 14 finite numbers (OpenCV's order)",
     )
+
+
+def check_identity(name: str, identity: CameraIdentity) -> None:
+    """Raise ValueError, naming the field of `name`, unless each is one line, which may be empty."""
+    for field, text in asdict(identity).items():
+        _check_line(f"{name}.{field}", text, MAX_NAME, may_be_empty=True)
+
+
+def identity_from_json(value: object, name: str) -> CameraIdentity:
+    """Return the identity in a JSON value; empty for None.
+
+    Raises
+    ------
+    ValueError
+        If it is neither None nor an object of texts; the message names the field of `name`.
+    """
+    require(isinstance(value, dict | None), f"{name} must be an object")
+    texts = value if isinstance(value, dict) else {}
+    identity = CameraIdentity(*(texts.get(one.name, "") for one in fields(CameraIdentity)))
+    check_identity(name, identity)
+    return identity
 
 
 def require(condition: bool, problem: str) -> None:
@@ -72,19 +114,71 @@ def _check_origin(name: str, origin: Origin) -> None:
     )
     for parameter in origin.parameters:
         _check_line(f"{name}.parameters", parameter, MAX_NAME)
-    covariance = origin.covariance
+    _check_covariance(f"{name}.covariance", origin.covariance)
+
+
+def _check_headset(headset: HeadsetIdentity) -> None:
+    require(
+        0 < len(headset.device_id) <= MAX_ID and set(headset.device_id) <= set(hexdigits),
+        f"headset.device_id must be 1 to {MAX_ID} hexadecimal digits",
+    )
+    for field in ("name", "runtime", "app"):
+        _check_line(f"headset.{field}", getattr(headset, field), MAX_NAME, may_be_empty=True)
+    require(0 <= headset.protocol < 2**16, "headset.protocol must lie between 0 and 65535")
+    require(
+        headset.eye_distance_m is None or 0.03 <= headset.eye_distance_m <= 0.1,
+        "headset.eye_distance_m must lie between 0.03 and 0.1 (metres)",
+    )
+    for eye, view in headset.views.items():
+        name = f"headset.{eye}"
+        _check_rigid(f"{name}.T_V_H", view.T_V_H)
+        _check_size(name, view.width_px, view.height_px)
+        left, right, up, down = view.tangents
+        require(
+            bool((np.abs(view.tangents) < 10).all()) and left < right and up < down,
+            f"{name}.tangents must be left, right, up and down edge of the view, below 10, with "
+            "left < right and up < down",
+        )
+
+
+def _check_depth_check(check: DepthCheck) -> None:
+    name = "depth_check"
+    _check_line(f"{name}.made", check.made, MAX_TEXT)
+    require(check.views > 0, f"{name}.views must be above 0")
+    require(0.5 <= check.scale <= 2.0, f"{name}.scale must lie between 0.5 and 2")
+    require(abs(check.offset_m) <= 1.0, f"{name}.offset_m must lie between -1 and 1 (metres)")
+    _check_covariance(f"{name}.covariance", check.covariance)
+    edges_m = check.ranges_m.ravel()
+    require(
+        0 < len(check.ranges_m) <= MAX_RANGES
+        and bool((np.diff(edges_m) >= 0).all())
+        and 0 <= edges_m[0] <= edges_m[-1] <= 100,
+        f"{name}.flatness must hold 1 to {MAX_RANGES} ranges of depth, ascending, of 0 to 100 "
+        "(metres)",
+    )
+    values_m = np.concatenate([check.flatness_m, check.flatness_sigma_m])
+    require(
+        bool(((values_m >= 0) & (values_m < 1)).all()),
+        f"{name}.flatness must be at least 0 and below 1 (metres), and so its σ",
+    )
+
+
+def _check_covariance(name: str, covariance: Float64) -> None:
     require(
         bool(np.isfinite(covariance).all())
         and np.allclose(covariance, covariance.T, rtol=1e-6, atol=0.0)
         and bool((np.diag(covariance) >= 0).all()),
-        f"{name}.covariance must be finite and symmetric, with variances that are not negative",
+        f"{name} must be finite and symmetric, with variances that are not negative",
     )
 
 
-def _check_line(name: str, text: str, longest: int) -> None:
+def _check_line(name: str, text: object, longest: int, *, may_be_empty: bool = False) -> None:
     require(
-        0 < len(text) <= longest and text.isprintable(),
-        f"{name} must be one line of 1 to {longest} printable characters",
+        isinstance(text, str)
+        and (may_be_empty or bool(text))
+        and len(text) <= longest
+        and text.isprintable(),
+        f"{name} must be one line of {0 if may_be_empty else 1} to {longest} printable characters",
     )
 
 
@@ -102,8 +196,8 @@ def _check_camera(name: str, K: Float64) -> None:
 
 def _check_size(name: str, width: int, height: int) -> None:
     require(
-        1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX,
-        f"{name}: width_px and height_px must lie between 1 and {MAX_SIDE_PX}, "
+        1 <= width <= MAX_DEVICE_SIDE_PX and 1 <= height <= MAX_DEVICE_SIDE_PX,
+        f"{name}: width_px and height_px must lie between 1 and {MAX_DEVICE_SIDE_PX}, "
         f"got {width} and {height}",
     )
 

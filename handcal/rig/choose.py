@@ -16,9 +16,10 @@ class ChooseSettings:
 
     most: int = 25
     """Views, or pairs of views."""
-    rest_share: float = 0.003
+    rest_share: float | None = 0.003
     """Largest motion of a board at rest since the previous images: mean distance of its corners, as
-    a share of the image's width. The images of a pair are rarely exactly simultaneous."""
+    a share of the image's width. The images of a pair are rarely exactly simultaneous. None if each
+    is a still image."""
     apart_share: float = 0.06
     """Minimum difference from every view kept before; 0 keeps similar views as well."""
     most_blur_px: float = 4.0
@@ -56,7 +57,8 @@ class ViewSelector:
         found = [one for one in seen if one is not None]
         if first is None or len(found) < len(seen):
             return "the board is not seen"
-        if before is None or _moved_share(before, first) > settings.rest_share:
+        rest_share = settings.rest_share
+        if rest_share is not None and (before is None or _moved_share(before, first) > rest_share):
             return "the board moves: hold it still for a moment"
         if max(one.blur_px for one in found) > settings.most_blur_px:
             return "the image is blurred: hold the board still, and see to focus and light"

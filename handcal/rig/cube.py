@@ -87,7 +87,7 @@ def face_pose(cube: Cube, marker: int) -> Float64:
     return rigid(np.column_stack([x, y, inwards]), -0.5 * cube.side_m * inwards)
 
 
-def corners_m(cube: Cube, markers: Iterable[int]) -> Float64:
+def marker_corners_m(cube: Cube, markers: Iterable[int]) -> Float64:
     """Return the corners of markers, four each as OpenCV orders them, in the cube's frame."""
     flat = np.column_stack([cube.marker_m * _AROUND, np.zeros(4)])
     return np.concatenate([transform(face_pose(cube, marker), flat) for marker in markers])
@@ -139,7 +139,7 @@ def cube_pose(corners_px: Mapping[int, Float64], cube: Cube, camera: Intrinsics)
     CubeError
         If the corners do not lie as on this cube.
     """
-    points_m, pixels = corners_m(cube, corners_px), np.concatenate([*corners_px.values()])
+    points_m, pixels = marker_corners_m(cube, corners_px), np.concatenate([*corners_px.values()])
     K, distortion = camera_matrix(camera), np.array(camera.distortion)
     _, rotation, translation = cv2.solvePnP(
         points_m, pixels, K, distortion, flags=cv2.SOLVEPNP_SQPNP

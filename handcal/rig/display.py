@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.geometry import camera_matrix, invert
-from handcal.rig.check import MAX_SIDE_PX
+from handcal.rig.check import MAX_DEVICE_SIDE_PX
 from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.grid import GridView
 from handcal.rig.verdict import CalibrationVerdict
@@ -39,8 +39,10 @@ class Screen:
 
     def __post_init__(self) -> None:
         freeze(self, "T_V_H", np.float64, 4, 4)
-        if not (0 < self.width_px <= MAX_SIDE_PX and 0 < self.height_px <= MAX_SIDE_PX):
-            raise ValueError(f"a display has 1 to {MAX_SIDE_PX} pixels along each side")
+        if not (
+            0 < self.width_px <= MAX_DEVICE_SIDE_PX and 0 < self.height_px <= MAX_DEVICE_SIDE_PX
+        ):
+            raise ValueError(f"a display has 1 to {MAX_DEVICE_SIDE_PX} pixels along each side")
 
 
 @dataclass(frozen=True, slots=True)

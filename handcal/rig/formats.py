@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 
@@ -20,15 +20,15 @@ from handcal.errors import FileError
 from handcal.geometry import camera_matrix, is_rigid, rigid
 from handcal.io.files import read_json, read_limited, write_atomic, write_json
 from handcal.rig.camera import CameraCalibration
-from handcal.rig.check import check_intrinsics, require
+from handcal.rig.check import check_intrinsics, identity_from_json, require
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
 from handcal.rig.views import WorstView
-from handcal.types import Float64, Intrinsics
+from handcal.types import CameraIdentity, Float64, Intrinsics
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
-FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
+CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
 JSON_VERSION = 1
 MAX_BYTES = 2**20
 _MAX_REACH_M = 10.0
@@ -38,7 +38,7 @@ Value = TypeVar("Value")
 
 
 def read_intrinsics(path: Path) -> Intrinsics:
-    """Read a camera's intrinsics in any of `FORMATS`, recognised by the file's content.
+    """Read a camera's intrinsics in any of `CALIBRATION_FORMATS`, recognised by the file's content.
 
     Raises
     ------
@@ -107,8 +107,29 @@ def read_stereo(path: Path) -> StereoCalibration:
         raise FileError(f"{path}: {error}") from error
 
 
-def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: CalibrationFormat) -> None:
-    """Write a camera's intrinsics, atomically.
+def read_identity(path: Path) -> CameraIdentity:
+    """Read the identity that `write_intrinsics` stored; empty if the file holds none.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, or its identity is not three lines of text.
+    """
+    if not read_limited(path, MAX_BYTES).lstrip().startswith(b"{"):
+        return CameraIdentity()
+    try:
+        return identity_from_json(read_json(path).get("device"), "device")
+    except ValueError as error:
+        raise FileError(f"{path}: {error}") from error
+
+
+def write_intrinsics(
+    path: Path,
+    intrinsics: Intrinsics,
+    kind: CalibrationFormat,
+    identity: CameraIdentity = CameraIdentity(),
+) -> None:
+    """Write a camera's intrinsics, and as JSON its identity, atomically.
 
     Raises
     ------
@@ -119,7 +140,8 @@ def write_intrinsics(path: Path, intrinsics: Intrinsics, kind: CalibrationFormat
     """
     check_intrinsics("camera", intrinsics)
     if kind == "json":
-        write_json(path, {"handcal_camera": JSON_VERSION, **asdict(intrinsics)})
+        values = {"handcal_camera": JSON_VERSION, **asdict(intrinsics)}
+        write_json(path, values | ({"device": asdict(identity)} if any(astuple(identity)) else {}))
     elif kind == "ros":
         write_atomic(path, _ros_text(intrinsics, path.stem).encode())
     else:

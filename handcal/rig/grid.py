@@ -9,7 +9,7 @@ import numpy as np
 from handcal.errors import HandcalError
 from handcal.rig.board import Board, BoardView, charuco
 from handcal.rig.board_finder import find_board
-from handcal.rig.check import MAX_SIDE_PX
+from handcal.rig.check import MAX_DEVICE_SIDE_PX
 from handcal.types import Float64, UInt8, freeze
 
 # Boards are described in metres, grids in pixels: any constant scale works.
@@ -40,8 +40,8 @@ class Grid:
             raise ValueError(
                 f"a square must be {_SMALLEST_SQUARE_PX} to {_LARGEST_SQUARE_PX} pixels wide"
             )
-        if max(self.width_px, self.height_px) > MAX_SIDE_PX:
-            raise ValueError(f"a display has at most {MAX_SIDE_PX} pixels along each side")
+        if max(self.width_px, self.height_px) > MAX_DEVICE_SIDE_PX:
+            raise ValueError(f"a display has at most {MAX_DEVICE_SIDE_PX} pixels along each side")
         if min(self.width_px, self.height_px) < 3 * self.square_px:
             raise ValueError(
                 f"the display, {self.width_px}×{self.height_px} pixels, has no room for 3 squares "

@@ -9,7 +9,7 @@ import numpy as np
 
 from handcal.display import arcmin_from_px, view_of_eye
 from handcal.geometry import image_points, invert, transform
-from handcal.types import EYES, RIG_PARTS, EyeDisplay, Float64, Rig
+from handcal.types import EYES, RIG_PARTS, DepthCheck, EyeDisplay, Float64, Rig
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
@@ -17,6 +17,9 @@ _LARGEST_OFFSET_M = 0.02
 _LARGEST_REACH_M = 0.25
 _LEAST_SEEN = 0.95
 _HAND_DEPTHS_M = (0.4, 0.5, 0.6)
+_LARGEST_BIAS_M = 0.005
+_IDENTIFY = "handcal rig migrate FILE --output NEW --camera realsense"
+_CHECK_DEPTH = "handcal rig depth RECORDING --rig FILE --output NEW"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,35 @@ class RigFinding:
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
     """Return the findings about a rig that `check_rig` accepts."""
     return tuple(_findings(rig))
+
+
+def missing_parts(rig: Rig) -> tuple[str, ...]:
+    """Return what the rig's file does not say, each in one line that says what to do."""
+    camera = rig.depth_camera
+    unknown = {"model": camera.model, "serial number": camera.serial_number}
+    names = " and ".join(name for name, known in unknown.items() if not known)
+    lines = []
+    if names:
+        verb = "are" if " and " in names else "is"
+        lines.append(
+            f"the depth camera's {names} {verb} not known: connect it and run '{_IDENTIFY}'"
+        )
+    if rig.headset is None:
+        lines.append(
+            "the headset's identity and views are not known: only the headset itself can report "
+            "them; no calibrated part depends on them"
+        )
+    if rig.depth_check is None:
+        lines.append(
+            "the depth of the depth camera has not been checked: record the board at several "
+            f"distances and run '{_CHECK_DEPTH}'"
+        )
+    lines += [
+        f"the origin of {part} is not known: calibrate it again to know its uncertainty"
+        for part in RIG_PARTS
+        if part not in rig.origins
+    ]
+    return tuple(lines)
 
 
 def _findings(rig: Rig) -> Iterator[RigFinding]:
@@ -57,6 +89,19 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         )
     reach_m = float(np.linalg.norm(rig.T_H_D[:3, 3]))
     yield _within("Depth camera from the headset rig", reach_m, (0.0, _LARGEST_REACH_M), 1e3, "mm")
+    camera = rig.depth_camera
+    yield RigFinding(
+        "Depth camera",
+        f"{camera.model or 'model not known'}, serial number {camera.serial_number or 'not known'}",
+    )
+    headset = rig.headset
+    yield RigFinding(
+        "Headset",
+        f"{headset.name or headset.device_id}, {headset.runtime or 'runtime not known'}"
+        if headset
+        else "not told in this file",
+    )
+    yield depth_finding(rig.depth_check)
     for part in RIG_PARTS:
         yield _origin_finding(rig, part)
 
@@ -107,6 +152,22 @@ def _seen_by_depth_camera(rig: Rig, display: EyeDisplay) -> float:
     size = camera.width - 0.5, camera.height - 0.5
     seen = (points_D_m[:, 2] > 0) & ((places_px > -0.5) & (places_px < size)).all(axis=1)
     return float(seen.mean())
+
+
+def depth_finding(check: DepthCheck | None) -> RigFinding:
+    """Return the largest bias of depth where hands are held; it is fine if it is surely small."""
+    what = "Depth check"
+    if check is None:
+        return RigFinding(what, "not told in this file")
+    bias_m, sigma_m = np.transpose([check.bias_m(depth_m) for depth_m in _HAND_DEPTHS_M])
+    worst = int(np.argmax(np.abs(bias_m) + 2.0 * sigma_m))
+    return RigFinding(
+        what,
+        f"{1e3 * bias_m[worst]:+.1f} ± {1e3 * sigma_m[worst]:.1f} mm at {_HAND_DEPTHS_M[worst]} m; "
+        f"flat to {1e3 * check.flatness_m.max():.1f} mm ({check.views} views, {check.made})",
+        bool(abs(bias_m[worst]) + 2.0 * sigma_m[worst] <= _LARGEST_BIAS_M),
+        f"within {1e3 * _LARGEST_BIAS_M:g} mm, including twice its standard deviation",
+    )
 
 
 def _origin_finding(rig: Rig, part: str) -> RigFinding:

@@ -1,30 +1,51 @@
 """The rig file: the offline calibration in OpenCV's FileStorage YAML.
 
-Anything that reads FileStorage reads it. Per eye: K, H0, t_C0_V_m, z_C0_S_m, the display's size
-and T_V_H; for the depth camera: T_H_D and its intrinsics; and how each was calibrated. Numbers
-survive exactly. Version 1, without this history, can be read too; files are always written as
-version 2.
+Anything that reads FileStorage reads it. Per eye: the display's size, T_V_H, and a named model with
+its parameters; for the depth camera: identity, intrinsics, T_H_D and the check of its depth; the
+headset's identity and views; and how each part was calibrated. Numbers survive exactly.
+
+Version 1 has no origins. Version 2 has no identities, no depth check, and an unnamed display model.
+Both can be read; files are always written as version 3. Unknown fields are ignored.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from handcal.errors import FileError
 from handcal.io.files import read_limited, write_atomic
-from handcal.rig.check import check_rig, require
+from handcal.rig.check import MAX_RANGES, check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
-from handcal.types import EYES, RIG_PARTS, EyeDisplay, Intrinsics, Origin, Rig, RigPart
+from handcal.types import (
+    EYES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    EyeDisplay,
+    HeadsetIdentity,
+    HeadsetView,
+    Intrinsics,
+    Origin,
+    Rig,
+    RigPart,
+)
 
-RIG_VERSION = 2
-MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 8 kB with its calibration history
+RIG_VERSION = 3
+DISPLAY_MODEL = "homography"
+"""The display model of `EyeDisplay`, the only one so far: ``K H0 UQ`` and its parameters."""
+MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 10 kB with all that may be known
+_CAMERA_TEXTS = ("model", "serial_number", "firmware")
 
 
 def write_rig(path: str | PathLike[str], rig: Rig) -> None:
-    """Write a rig file, version 2, atomically.
+    """Write a rig file, version 3, atomically.
 
     Parameters
     ----------
@@ -58,36 +79,19 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
     storage.write("handcal_rig", RIG_VERSION)
     storage.write("name", quoted(rig.name))
     for eye in EYES:
-        display = rig.eyes[eye]
-        storage.startWriteStruct(eye, cv2.FileNode_MAP)
-        storage.write("K", display.K)
-        storage.write("H0", display.H0)
-        storage.write("t_C0_V_m", display.t_C0_V_m[:, None])
-        storage.write("z_C0_S_m", display.z_C0_S_m)
-        storage.write("width_px", display.width_px)
-        storage.write("height_px", display.height_px)
-        storage.write("T_V_H", display.T_V_H)
-        storage.endWriteStruct()
+        _write_display(storage, eye, rig.eyes[eye])
     storage.write("T_H_D", rig.T_H_D)
-    intrinsics = rig.depth_intrinsics
-    storage.startWriteStruct("depth_camera", cv2.FileNode_MAP)
-    storage.write("width_px", intrinsics.width)
-    storage.write("height_px", intrinsics.height)
-    for name in ("fx", "fy", "cx", "cy"):
-        storage.write(name, getattr(intrinsics, name))
-    storage.startWriteStruct("distortion", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
-    for coefficient in intrinsics.distortion:
-        storage.write("", coefficient)
-    storage.endWriteStruct()
-    storage.endWriteStruct()
-    _write_origins(storage, rig)
+    _write_depth_camera(storage, rig.depth_intrinsics, rig.depth_camera)
+    _write_depth_check(storage, rig.depth_check)
+    _write_headset(storage, rig.headset)
+    _write_origins(storage, rig.origins)
     data = storage.releaseAndGetString().encode()
     require(len(data) <= MAX_RIG_BYTES, f"the rig takes more than {MAX_RIG_BYTES:,} bytes")
     write_atomic(path, data)
 
 
 def read_rig(path: str | PathLike[str]) -> Rig:
-    """Read and check a rig file, version 1 or 2.
+    """Read and check a rig file, version 1, 2 or 3.
 
     Parameters
     ----------
@@ -127,23 +131,90 @@ def quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
-def _write_origins(storage: cv2.FileStorage, rig: Rig) -> None:
-    if not rig.origins:
-        return
-    storage.startWriteStruct("origins", cv2.FileNode_MAP)
-    for part, origin in rig.origins.items():
-        storage.startWriteStruct(part, cv2.FileNode_MAP)
-        for name in ("method", "made", "verdict", "reason"):
-            storage.write(name, quoted(getattr(origin, name)))
-        storage.write("views", origin.views)
-        storage.write("rms_px", origin.rms_px)
-        storage.startWriteStruct("parameters", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
-        for parameter in origin.parameters:
-            storage.write("", quoted(parameter))
-        storage.endWriteStruct()
-        storage.write("covariance", origin.covariance)
-        storage.endWriteStruct()
+@contextmanager
+def _map(storage: cv2.FileStorage, name: str) -> Iterator[None]:
+    """Write the fields written inside ``with`` as a map."""
+    storage.startWriteStruct(name, cv2.FileNode_MAP)
+    yield
     storage.endWriteStruct()
+
+
+def _write_texts(storage: cv2.FileStorage, source: object, names: tuple[str, ...]) -> None:
+    for name in names:
+        storage.write(name, quoted(getattr(source, name)))
+
+
+def _write_display(storage: cv2.FileStorage, eye: str, display: EyeDisplay) -> None:
+    with _map(storage, eye):
+        storage.write("width_px", display.width_px)
+        storage.write("height_px", display.height_px)
+        storage.write("T_V_H", display.T_V_H)
+        with _map(storage, "model"):
+            storage.write("name", quoted(DISPLAY_MODEL))
+            storage.write("K", display.K)
+            storage.write("H0", display.H0)
+            storage.write("t_C0_V_m", display.t_C0_V_m[:, None])
+            storage.write("z_C0_S_m", display.z_C0_S_m)
+
+
+def _write_depth_camera(
+    storage: cv2.FileStorage, intrinsics: Intrinsics, identity: CameraIdentity
+) -> None:
+    with _map(storage, "depth_camera"):
+        _write_texts(storage, identity, _CAMERA_TEXTS)
+        storage.write("width_px", intrinsics.width)
+        storage.write("height_px", intrinsics.height)
+        for name in ("fx", "fy", "cx", "cy"):
+            storage.write(name, getattr(intrinsics, name))
+        storage.startWriteStruct("distortion", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
+        for coefficient in intrinsics.distortion:
+            storage.write("", coefficient)
+        storage.endWriteStruct()
+
+
+def _write_depth_check(storage: cv2.FileStorage, check: DepthCheck | None) -> None:
+    if check is None:
+        return
+    with _map(storage, "depth_check"):
+        storage.write("made", quoted(check.made))
+        storage.write("views", check.views)
+        storage.write("scale", check.scale)
+        storage.write("offset_m", check.offset_m)
+        storage.write("covariance", check.covariance)
+        rows = [check.ranges_m, check.flatness_m[:, None], check.flatness_sigma_m[:, None]]
+        storage.write("flatness", np.hstack(rows))
+
+
+def _write_headset(storage: cv2.FileStorage, headset: HeadsetIdentity | None) -> None:
+    if headset is None:
+        return
+    with _map(storage, "headset"):
+        _write_texts(storage, headset, ("device_id", "name", "runtime", "app"))
+        storage.write("protocol", headset.protocol)
+        if headset.eye_distance_m is not None:
+            storage.write("eye_distance_m", headset.eye_distance_m)
+        for eye, view in headset.views.items():
+            with _map(storage, eye):
+                storage.write("width_px", view.width_px)
+                storage.write("height_px", view.height_px)
+                storage.write("tangents", view.tangents[:, None])
+                storage.write("T_V_H", view.T_V_H)
+
+
+def _write_origins(storage: cv2.FileStorage, origins: Mapping[RigPart, Origin]) -> None:
+    if not origins:
+        return
+    with _map(storage, "origins"):
+        for part, origin in origins.items():
+            with _map(storage, part):
+                _write_texts(storage, origin, ("method", "made", "verdict", "reason"))
+                storage.write("views", origin.views)
+                storage.write("rms_px", origin.rms_px)
+                storage.startWriteStruct("parameters", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
+                for parameter in origin.parameters:
+                    storage.write("", quoted(parameter))
+                storage.endWriteStruct()
+                storage.write("covariance", origin.covariance)
 
 
 def _parse(root: Fields) -> Rig:
@@ -152,31 +223,45 @@ def _parse(root: Fields) -> Rig:
         1 <= version <= RIG_VERSION,
         f"rig version {version} is unknown; versions 1 to {RIG_VERSION} can be read",
     )
-    eyes = {eye: _parse_display(root.section(eye)) for eye in EYES}
+    depth_camera = root.section("depth_camera")
     rig = Rig(
         name=root.text("name"),
-        eyes=eyes,
+        eyes={eye: _parse_display(root.section(eye), version) for eye in EYES},
         T_H_D=root.matrix("T_H_D", 4, 4),
-        depth_intrinsics=_parse_depth_camera(root.section("depth_camera")),
+        depth_intrinsics=_parse_intrinsics(depth_camera),
         origins=_parse_origins(root),
     )
+    if version >= 3:
+        rig = replace(
+            rig,
+            depth_camera=CameraIdentity(*map(depth_camera.text, _CAMERA_TEXTS)),
+            headset=_parse_headset(root),
+            depth_check=_parse_depth_check(root),
+        )
     check_rig(rig)
     return rig
 
 
-def _parse_display(fields: Fields) -> EyeDisplay:
+def _parse_display(fields: Fields, version: int) -> EyeDisplay:
+    model = fields.section("model") if version >= 3 else fields
+    name = model.text("name") if version >= 3 else DISPLAY_MODEL
+    require(
+        name == DISPLAY_MODEL,
+        f"the display model {name[:40]!r} is not known, only {DISPLAY_MODEL!r}: use the version "
+        "of handcal that wrote this file, or a newer one",
+    )
     return EyeDisplay(
-        K=fields.matrix("K", 3, 3),
-        H0=fields.matrix("H0", 3, 3),
-        t_C0_V_m=fields.matrix("t_C0_V_m", 3, 1)[:, 0],
-        z_C0_S_m=fields.number("z_C0_S_m"),
+        K=model.matrix("K", 3, 3),
+        H0=model.matrix("H0", 3, 3),
+        t_C0_V_m=model.matrix("t_C0_V_m", 3, 1)[:, 0],
+        z_C0_S_m=model.number("z_C0_S_m"),
         width_px=fields.integer("width_px"),
         height_px=fields.integer("height_px"),
         T_V_H=fields.matrix("T_V_H", 4, 4),
     )
 
 
-def _parse_depth_camera(fields: Fields) -> Intrinsics:
+def _parse_intrinsics(fields: Fields) -> Intrinsics:
     return Intrinsics(
         width=fields.integer("width_px"),
         height=fields.integer("height_px"),
@@ -185,6 +270,47 @@ def _parse_depth_camera(fields: Fields) -> Intrinsics:
         cx=fields.number("cx"),
         cy=fields.number("cy"),
         distortion=fields.numbers("distortion"),
+    )
+
+
+def _parse_depth_check(root: Fields) -> DepthCheck | None:
+    if not root.has("depth_check"):
+        return None
+    fields = root.section("depth_check")
+    flatness = fields.rows("flatness", 4, MAX_RANGES)
+    return DepthCheck(
+        made=fields.text("made"),
+        views=fields.integer("views"),
+        scale=fields.number("scale"),
+        offset_m=fields.number("offset_m"),
+        covariance=fields.matrix("covariance", 2, 2),
+        ranges_m=flatness[:, :2],
+        flatness_m=flatness[:, 2],
+        flatness_sigma_m=flatness[:, 3],
+    )
+
+
+def _parse_headset(root: Fields) -> HeadsetIdentity | None:
+    if not root.has("headset"):
+        return None
+    fields = root.section("headset")
+    return HeadsetIdentity(
+        device_id=fields.text("device_id"),
+        name=fields.text("name"),
+        runtime=fields.text("runtime"),
+        app=fields.text("app"),
+        protocol=fields.integer("protocol"),
+        views={eye: _parse_view(fields.section(eye)) for eye in EYES if fields.has(eye)},
+        eye_distance_m=fields.number("eye_distance_m") if fields.has("eye_distance_m") else None,
+    )
+
+
+def _parse_view(fields: Fields) -> HeadsetView:
+    return HeadsetView(
+        T_V_H=fields.matrix("T_V_H", 4, 4),
+        tangents=fields.matrix("tangents", 4, 1)[:, 0],
+        width_px=fields.integer("width_px"),
+        height_px=fields.integer("height_px"),
     )
 
 

@@ -18,13 +18,13 @@ from handcal.rig.display import (
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.formats import read_intrinsics, read_pose, read_stereo
+from handcal.rig.formats import read_identity, read_intrinsics, read_pose, read_stereo
 from handcal.rig.grid import grid_on, on_display
 from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
-from handcal.rig.views import View, used
-from handcal.types import Eye, Float64, Intrinsics, Rig
+from handcal.rig.views import BoardImage, used
+from handcal.types import CameraIdentity, Eye, Float64, Intrinsics, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class DisplayInputs:
 
 
 def calibrate_depth_camera(
-    pairs: Sequence[tuple[View, View]],
+    pairs: Sequence[tuple[BoardImage, BoardImage]],
     lens: LensModel,
     depth_intrinsics: Path | None,
     headset_intrinsics: Path | None,
@@ -60,7 +60,7 @@ def calibrate_depth_camera(
 
     Parameters
     ----------
-    pairs : sequence of (View, View)
+    pairs : sequence of (BoardImage, BoardImage)
         By the depth camera and by the headset's.
     lens : LensModel
         Distortion model of intrinsics that are solved.
@@ -76,13 +76,13 @@ def calibrate_depth_camera(
 
 
 def calibrate_viewpoint(
-    board_views: Sequence[View], camera: Intrinsics, stereo: Path | None, tracked: Path | None
+    board_views: Sequence[BoardImage], camera: Intrinsics, stereo: Path | None, tracked: Path | None
 ) -> ViewpointPose:
     """Calibrate the pose of the viewpoint camera in the headset.
 
     Parameters
     ----------
-    board_views : sequence of View
+    board_views : sequence of BoardImage
         By the viewpoint camera, of the tracked board; not used with `stereo`.
     camera : Intrinsics
         The viewpoint camera.
@@ -106,7 +106,7 @@ def calibrate_viewpoint(
 def calibrate_eye_display(
     rig: Rig,
     eye: Eye,
-    grid_views: Sequence[View],
+    grid_views: Sequence[BoardImage],
     camera: Intrinsics,
     viewpoint: ViewpointPose,
     inputs: DisplayInputs,
@@ -118,7 +118,7 @@ def calibrate_eye_display(
     rig : Rig
         Gives the size of the display and, unless `inputs` does, T_V_H.
     eye : {"left", "right"}
-    grid_views : sequence of View
+    grid_views : sequence of BoardImage
         By the viewpoint camera, of the grid's board.
     camera : Intrinsics
         The viewpoint camera.
@@ -144,6 +144,11 @@ def calibrate_eye_display(
 def intrinsics_in(path: Path | None) -> Intrinsics | None:
     """Return the intrinsics in a file; None without one."""
     return None if path is None else read_intrinsics(path)
+
+
+def identity_in(path: Path | None) -> CameraIdentity:
+    """Return the identity of the camera in a file of its intrinsics; empty without one."""
+    return CameraIdentity() if path is None else read_identity(path)
 
 
 def pose_in(path: Path | None) -> Float64 | None:

@@ -27,7 +27,7 @@ from handcal.rig.camera import (
 )
 from handcal.rig.fit import marginal_covariance, rms
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import View, ViewsError, WorstView, one_size, worst_view
+from handcal.rig.views import BoardImage, ViewsError, WorstView, one_size, worst_view
 from handcal.types import Float64, Intrinsics, freeze
 
 _Both: TypeAlias = tuple[Float64, Float64]  # of the depth camera's and the headset's image
@@ -95,7 +95,7 @@ class _Pair:
 
 
 def calibrate_stereo(
-    pairs: Sequence[tuple[View, View]],
+    pairs: Sequence[tuple[BoardImage, BoardImage]],
     depth: Intrinsics | None = None,
     headset: Intrinsics | None = None,
     settings: StereoSettings | None = None,
@@ -104,7 +104,7 @@ def calibrate_stereo(
 
     Parameters
     ----------
-    pairs : sequence of (View, View)
+    pairs : sequence of (BoardImage, BoardImage)
         The depth camera's and the headset camera's. A pair with either dropped is left out.
     depth, headset : Intrinsics, optional
         If not given, solved from the same views, which then must be more and better.
@@ -159,7 +159,7 @@ def calibrate_stereo(
     )
 
 
-def _found_by_both(pairs: Sequence[tuple[View, View]]) -> dict[str, _Pair]:
+def _found_by_both(pairs: Sequence[tuple[BoardImage, BoardImage]]) -> dict[str, _Pair]:
     """Return the corners that both cameras see, by the name of the depth camera's image."""
     both = {}
     for first, second in pairs:
@@ -207,7 +207,7 @@ def _check_sizes(
             )
 
 
-def _solved(views: Sequence[View], which: str, settings: CameraSettings) -> Intrinsics:
+def _solved(views: Sequence[BoardImage], which: str, settings: CameraSettings) -> Intrinsics:
     try:
         calibration: CameraCalibration = calibrate_camera(views, settings)
     except ViewsError as error:

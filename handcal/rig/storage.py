@@ -84,15 +84,24 @@ class Fields:
 
     def matrix(self, name: str, rows: int, columns: int) -> Float64:
         """Return an opencv-matrix of doubles of the given size."""
+        return self._matrix(name, rows, columns, str(rows))
+
+    def rows(self, name: str, columns: int, most: int) -> Float64:
+        """Return an opencv-matrix of doubles with 1 to `most` rows of `columns`."""
+        rows = self._node.getNode(name).getNode("rows").real() if self.has(name) else 0
+        return self._matrix(name, rows if rows in range(1, most + 1) else 0, columns, "N")
+
+    def _matrix(self, name: str, rows: float, columns: int, rows_text: str) -> Float64:
         node = self._node.getNode(name)
         # The size is checked before OpenCV allocates memory for it.
         require(
             node.isMap()
+            and rows > 0
             and node.getNode("rows").real() == rows
             and node.getNode("cols").real() == columns
             and node.getNode("dt").string() == "d"
             and node.getNode("data").size() == rows * columns,
-            f"{self._prefix}{name} must be a {rows}×{columns} opencv-matrix of type d",
+            f"{self._prefix}{name} must be a {rows_text}×{columns} opencv-matrix of type d",
         )
         return np.asarray(node.mat(), dtype=np.float64)
 

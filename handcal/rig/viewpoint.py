@@ -15,10 +15,10 @@ from handcal.rig.board import BoardView
 from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import View, ViewsError, require_size, used
+from handcal.rig.views import BoardImage, ViewsError, require_size, used
 from handcal.types import Float64, Intrinsics, freeze
 
-MIN_VIEWS = 3
+MIN_TRACKED_VIEWS = 3
 _GOOD_PX, _BAD_PX = 1.5, 5.0
 _GOOD_SIGMA_M = 0.001
 
@@ -82,7 +82,7 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
     Parameters
     ----------
     views : mapping of name to TrackedView
-        At least `MIN_VIEWS`, the camera in the same place behind the display.
+        At least `MIN_TRACKED_VIEWS`, the camera in the same place behind the display.
     camera : Intrinsics
         The viewpoint camera.
 
@@ -92,10 +92,10 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
         If there are too few views, or one of another size than the camera's images.
     """
     require_size({name: one.view.size for name, one in views.items()}, camera)
-    if len(views) < MIN_VIEWS:
+    if len(views) < MIN_TRACKED_VIEWS:
         raise ViewsError(
-            f"{len(views)} views with a tracked board are too few: take {MIN_VIEWS} or more, with "
-            "the board at other distances and angles"
+            f"{len(views)} views with a tracked board are too few: take {MIN_TRACKED_VIEWS} or "
+            "more, with the board at other distances and angles"
         )
     points_H_m = np.concatenate([transform(one.T_H_B, one.view.points_m) for one in views.values()])
     pixels = np.concatenate([one.view.pixels for one in views.values()])
@@ -121,7 +121,7 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
 
 
 def viewpoint_from_tracked(
-    views: Iterable[View], T_H_B: Mapping[str, Float64], camera: Intrinsics
+    views: Iterable[BoardImage], T_H_B: Mapping[str, Float64], camera: Intrinsics
 ) -> ViewpointPose:
     """Find the pose from the views of a board that are not left out, and its tracked poses by name.
 

@@ -31,7 +31,7 @@ class ViewsError(HandcalError):
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class BoardImage:
     """An image, with the board found in it."""
 
     name: str
@@ -62,12 +62,12 @@ class WorstView:
     why: str
 
 
-def view(name: str, image: UInt8, board: Board) -> View:
+def board_image(name: str, image: UInt8, board: Board) -> BoardImage:
     """Look for the board in an image (H, W) or (H, W, 3)."""
     try:
-        return View(name, find_board(image, board))
+        return BoardImage(name, find_board(image, board))
     except BoardError as error:
-        return View(name, None, str(error))
+        return BoardImage(name, None, str(error))
 
 
 def image_files(paths: Iterable[Path]) -> list[Path]:
@@ -99,7 +99,7 @@ def read_views(
     files: Sequence[Path],
     board: Board,
     progress: Progress = Progress(),
-) -> tuple[View, ...]:
+) -> tuple[BoardImage, ...]:
     """Look for the board in image files; one that cannot be read is a view with a problem.
 
     Parameters
@@ -114,13 +114,13 @@ def read_views(
         progress.at(number / len(files), file.name)
         try:
             image = read_image(file, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-            views.append(view(file.name, image, board))
+            views.append(board_image(file.name, image, board))
         except (FileError, ValueError) as error:
-            views.append(View(file.name, None, str(error)))
+            views.append(BoardImage(file.name, None, str(error)))
     return tuple(views)
 
 
-def drop(views: Iterable[View], names: Collection[str]) -> tuple[View, ...]:
+def drop(views: Iterable[BoardImage], names: Collection[str]) -> tuple[BoardImage, ...]:
     """Return the views with exactly those in `names` left out.
 
     Raises
@@ -135,7 +135,7 @@ def drop(views: Iterable[View], names: Collection[str]) -> tuple[View, ...]:
     return tuple(replace(view, dropped=view.name in names) for view in views)
 
 
-def used(views: Iterable[View], at_least: int) -> dict[str, BoardView]:
+def used(views: Iterable[BoardImage], at_least: int) -> dict[str, BoardView]:
     """Return the boards found in the views that are not left out, by name.
 
     Raises
@@ -202,7 +202,9 @@ def coverage(found: Iterable[BoardView]) -> Coverage:
     return Coverage(hits, float(np.mean(hits > 0)))
 
 
-def pair_views(first: Sequence[View], second: Sequence[View]) -> tuple[tuple[View, View], ...]:
+def pair_views(
+    first: Sequence[BoardImage], second: Sequence[BoardImage]
+) -> tuple[tuple[BoardImage, BoardImage], ...]:
     """Pair the views of two cameras by the last number in their names, as left07 and right07.
 
     If one view of a pair is left out, so is the other.
@@ -222,13 +224,13 @@ def pair_views(first: Sequence[View], second: Sequence[View]) -> tuple[tuple[Vie
     return tuple(_as_pair(numbered[0][number], numbered[1][number]) for number in shared)
 
 
-def _as_pair(first: View, second: View) -> tuple[View, View]:
+def _as_pair(first: BoardImage, second: BoardImage) -> tuple[BoardImage, BoardImage]:
     dropped = first.dropped or second.dropped
     return replace(first, dropped=dropped), replace(second, dropped=dropped)
 
 
-def _by_number(views: Iterable[View]) -> dict[int, View]:
-    numbered: dict[int, View] = {}
+def _by_number(views: Iterable[BoardImage]) -> dict[int, BoardImage]:
+    numbered: dict[int, BoardImage] = {}
     for one in views:
         numbers = re.findall(r"\d+", Path(one.name).stem)
         if not numbers:

@@ -17,7 +17,7 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
 
 _POLL_S = 0.002
 # Colour of an Intel RealSense D415 at 1280x720: 69° across, 15 mm beside the depth (data sheet).
@@ -56,6 +56,7 @@ class SyntheticCamera(Closable):
     """
 
     name = "Simulated camera"
+    identity = CameraIdentity("Simulated camera", "simulated", "")
 
     def __init__(
         self,

@@ -8,7 +8,8 @@ import platform
 import shutil
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -20,7 +21,9 @@ from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
+from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
+from handcal.types import CameraIdentity, Intrinsics
 
 _PACKAGES = (
     "numpy",
@@ -55,8 +58,14 @@ class Finding:
     """Recommended action; empty if none."""
 
 
-def examine() -> list[Finding]:
-    """Check everything that a calibration needs; never raises."""
+def examine(rig: Path | None = None) -> list[Finding]:
+    """Check everything that a calibration needs; never raises.
+
+    Parameters
+    ----------
+    rig : Path, optional
+        Rig file with whose depth camera the connected cameras are compared.
+    """
     return [
         _python(),
         *_packages(),
@@ -64,7 +73,8 @@ def examine() -> list[Finding]:
         _hand_detector(),
         _network(),
         _pairing(),
-        *_cameras(),
+        *_rig(rig),
+        *_cameras(rig),
         _screen(),
         _disk(),
     ]
@@ -125,7 +135,13 @@ def _pairing() -> Finding:
     return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
 
 
-def _cameras() -> list[Finding]:
+def _rig(path: Path | None) -> list[Finding]:
+    if path is None:
+        return []
+    return [_try("Rig file", lambda: read_rig(path).name, "choose another rig file")]
+
+
+def _cameras(rig: Path | None) -> list[Finding]:
     try:
         devices = connected_devices()
     except HandcalError as error:
@@ -133,7 +149,28 @@ def _cameras() -> list[Finding]:
     if not devices:
         advice = "the simulator and recordings work without"
         return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
-    return [examine_camera(device) for device in devices]
+    return [with_rig(examine_camera(device), rig, device.identity) for device in devices]
+
+
+def with_rig(
+    finding: Finding,
+    path: Path | None,
+    identity: CameraIdentity,
+    intrinsics: Intrinsics | None = None,
+) -> Finding:
+    """Return a camera's finding with its differences from the camera of a rig file, if given.
+
+    A rig file that cannot be read leaves the finding as it is.
+    """
+    differences: tuple[str, ...] = ()
+    if path is not None:
+        with suppress(HandcalError):
+            differences = compare_camera(read_rig(path), identity, intrinsics)
+    if not differences:
+        return finding
+    found = f"{finding.found}; not the depth camera of the rig: {'; '.join(differences)}"
+    advice = "choose the rig file of this camera, or calibrate its pose on the headset again"
+    return replace(finding, health=Health.LIMITED, found=found, advice=advice)
 
 
 def examine_camera(device: Device) -> Finding:

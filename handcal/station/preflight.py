@@ -19,7 +19,7 @@ from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 from handcal.rig.rig_file import read_rig
-from handcal.station.doctor import Finding, Health, examine_camera, examine_disk
+from handcal.station.doctor import Finding, Health, examine_camera, examine_disk, with_rig
 from handcal.station.settings import StationSettings
 
 Part: TypeAlias = Literal["camera", "headset", "rig", "sessions"]
@@ -82,22 +82,31 @@ def _broken(found: str, advice: str) -> Finding:
 def _camera(settings: StationSettings) -> Finding:
     match settings.source:
         case "realsense":
-            return examine_camera(choose_device(connected_devices(), settings.realsense.serial))
+            device = choose_device(connected_devices(), settings.realsense.serial)
+            return with_rig(examine_camera(device), _chosen_rig(settings), device.identity)
         case "recording":
-            return _recording(settings.recording, settings.playback.loop)
+            return _recording(settings)
         case "simulator":
             return _good("simulated; no hardware is needed")
 
 
-def _recording(name: str, is_looped: bool) -> Finding:
+def _chosen_rig(settings: StationSettings) -> Path | None:
+    """Return the rig file; None for the shipped example, which is of no real camera."""
+    return settings.rig_path if settings.rig else None
+
+
+def _recording(settings: StationSettings) -> Finding:
+    name = settings.recording
     kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, or a folder that handcal recorded"
     if not name:
         return _broken("no recording is chosen", f"choose {kinds}")
     path = Path(name)
-    how = "played in a loop" if is_looped else "played once"
+    how = "played in a loop" if settings.playback.loop else "played once"
     if path.is_dir():
         with FolderCamera(path) as camera:
-            return _good(f"{camera.name}, {how}")
+            found = _good(f"{camera.name}, {how}")
+            rig, intrinsics = _chosen_rig(settings), camera.depth_intrinsics
+            return with_rig(found, rig, camera.identity, intrinsics)
     if not path.is_file():
         return _broken(f"there is no recording {path}", f"choose {kinds}")
     if path.suffix not in RECORDING_SUFFIXES:

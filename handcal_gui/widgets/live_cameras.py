@@ -12,7 +12,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.types import Frame
+from handcal.types import CameraIdentity, Frame
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.image_view import ImageView
@@ -34,8 +34,8 @@ class LiveCameras(QWidget):
         Name of each camera.
     realsense : RealSenseSettings, optional
     tell : callable
-        Called in another thread with a camera's title and its first frame, if the camera also has
-        depth.
+        Called in another thread with a camera's title, first frame and identity, if the camera also
+        has depth.
     open_source : callable
         Like `open_view_source`.
 
@@ -55,7 +55,7 @@ class LiveCameras(QWidget):
         self,
         titles: Sequence[str],
         realsense: RealSenseSettings | None = None,
-        tell: Callable[[str, Frame], object] = lambda _title, _frame: None,
+        tell: Callable[[str, Frame, CameraIdentity], object] = lambda *_: None,
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         parent: QWidget | None = None,
     ) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from handcal.camera.camera import Camera
+from handcal.camera.feed import CameraFeed
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording, record_frames
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
@@ -19,10 +20,12 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import RoomSettings, make_room
 from handcal.sim.sway import swaying_hand
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
+from tests.helpers import eventually
 
 COUNT = 6
 KINDS = ("simulator", "realsense", "folder", "recording")
+D415 = CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
 OpenCamera: TypeAlias = Callable[[], Camera]
 
 
@@ -48,7 +51,7 @@ def open_camera(
             return RealSenseCamera
         case kind:
             path = tmp_path / ("made" if kind == "folder" else "made.db3")
-            record_frames(path, make_frames(COUNT))
+            record_frames(path, make_frames(COUNT), D415)
             return lambda: open_recording(path)
 
 
@@ -94,3 +97,34 @@ def test_a_camera_can_be_opened_again(open_camera: OpenCamera) -> None:
     for _ in range(2):
         with open_camera() as camera:
             assert camera.read(5.0).depth.any()
+
+
+def test_a_camera_tells_which_device_it_is(open_camera: OpenCamera) -> None:
+    with open_camera() as camera:
+        simulated = CameraIdentity("Simulated camera", "simulated", "")
+        assert camera.identity == (simulated if camera.name == "Simulated camera" else D415)
+
+
+@pytest.mark.parametrize("name", ["made", "made.db3"])
+def test_a_recording_of_an_unknown_camera_names_none(
+    name: str, make_frames: Callable[..., Iterator[Frame]], tmp_path: Path
+) -> None:
+    record_frames(tmp_path / name, make_frames(1))
+    with open_recording(tmp_path / name) as camera:
+        assert camera.identity == CameraIdentity()
+
+
+@pytest.mark.parametrize("name", ["0925_012.bag", "0925_015.bag"])
+def test_a_recording_by_a_real_camera_names_it(shared_data: Path, name: str) -> None:
+    pytest.importorskip("pyrealsense2")
+    with open_recording(shared_data / "recordings" / name) as camera:
+        assert camera.identity == CameraIdentity(
+            "Intel RealSense D435", "817512071792", "05.11.06.250"
+        )
+
+
+def test_a_feed_tells_which_device_it_reads(open_camera: OpenCamera) -> None:
+    with CameraFeed(open_camera) as feed:
+        assert feed.status.identity == CameraIdentity()
+        eventually(feed.read)
+        assert feed.status.identity.model

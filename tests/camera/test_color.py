@@ -16,22 +16,23 @@ from handcal.camera.recordings import open_recording, record_frames
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.errors import CameraEndError, CameraError
-from handcal.types import Frame
+from handcal.types import CameraIdentity, Frame
 
+D415 = CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
 MakeFrames = Callable[..., Iterator[Frame]]
 
 
 @pytest.fixture
 def recording(tmp_path: Path, make_frames: MakeFrames) -> Path:
-    record_frames(tmp_path / "take", make_frames(3))
+    record_frames(tmp_path / "take", make_frames(3), D415)
     return tmp_path / "take"
 
 
 def test_a_recording_gives_its_colour_and_tells_its_imager_once(
     recording: Path, make_frames: MakeFrames
 ) -> None:
-    told: list[Frame] = []
-    with open_view_source(str(recording), tell=told.append) as camera:
+    told: list[tuple[Frame, CameraIdentity]] = []
+    with open_view_source(str(recording), tell=lambda *both: told.append(both)) as camera:
         for wanted in make_frames(3):
             image, t_ns = camera.read()
             assert wanted.color is not None
@@ -39,7 +40,8 @@ def test_a_recording_gives_its_colour_and_tells_its_imager_once(
             assert t_ns == wanted.t_camera_ns
         with pytest.raises(CameraEndError):
             camera.read()
-    assert [frame.T_C_D.tolist() for frame in told] == [wanted.T_C_D.tolist()]
+    assert [frame.T_C_D.tolist() for frame, _ in told] == [wanted.T_C_D.tolist()]
+    assert [identity for _, identity in told] == [D415]
     with pytest.raises(CameraError, match="is closed"):
         camera.read()
 

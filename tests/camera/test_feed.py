@@ -9,7 +9,7 @@ import pytest
 from handcal.camera.feed import CameraFeed, FeedSettings
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.closable import Closable
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
 
 CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)
 SETTINGS = FeedSettings(read_s=0.01, silent_s=0.03, reopen_s=0.05)
@@ -21,6 +21,7 @@ class Scripted(Closable):
     """Gives what its script says, a frame for a number."""
 
     name = "Scripted camera"
+    identity = CameraIdentity()
     depth_intrinsics = CAMERA
 
     def __init__(self, script: Sequence[int | Exception]) -> None:

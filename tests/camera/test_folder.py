@@ -87,6 +87,8 @@ def test_nothing_is_written_over(folder: Path, make_frames: MakeFrames) -> None:
         ("color", [], "must describe depth and"),
         ("depth_scale", 0, "depth_scale is 0"),
         ("T_C_D", [[1.0]], "must be a rigid transform"),
+        ("device", "D415", "device must be an object"),
+        ("device", {"serial_number": 123}, r"device\.serial_number must be one line"),
         ("T_C_D", "here", "must be a rigid transform"),
         ("T_C_D", np.diag([2.0, 1.0, 1.0, 1.0]).tolist(), "must be a rigid transform"),
     ],

@@ -16,7 +16,7 @@ from handcal.camera.recordings import open_recording
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
 from handcal.io.closable import Closable
 from handcal.progress import Progress
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
 
 CAMERA = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)
 SETTINGS = RecordSettings(silent_s=0.1, free_bytes=0)
@@ -28,6 +28,7 @@ class Scripted(Closable):
     """Gives what its script says: a frame for a number, and silence at the end."""
 
     name = "Scripted camera"
+    identity = CameraIdentity()
     depth_intrinsics = CAMERA
 
     def __init__(self, script: Sequence[int | str | Exception]) -> None:

@@ -12,6 +12,7 @@ import pytest
 from handcal.camera import sdk_devices
 from handcal.camera.sdk_devices import Device, choose_device, connected_devices, librealsense
 from handcal.errors import CameraError
+from handcal.types import CameraIdentity
 
 D415 = Device("Intel RealSense D415", "123", "5.16.0.1", "3.2", temperature_c=41.0)
 
@@ -24,6 +25,12 @@ def test_devices_are_described_by_what_they_tell(plug_in: Callable[..., Any]) ->
         D415,
         replace(D415, serial="4", recommended_firmware="5.17.0.10"),
     ]
+
+
+def test_an_identity_is_of_printable_lines() -> None:
+    assert D415.identity == CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
+    odd = replace(D415, name="D415\x00\n\t", serial="9" * 1000, firmware="")
+    assert odd.identity == CameraIdentity("D415", "9" * 100, "")
 
 
 def test_the_installed_sdk_can_look() -> None:

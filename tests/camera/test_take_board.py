@@ -27,10 +27,10 @@ from handcal.io.images import read_image
 from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
-from handcal.rig.formats import read_intrinsics, read_pose
+from handcal.rig.formats import read_identity, read_intrinsics, read_pose
 from handcal.rig.views import image_files, pair_views, read_views
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
-from handcal.types import Float64, Frame, Intrinsics, UInt8
+from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 
 BOARD = Board(squares=(7, 5), square_m=0.035, marker_m=0.025)
 CAMERA = Intrinsics(480, 360, 400.0, 401.0, 238.0, 181.0)
@@ -193,8 +193,10 @@ def test_the_depth_imager_is_kept_beside_its_colour(tmp_path: Path) -> None:
         color_intrinsics=CAMERA,
         T_C_D=T_C_D,
     )
-    keep_imager(tmp_path / "depth", frame)
+    d415 = CameraIdentity("Intel RealSense D415", "123")
+    keep_imager(tmp_path / "depth", frame, d415)
     assert read_intrinsics(tmp_path / "depth" / IMAGER) == CAMERA
+    assert read_identity(tmp_path / "depth" / IMAGER) == d415
     np.testing.assert_allclose(read_pose(tmp_path / "depth" / DEPTH_TO_COLOR), T_C_D, atol=1e-12)
 
 

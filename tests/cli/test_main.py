@@ -242,11 +242,11 @@ def test_doctor_fails_only_for_what_must_be_mended(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     note = Finding("Camera", Health.LIMITED, "none connected", "plug one in")
-    monkeypatch.setattr(doctor, "examine", lambda: [note])
+    monkeypatch.setattr(doctor, "examine", lambda _rig: [note])
     handcal("doctor")
     assert capsys.readouterr().out == "note     Camera: none connected\n         → plug one in\n"
     problem = Finding("scipy", Health.BROKEN, "not installed", "install it")
-    monkeypatch.setattr(doctor, "examine", lambda: [note, problem])
+    monkeypatch.setattr(doctor, "examine", lambda _rig: [note, problem])
     assert fails("doctor") == (1, "handcal: fix the problems listed above and try again\n")
 
 

@@ -16,7 +16,7 @@ from handcal.hand.segment import SegmentSettings
 from handcal.io.closable import Closable
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import draw_hand
-from handcal.types import Float64, Frame, Intrinsics
+from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
 
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 T_0 = rigid([0.1, 0.1, 0.1], [0.0, 0.02, 0.52])
@@ -28,6 +28,7 @@ class FrameList(Closable):
     """A camera that gives the frames of a list."""
 
     name = "List"
+    identity = CameraIdentity()
     depth_intrinsics = CAMERA
 
     def __init__(self, frames: Iterable[Frame]) -> None:

@@ -38,7 +38,7 @@ from handcal.station.procedure import CalibrationSettings, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import EYES, Alignment, Eye, Float64, Frame, Rig, UInt8
+from handcal.types import EYES, Alignment, CameraIdentity, Eye, Float64, Frame, Rig, UInt8
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -164,6 +164,7 @@ class Camera(Closable):
     """A camera that repeats one of the rendered frames and can be unplugged."""
 
     name = "Camera of the tests"
+    identity = CameraIdentity()
 
     def __init__(self, frames: Mapping[str, Frame]) -> None:
         self.shows = "nothing"

@@ -12,7 +12,7 @@ from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import ViewsError, WorstView
-from handcal.types import Intrinsics
+from handcal.types import CameraIdentity, DepthCheck, Intrinsics
 
 RIG = example_rig()
 MADE = "2026-11-21T16:00:00+00:00"
@@ -70,6 +70,18 @@ def test_depth_that_is_not_aligned_to_colour_has_its_own_place() -> None:
     rig = with_stereo(RIG, STEREO, MADE, depth_intrinsics=depth, T_C_D=T_C_D)
     np.testing.assert_allclose(rig.T_H_D, STEREO.T_H_D @ T_C_D)
     assert rig.depth_intrinsics == depth
+
+
+def test_the_rig_s_camera_is_the_one_that_took_the_images() -> None:
+    d415 = CameraIdentity("Intel RealSense D415", "123")
+    check = DepthCheck(
+        *("today", 9, 1.0, 0.0, np.eye(2), np.ones((1, 2)), np.zeros(1), np.zeros(1))
+    )
+    checked = replace(with_stereo(RIG, STEREO, depth_camera=d415), depth_check=check)
+    assert checked.depth_camera == d415
+    again = with_stereo(checked, STEREO)
+    assert (again.depth_camera, again.depth_check) == (CameraIdentity(), None)
+    assert with_display(checked, "left", display_calibration()).depth_check is check
 
 
 def test_a_pose_that_is_not_determined_makes_no_rig() -> None:

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.io.images import read_image
+from handcal.io.images import MAX_SIDE_PX, read_image
 from handcal.rig.board import Board, charuco
 from handcal.rig.board_finder import find_board
-from handcal.rig.board_print import MAX_SIDE_PX, draw_board, write_board_pdf
+from handcal.rig.board_print import draw_board, write_board_pdf
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from handcal.geometry import camera_matrix, rigid
 from handcal.rig.board import Board
 from handcal.rig.camera import CameraSettings, calibrate_camera
-from handcal.rig.views import View, ViewsError, drop, read_views, view
+from handcal.rig.views import BoardImage, ViewsError, board_image, drop, read_views
 from handcal.sim.boards import BoardPainter, board_poses, board_view
 from handcal.types import Intrinsics
 
@@ -17,11 +17,11 @@ CAMERA = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (-0.25, 0.08, 0.0008, 
 NOISE_PX = 0.1
 
 
-def _views(count: int = 15, seed: int = 1, noise_px: float = NOISE_PX) -> tuple[View, ...]:
+def _views(count: int = 15, seed: int = 1, noise_px: float = NOISE_PX) -> tuple[BoardImage, ...]:
     rng = np.random.default_rng(seed)
     poses = board_poses(BOARD, CAMERA, count, rng)
     return tuple(
-        View(f"{number}.png", board_view(BOARD, T, CAMERA, rng, noise_px))
+        BoardImage(f"{number}.png", board_view(BOARD, T, CAMERA, rng, noise_px))
         for number, T in enumerate(poses)
     )
 
@@ -75,7 +75,9 @@ def test_images_of_a_board_give_the_camera_to_three_thousandths() -> None:
     rng = np.random.default_rng(3)
     painter = BoardPainter(BOARD, CAMERA)
     poses = board_poses(BOARD, CAMERA, 10, rng)
-    views = [view(f"{number}", painter.paint(T, rng), BOARD) for number, T in enumerate(poses)]
+    views = [
+        board_image(f"{number}", painter.paint(T, rng), BOARD) for number, T in enumerate(poses)
+    ]
     result = calibrate_camera(views)
     assert abs(result.intrinsics.fx / CAMERA.fx - 1) < 0.003
     assert abs(result.intrinsics.fy / CAMERA.fy - 1) < 0.003
@@ -96,7 +98,7 @@ def test_views_at_one_angle_are_bad() -> None:
     views = []
     for number in range(12):
         T_C_B = rigid([0.0, 0.0, 0.1 * number], [*rng.uniform(-0.1, 0.0, 2), 0.5])
-        views.append(View(f"{number}", board_view(BOARD, T_C_B, CAMERA, rng, NOISE_PX)))
+        views.append(BoardImage(f"{number}", board_view(BOARD, T_C_B, CAMERA, rng, NOISE_PX)))
     result = calibrate_camera(views)
     assert result.verdict.name == "bad"
     assert "one angle" in result.verdict.reason
@@ -107,7 +109,7 @@ def test_a_bad_image_is_named_and_may_be_dropped() -> None:
     spoilt = views[4].found
     assert spoilt is not None
     pixels = spoilt.pixels + np.random.default_rng(1).normal(scale=8.0, size=spoilt.pixels.shape)
-    views[4] = View("4.png", dataclasses.replace(spoilt, pixels=pixels))
+    views[4] = BoardImage("4.png", dataclasses.replace(spoilt, pixels=pixels))
     result = calibrate_camera(views)
     assert result.verdict.name == "bad"
     assert result.worst.name == "4.png"

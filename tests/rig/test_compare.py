@@ -1,12 +1,14 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from handcal.camera.recordings import open_recording
 from handcal.geometry import rigid
-from handcal.rig.compare import compare_rigs
+from handcal.rig.compare import compare_camera, compare_rigs
 from handcal.rig.example import example_rig
-from handcal.types import Rig
+from handcal.types import CameraIdentity, Rig
 
 RIG = example_rig()
 
@@ -53,3 +55,59 @@ def test_another_depth_lens_is_told_in_pixels() -> None:
     longer = replace(RIG.depth_intrinsics, fx=1.01 * RIG.depth_intrinsics.fx)
     found = differences(replace(RIG, depth_intrinsics=longer))
     assert found == {"depth camera: largest move of a pixel": pytest.approx(6.395, rel=1e-3)}
+
+
+D415 = CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
+KNOWN = replace(RIG, depth_camera=D415)
+LENS = RIG.depth_intrinsics
+
+
+def test_the_rig_s_own_camera_does_not_differ() -> None:
+    assert compare_camera(KNOWN, D415, LENS) == ()
+    assert compare_camera(KNOWN, replace(D415, firmware="6.0")) == ()
+    assert compare_camera(KNOWN, CameraIdentity(), LENS) == ()
+    assert compare_camera(RIG, D415, LENS) == ()
+    solved = replace(LENS, fx=1.004 * LENS.fx, fy=1.003 * LENS.fy, cx=LENS.cx + 2.0)
+    assert compare_camera(KNOWN, D415, replace(solved, distortion=(0.004, 0.0, 0.0, 0.0))) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"fx": 1.04 * LENS.fx, "fy": 1.04 * LENS.fy}, "focal length 4.0 % longer"),
+        ({"fy": 0.98 * LENS.fy}, "focal length 2.0 % shorter"),
+        ({"cx": LENS.cx + 3.0, "cy": LENS.cy - 4.0}, "principal point 5.0 px away"),
+        ({"width": 848, "height": 480}, "images of 848x480 pixels, not 1280x720"),
+    ],
+)
+def test_another_lens_is_told_with_numbers(changes: dict[str, float], words: str) -> None:
+    assert compare_camera(KNOWN, D415, replace(LENS, **changes)) == (words,)  # type: ignore[arg-type]
+
+
+def test_another_distortion_is_told_in_pixels() -> None:
+    (words,) = compare_camera(KNOWN, D415, replace(LENS, distortion=(-0.1, 0.0, 0.0, 0.0)))
+    # In the corner: x = 639.5 / 1005, y = 359.5 / 1005, moved by 0.1 r^3.
+    corner = np.hypot(639.5, 359.5) / 1005.0
+    assert words == f"lens distortion differs by up to {1005.0 * 0.1 * corner**3:.1f} px"
+
+
+def test_another_device_is_named_and_so_is_its_lens() -> None:
+    other = CameraIdentity("Intel RealSense D435", "456")
+    longer = replace(LENS, fx=1.1 * LENS.fx, fy=1.1 * LENS.fy)
+    assert compare_camera(KNOWN, other, longer) == (
+        "another model: Intel RealSense D435, not Intel RealSense D415",
+        "another serial number: 456, not 123",
+        "focal length 10.0 % longer",
+    )
+
+
+def test_a_real_recording_is_told_from_the_example_rig(shared_data: Path) -> None:
+    pytest.importorskip("pyrealsense2")
+    with open_recording(shared_data / "recordings" / "0925_012.bag") as camera:
+        words = compare_camera(KNOWN, camera.identity, camera.depth_intrinsics)
+        own = replace(RIG, depth_camera=camera.identity, depth_intrinsics=camera.depth_intrinsics)
+        assert compare_camera(own, camera.identity, camera.depth_intrinsics) == ()
+    assert words[1:3] == (
+        "another serial number: 817512071792, not 123",
+        "focal length 35.6 % shorter",
+    )

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handcal.geometry import image_points, rigid, transform
-from handcal.rig.cube import Cube, CubeError, corners_m, cube_pose, face_pose, find_cube
+from handcal.rig.cube import Cube, CubeError, cube_pose, face_pose, find_cube, marker_corners_m
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.types import Float64, Intrinsics, UInt8
@@ -22,7 +22,7 @@ def paint(pose: Float64 = POSE, cube: Cube = CUBE) -> UInt8:
 
 
 def seen(pose: Float64, cube: Cube, markers: list[int]) -> dict[int, Float64]:
-    pixels = image_points(transform(pose, corners_m(cube, markers)), CAMERA)
+    pixels = image_points(transform(pose, marker_corners_m(cube, markers)), CAMERA)
     return dict(zip(markers, pixels.reshape(-1, 4, 2), strict=True))
 
 

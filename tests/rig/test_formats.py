@@ -10,9 +10,10 @@ from handcal.geometry import rigid
 from handcal.rig.board import Board
 from handcal.rig.camera import calibrate_camera
 from handcal.rig.formats import (
-    FORMATS,
+    CALIBRATION_FORMATS,
     CalibrationFormat,
     camera_json,
+    read_identity,
     read_intrinsics,
     read_pose,
     read_stereo,
@@ -22,9 +23,9 @@ from handcal.rig.formats import (
 )
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.storage import MAX_STORAGE_BYTES
-from handcal.rig.views import View
+from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
-from handcal.types import Intrinsics
+from handcal.types import CameraIdentity, Intrinsics
 
 FIVE = (0.1, -0.2, 1 / 3 * 1e-3, 0.002, 0.03)
 CAMERA = Intrinsics(640, 480, 500.1, 501 / 3, 320.5, 239.5, FIVE)
@@ -54,7 +55,21 @@ rectification_matrix:
 """
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+def test_the_identity_of_a_camera_is_kept_as_json(tmp_path: Path) -> None:
+    path, identity = tmp_path / "c.json", CameraIdentity("Intel RealSense D415", "123", "5.16")
+    write_intrinsics(path, CAMERA, "json", identity)
+    assert read_intrinsics(path) == CAMERA
+    assert read_identity(path) == identity
+    for kind in CALIBRATION_FORMATS:
+        write_intrinsics(path, CAMERA, kind)
+        assert read_identity(path) == CameraIdentity()
+    for bad in (3, {"model": 3}, {"serial_number": "1\n2"}, {"firmware": "x" * 1000}):
+        path.write_text(json.dumps({"device": bad}))
+        with pytest.raises(FileError, match=r"c\.json: device"):
+            read_identity(path)
+
+
+@pytest.mark.parametrize("kind", CALIBRATION_FORMATS)
 @pytest.mark.parametrize("more", [(), (0.4, 0.5, 0.6)])
 def test_intrinsics_survive_exactly(
     tmp_path: Path, kind: CalibrationFormat, more: tuple[float, ...]
@@ -99,8 +114,8 @@ def test_a_whole_calibration_survives(tmp_path: Path) -> None:
     plain = Intrinsics(640, 480, 500.0, 500.0, 319.5, 239.5)
     pairs = [
         (
-            View(f"d{number}", board_view(board, T, plain, rng, 0.1), dropped=number == 2),
-            View(f"h{number}", board_view(board, T_H_D @ T, plain, rng, 0.1)),
+            BoardImage(f"d{number}", board_view(board, T, plain, rng, 0.1), dropped=number == 2),
+            BoardImage(f"h{number}", board_view(board, T_H_D @ T, plain, rng, 0.1)),
         )
         for number, T in enumerate(board_poses(board, plain, 8, rng))
     ]

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from handcal.geometry import image_points, rigid, transform
-from handcal.rig.cube import Cube, corners_m, refine_corners
+from handcal.rig.cube import Cube, marker_corners_m, refine_corners
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.types import Float64, Intrinsics, UInt8
@@ -44,7 +44,7 @@ def test_a_marker_seen_from_the_side_keeps_its_corners() -> None:
     image = CubePainter(cube, camera, PictureSettings(noise=0.0)).paint(
         pose, np.random.default_rng(1)
     )
-    top_px = image_points(transform(pose, corners_m(cube, [4])), camera)
+    top_px = image_points(transform(pose, marker_corners_m(cube, [4])), camera)
     height_px = np.ptp(top_px[:, 1])
     assert height_px < 40
     found_px = refine_corners(image, top_px + 0.3, 6)

@@ -4,8 +4,8 @@ import numpy as np
 
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
-from handcal.rig.report import report_rig
-from handcal.types import Origin, Rig
+from handcal.rig.report import missing_parts, report_rig
+from handcal.types import CameraIdentity, DepthCheck, HeadsetIdentity, Origin, Rig
 
 RIG = example_rig()
 
@@ -43,3 +43,49 @@ def test_a_part_that_was_not_good_is_told_with_its_reason() -> None:
     origin = Origin("grid", "today", 3, 0.2, "bad", "the camera moved", ("x_m",), np.eye(1))
     found = doubtful(replace(RIG, origins={"left": origin}))
     assert found == {"Calibration of left": "bad: the camera moved (grid, today)"}
+
+
+def depth_check(offset_m: float, sigma_m: float = 0.0005) -> DepthCheck:
+    covariance = np.diag([0.0, sigma_m**2])
+    ranges_m, flatness_m = np.array([[0.3, 0.8]]), np.array([0.002])
+    return DepthCheck(
+        *("today", 9, 1.0, offset_m, covariance, ranges_m, flatness_m, flatness_m / 10)
+    )
+
+
+def test_the_devices_and_a_small_bias_of_depth_are_told() -> None:
+    rig = replace(
+        RIG,
+        depth_camera=CameraIdentity("Intel RealSense D415", "123"),
+        headset=HeadsetIdentity("0a1b", runtime="OpenXR"),
+        depth_check=depth_check(-0.003),
+    )
+    told = {one.what: one.found for one in report_rig(rig)}
+    assert told["Depth camera"] == "Intel RealSense D415, serial number 123"
+    assert told["Headset"] == "0a1b, OpenXR"
+    assert told["Depth check"].startswith("-3.0 ± 0.5 mm at 0.4 m; flat to 2.0 mm (9 views, today)")
+    assert doubtful(rig) == {}
+
+
+def test_a_depth_that_may_be_biased_is_in_doubt() -> None:
+    for check in (depth_check(0.01), depth_check(-0.01), depth_check(0.003, sigma_m=0.002)):
+        assert set(doubtful(replace(RIG, depth_check=check))) == {"Depth check"}
+
+
+def test_missing_parts_are_told_one_line_each() -> None:
+    lines = missing_parts(RIG)
+    assert len(lines) == 6
+    assert all("\n" not in line for line in lines)
+    assert "model and serial number are not known: connect it and run 'handcal rig" in lines[0]
+    model = replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415"))
+    assert "depth camera's serial number is not known" in missing_parts(model)[0]
+    origin = Origin("grid", "today", 3, 0.2, "good", "so it is", ("x_m",), np.eye(1))
+    whole = replace(
+        RIG,
+        depth_camera=CameraIdentity("Intel RealSense D415", "123"),
+        headset=HeadsetIdentity("0a1b"),
+        depth_check=depth_check(0.0),
+        origins={"left": origin, "right": origin, "T_H_D": origin},
+    )
+    assert missing_parts(whole) == ()
+    assert len(missing_parts(replace(whole, origins={"left": origin}))) == 2

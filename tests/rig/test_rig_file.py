@@ -1,6 +1,8 @@
 import contextlib
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,7 +15,19 @@ from handcal.geometry import rigid
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
-from handcal.types import EYES, RIG_PARTS, EyeDisplay, Intrinsics, Origin, Rig
+from handcal.types import (
+    EYES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    EyeDisplay,
+    HeadsetIdentity,
+    HeadsetView,
+    Intrinsics,
+    Origin,
+    Rig,
+)
+from tests.helpers import DATA
 
 FOCAL = st.floats(1.0, 1e5)
 OFFSET = st.floats(-0.05, 0.05)
@@ -43,6 +57,39 @@ ORIGINS = st.builds(
     covariance=st.builds(lambda a, b: np.array([[a, b], [b, a]]), st.floats(0, 1), OFFSET),
 )
 CHARACTERS = st.characters(categories=["L", "N", "P", "S"], include_characters=" ")
+MAY_BE_EMPTY = LINES | st.just("")
+HEADSETS = st.builds(
+    HeadsetIdentity,
+    device_id=st.text("0123456789abcdefABCDEF", min_size=1, max_size=128),
+    name=MAY_BE_EMPTY,
+    runtime=MAY_BE_EMPTY,
+    app=MAY_BE_EMPTY,
+    protocol=st.integers(0, 2**16 - 1),
+    views=st.dictionaries(
+        st.sampled_from(EYES),
+        st.builds(
+            lambda T, low, high, side: HeadsetView(T, np.array([low, high] * 2), side, side),
+            *(TRANSFORMS, st.floats(-9, -0.1), st.floats(0, 9), SIDE),
+        ),
+    ),
+    eye_distance_m=st.none() | st.floats(0.03, 0.1),
+)
+CHECKS = st.builds(
+    lambda edges_m, values: DepthCheck(
+        made="2026-11-23",
+        views=1 + len(edges_m),
+        scale=1.0 + values[0],
+        offset_m=values[1],
+        covariance=np.diag(np.abs(values[:2])),
+        ranges_m=np.sort(edges_m).reshape(-1, 2),
+        flatness_m=np.full(len(edges_m) // 2, abs(values[2])),
+        flatness_sigma_m=np.full(len(edges_m) // 2, abs(values[0])),
+    ),
+    st.integers(1, 20).flatmap(
+        lambda n: st.lists(st.floats(0, 10), min_size=2 * n, max_size=2 * n)
+    ),
+    VECTORS,
+)
 RIGS = st.builds(
     Rig,
     name=st.text(CHARACTERS, min_size=1, max_size=200)
@@ -62,22 +109,27 @@ RIGS = st.builds(
         ),
     ),
     origins=st.dictionaries(st.sampled_from(RIG_PARTS), ORIGINS),
+    depth_camera=st.builds(CameraIdentity, MAY_BE_EMPTY, MAY_BE_EMPTY, MAY_BE_EMPTY),
+    headset=st.none() | HEADSETS,
+    depth_check=st.none() | CHECKS,
 )
 
 
-def assert_equal(a: Rig, b: Rig) -> None:
-    assert a.name == b.name
-    assert a.depth_intrinsics == b.depth_intrinsics
-    assert np.array_equal(a.T_H_D, b.T_H_D)
-    assert set(a.origins) == set(b.origins)
-    for part, origin in a.origins.items():
-        for field in dataclasses.fields(Origin):
-            ours, theirs = getattr(origin, field.name), getattr(b.origins[part], field.name)
-            assert np.array_equal(ours, theirs), f"{part}.{field.name}"
-    for eye in EYES:
-        for field in dataclasses.fields(EyeDisplay):
-            ours, theirs = getattr(a.eyes[eye], field.name), getattr(b.eyes[eye], field.name)
-            assert np.array_equal(ours, theirs), f"{eye}.{field.name}"
+def assert_equal(a: Any, b: Any, atol: float = 0.0, name: str = "rig") -> None:
+    """Compare two values field by field, with numbers equal within `atol`."""
+    if dataclasses.is_dataclass(a):
+        for field in dataclasses.fields(a):
+            ours, theirs = getattr(a, field.name), getattr(b, field.name)
+            assert_equal(ours, theirs, atol, f"{name}.{field.name}")
+    elif isinstance(a, Mapping):
+        assert isinstance(b, Mapping)
+        assert set(a) == set(b), name
+        for key in a:
+            assert_equal(a[key], b[key], atol, f"{name}.{key}")
+    elif isinstance(a, np.ndarray):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=atol, err_msg=name)
+    else:
+        assert a == b, name
 
 
 @given(RIGS)
@@ -97,7 +149,7 @@ def path(tmp_path: Path) -> Path:
 
 def test_opencv_itself_reads_the_file(path: Path) -> None:
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    K = storage.getNode("right").getNode("K").mat()
+    K = storage.getNode("right").getNode("model").getNode("K").mat()
     storage.release()
     assert np.array_equal(K, example_rig().eyes["right"].K)
 
@@ -106,18 +158,32 @@ def test_opencv_itself_reads_the_file(path: Path) -> None:
     ("old", "new", "problem"),
     [
         ("%YAML", "#", "not a YAML file as OpenCV and handcal write it"),
-        ("handcal_rig: 2", "handcal_rig: 3", "rig version 3 is unknown; versions 1 to 2"),
-        ("handcal_rig: 2", "other: 2", "handcal_rig must be a whole number"),
+        ("handcal_rig: 3", "handcal_rig: 4", "rig version 4 is unknown; versions 1 to 3"),
+        ("handcal_rig: 3", "other: 3", "handcal_rig must be a whole number"),
         ("name: ", "label: ", "name must be a text"),
         ("left:", "links:", "left must be a map"),
-        ("   H0:", "   H1:", r"left\.H0 must be a 3×3 opencv-matrix of type d"),
-        ("rows: 3", "rows: 2", r"left\.K must be a 3×3"),
-        ("rows: 3", "rows: 1000000000", r"left\.K must be a 3×3"),
-        ("dt: d", "dt: f", r"left\.K must be a 3×3 opencv-matrix of type d"),
-        ("2456.,", "", r"left\.K must be a 3×3"),
+        ("      H0:", "      H1:", r"left\.model\.H0 must be a 3×3 opencv-matrix of type d"),
+        ("rows: 3", "rows: 2", r"left\.model\.K must be a 3×3"),
+        ("rows: 4", "rows: 3", r"left\.T_V_H must be a 4×4"),
+        ("rows: 3", "rows: 1000000000", r"left\.model\.K must be a 3×3"),
+        ("dt: d", "dt: f", r"left\.T_V_H must be a 4×4 opencv-matrix of type d"),
+        ("2456.,", "", r"left\.model\.K must be a 3×3"),
         ("2456.,", "-2456.,", r"left\.K .* positive focal lengths"),
         ("2456.,", ".nan,", r"left\.K .* finite"),
-        ("z_C0_S_m: 2.", "z_C0_S_m: two", r"left\.z_C0_S_m must be a number"),
+        ("z_C0_S_m: 2.", "z_C0_S_m: two", r"left\.model\.z_C0_S_m must be a number"),
+        ("   model:", "   modell:", r"left\.model must be a map"),
+        ('"homography"', "1", r"left\.model\.name must be a text"),
+        (
+            '"homography"',
+            '"spline"',
+            "the display model 'spline' is not known, only 'homography': ",
+        ),
+        ('   model: ""', "   model: 1", r"depth_camera\.model must be a text"),
+        (
+            'serial_number: ""',
+            'serial_number: "1\\t2"',
+            r"depth_camera\.serial_number must be one l",
+        ),
         ("width_px: 1268", "width_px: 1268.5", r"left\.width_px must be a whole number"),
         ("width_px: 1280", "width_px: 0", "depth_camera: width_px"),
         ("distortion: []", "distortion: [ 0.1 ]", r"depth_camera\.distortion must hold"),
@@ -162,7 +228,7 @@ def test_damaged_bytes_give_a_plausible_rig_or_a_file_error(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     path = tmp_path_factory.mktemp("rig") / "rig.yaml"
-    write_rig(path, example_rig())
+    write_rig(path, data.draw(st.sampled_from([example_rig(), FULL])))
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 3))):
         start = data.draw(st.integers(0, len(content)))
@@ -173,14 +239,145 @@ def test_damaged_bytes_give_a_plausible_rig_or_a_file_error(
         check_rig(read_rig(path))
 
 
-def test_a_rig_of_version_1_is_read_and_written_as_version_2(path: Path, tmp_path: Path) -> None:
-    path.write_text(path.read_text().replace("handcal_rig: 2", "handcal_rig: 1"))
-    rig = read_rig(path)
-    assert_equal(rig, example_rig())
-    assert rig.origins == {}
+@pytest.mark.parametrize(("version", "parts"), [(1, set()), (2, set(RIG_PARTS))])
+def test_an_older_version_is_read_and_written_as_the_newest(
+    tmp_path: Path, version: int, parts: set[str]
+) -> None:
+    old = DATA / f"rig-v{version}.yaml"
+    assert f"handcal_rig: {version}\n" in old.read_text()
+    rig = read_rig(old)
+    assert (rig.depth_camera, rig.headset, rig.depth_check) == (CameraIdentity(), None, None)
+    assert set(rig.origins) == parts
+    if version == 1:
+        assert_equal(rig, example_rig(), atol=1e-15)
     write_rig(tmp_path / "new.yaml", rig)
-    assert "handcal_rig: 2\n" in (tmp_path / "new.yaml").read_text()
+    assert "handcal_rig: 3\n" in (tmp_path / "new.yaml").read_text()
     assert_equal(read_rig(tmp_path / "new.yaml"), rig)
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_unknown_fields_of_a_known_version_are_ignored(path: Path, version: int) -> None:
+    old = DATA / f"rig-v{version}.yaml" if version < 3 else path
+    text = old.read_text()
+    extra = "more:\n   K: 1\n   list: [ 1, two ]\n"
+    if version < 3:  # fields of version 3 are unknown to versions before it
+        extra += "headset: 1\ndepth_check: 1\n"
+    path.write_text(text + extra)
+    rig = read_rig(path)
+    path.write_text(text)
+    assert_equal(rig, read_rig(path))
+
+
+CHECK = DepthCheck(
+    made="2026-11-23T01:00:00+00:00",
+    views=12,
+    scale=1.002,
+    offset_m=-0.001,
+    covariance=np.array([[1e-6, -4e-7], [-4e-7, 2e-7]]),
+    ranges_m=np.array([[0.3, 0.5], [0.5, 0.8]]),
+    flatness_m=np.array([0.0011, 0.0023]),
+    flatness_sigma_m=np.array([0.0001, 0.0003]),
+)
+HEADSET = HeadsetIdentity(
+    "0a1b2c",
+    name="Ward 3",
+    runtime="Unity OpenXR 1.10",
+    app="handcal 2",
+    protocol=2,
+    views={"left": HeadsetView(np.eye(4), np.array([-0.5, 0.4, -0.3, 0.3]), 1268, 720)},
+    eye_distance_m=0.0631,
+)
+FULL = dataclasses.replace(
+    example_rig(),
+    depth_camera=CameraIdentity("Intel RealSense D415", "817512071792", "5.16.0.1"),
+    headset=HEADSET,
+    depth_check=CHECK,
+    origins={
+        part: Origin("grid", "today", 3, 0.2, "good", "so it is", ("x_m",), np.eye(1))
+        for part in RIG_PARTS
+    },
+)
+
+
+def test_a_rig_of_which_everything_is_known_comes_back_exactly(path: Path) -> None:
+    write_rig(path, FULL)
+    assert_equal(read_rig(path), FULL)
+    views = dict.fromkeys(EYES, HEADSET.views["left"])
+    headset = dataclasses.replace(HEADSET, views=views, eye_distance_m=None, name="", app="")
+    twenty = np.arange(40).reshape(20, 2) / 40
+    check = dataclasses.replace(
+        CHECK, ranges_m=twenty, flatness_m=np.zeros(20), flatness_sigma_m=np.ones(20) / 7
+    )
+    largest = dataclasses.replace(FULL, headset=headset, depth_check=check)
+    write_rig(path, largest)
+    assert path.stat().st_size < 0.75 * MAX_RIG_BYTES
+    assert_equal(read_rig(path), largest)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('"817512071792"', "817512071792", r"depth_camera\.serial_number must be a text"),
+        ('"0a1b2c"', '"0a1b2g"', r"headset\.device_id must be 1 to 128 hexadecimal digits"),
+        ('"0a1b2c"', '""', r"headset\.device_id must be 1 to 128"),
+        ("device_id", "device", r"headset\.device_id must be a text"),
+        ("protocol: 2", "protocol: -2", r"headset\.protocol must lie between 0 and 65535"),
+        ("eye_distance_m: 0.06", "eye_distance_m: 0.6", r"headset\.eye_distance_m must lie"),
+        ("-0.5, 0.4", "0.5, 0.4", r"headset\.left\.tangents must be left, right, up and down"),
+        ("-0.5, 0.4", "-.inf, 0.4", r"headset\.left\.tangents must be left, right, up and down"),
+        ("tangents", "tangent", r"headset\.left\.tangents must be a 4×1"),
+        ("scale: 1.002", "scale: 0.1", r"depth_check\.scale must lie"),
+        ("scale: 1.002", "scale: .nan", r"depth_check\.scale must lie"),
+        ("offset_m: -0.001", "offset_m: -10", r"depth_check\.offset_m must lie"),
+        ("views: 12", "views: 0", r"depth_check\.views must be above 0"),
+        (
+            "rows: 2\n      cols: 4",
+            "rows: 200\n      cols: 4",
+            r"depth_check\.flatness must be a N×4",
+        ),
+        (
+            "rows: 2\n      cols: 4",
+            "rows: 0\n      cols: 4",
+            r"depth_check\.flatness must be a N×4",
+        ),
+        ("rows: 2\n      cols: 4", "rows: 1.5\n      cols: 4", r"flatness must be a N×4"),
+        ("flatness:", "flat:", r"depth_check\.flatness must be a N×4"),
+    ],
+)
+def test_a_bad_field_of_what_may_be_known_is_named(
+    path: Path, old: str, new: str, problem: str
+) -> None:
+    write_rig(path, FULL)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(FileError, match=problem):
+        read_rig(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"ranges_m": CHECK.ranges_m[::-1]}, "1 to 20 ranges of depth, ascending"),
+        ({"ranges_m": -CHECK.ranges_m[::-1, ::-1]}, "1 to 20 ranges of depth, ascending"),
+        ({"flatness_m": np.array([0.001, -0.001])}, "flatness must be at least 0 and below 1"),
+        ({"flatness_sigma_m": np.array([0.001, np.nan])}, "and so its σ"),
+        ({"covariance": np.array([[1.0, 0.0], [0.5, 1.0]])}, "must be finite and symmetric"),
+        ({"made": ""}, r"depth_check\.made must be one line"),
+    ],
+)
+def test_an_implausible_depth_check_is_not_written(
+    path: Path, changes: dict[str, object], problem: str
+) -> None:
+    check = dataclasses.replace(CHECK, **changes)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=problem):
+        write_rig(path, dataclasses.replace(example_rig(), depth_check=check))
+
+
+def test_the_bias_of_depth_is_told_with_its_uncertainty() -> None:
+    bias_m, sigma_m = CHECK.bias_m(0.5)
+    assert bias_m == pytest.approx(0.002 * 0.5 - 0.001)
+    assert sigma_m == pytest.approx(np.sqrt(0.25 * 1e-6 - 2 * 0.5 * 4e-7 + 2e-7))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from handcal.geometry import invert, rigid
 from handcal.rig.board import Board, BoardView
 from handcal.rig.stereo import StereoCalibration, calibrate_stereo
-from handcal.rig.views import View, ViewsError, drop, pair_views, read_views, view
+from handcal.rig.views import BoardImage, ViewsError, board_image, drop, pair_views, read_views
 from handcal.sim.boards import BoardPainter, board_poses, board_view
 from handcal.types import Float64, Intrinsics
 
@@ -18,7 +18,7 @@ CHECKERBOARD = Board(kind="checkerboard", squares=(10, 7))
 DEPTH = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (0.12, -0.25, 0.0006, -0.0004, 0.1))
 HEADSET = Intrinsics(640, 360, 480.0, 481.0, 315.0, 184.0, (-0.09, 0.05, -0.0005, 0.0007, -0.01))
 T_H_D = rigid([np.radians(-15.0), 0.01, 0.0], [-0.0175, -0.030, 0.015])
-Pairs = tuple[tuple[View, View], ...]
+Pairs = tuple[tuple[BoardImage, BoardImage], ...]
 
 
 def _poses(count: int, seed: int, second: Intrinsics = HEADSET) -> list[Float64]:
@@ -32,8 +32,8 @@ def _pairs(
     rng = np.random.default_rng(seed)
     return tuple(
         (
-            View(f"d{number}", board_view(BOARD, T_D_B, DEPTH, rng, noise_px)),
-            View(f"h{number}", board_view(BOARD, T_H_D @ T_D_B, second, rng, noise_px)),
+            BoardImage(f"d{number}", board_view(BOARD, T_D_B, DEPTH, rng, noise_px)),
+            BoardImage(f"h{number}", board_view(BOARD, T_H_D @ T_D_B, second, rng, noise_px)),
         )
         for number, T_D_B in enumerate(_poses(count, seed, second))
     )
@@ -47,12 +47,12 @@ def _errors(result: StereoCalibration) -> tuple[float, float]:
     return float(np.degrees(angle)), 1e3 * float(shift_m)
 
 
-def _mirror(one: View) -> View:
+def _mirror(one: BoardImage) -> BoardImage:
     """Return what the detector finds of a checkerboard in a mirrored image."""
     seen = one.found
     assert seen is not None
     grid = seen.pixels.reshape(6, 9, 2)[::-1].reshape(-1, 2) * [-1, 1] + [seen.size[0] - 1, 0]
-    return View(one.name, dataclasses.replace(seen, pixels=grid))
+    return BoardImage(one.name, dataclasses.replace(seen, pixels=grid))
 
 
 def test_without_noise_the_pose_comes_back() -> None:
@@ -88,7 +88,7 @@ def test_images_give_the_pose_to_a_twentieth_of_a_degree_and_three_tenths_of_a_m
             painter.paint(T @ T_D_B, rng)
             for painter, T in zip(painters, (np.eye(4), T_H_D), strict=True)
         )
-        first, second = (view(f"{number}", image, BOARD) for image in images)
+        first, second = (board_image(f"{number}", image, BOARD) for image in images)
         pairs.append((first, second))
     angle_deg, shift_mm = _errors(calibrate_stereo(pairs))
     assert angle_deg < 0.05
@@ -102,13 +102,13 @@ def test_corners_that_only_one_camera_sees_are_left_out() -> None:
     assert _errors(calibrate_stereo(pairs, DEPTH, HEADSET))[0] < 0.05
 
 
-def _only(one: View, which: slice) -> View:
+def _only(one: BoardImage, which: slice) -> BoardImage:
     seen = one.found
     assert isinstance(seen, BoardView)
     part = BoardView(
         seen.points_m[which], seen.pixels[which], seen.size, seen.ids[which], seen.blur_px
     )
-    return View(one.name, part)
+    return BoardImage(one.name, part)
 
 
 def test_swapped_cameras_are_named() -> None:
@@ -170,8 +170,8 @@ def test_too_few_pairs_and_one_angle() -> None:
         T_D_B = rigid(None, [*rng.uniform([-0.15, -0.05], [-0.1, 0.0]), 0.6])
         level.append(
             (
-                View(f"d{number}", board_view(BOARD, T_D_B, DEPTH, rng, 0.1)),
-                View(f"h{number}", board_view(BOARD, T_H_D @ T_D_B, HEADSET, rng, 0.1)),
+                BoardImage(f"d{number}", board_view(BOARD, T_D_B, DEPTH, rng, 0.1)),
+                BoardImage(f"h{number}", board_view(BOARD, T_H_D @ T_D_B, HEADSET, rng, 0.1)),
             )
         )
     verdict = calibrate_stereo(level, DEPTH, HEADSET).verdict
@@ -193,7 +193,7 @@ def test_photographs_fit_better_than_by_plain_opencv(shared_data: Path) -> None:
     assert np.linalg.norm(result.T_H_D[:3, 3]) == pytest.approx(0.0832, abs=5e-4)
     assert "left08.jpg" in result.worst.name
     mirrored = tuple(
-        view(file.name, np.ascontiguousarray(_gray(file)[:, ::-1]), CHECKERBOARD)
+        board_image(file.name, np.ascontiguousarray(_gray(file)[:, ::-1]), CHECKERBOARD)
         for file in sorted(folder.glob("right*.jpg"))
     )
     with pytest.raises(ViewsError, match="mirrored"):

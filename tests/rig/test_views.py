@@ -10,7 +10,7 @@ from handcal.progress import Progress
 from handcal.rig.board import Board, BoardView
 from handcal.rig.board_print import draw_board
 from handcal.rig.views import (
-    View,
+    BoardImage,
     ViewsError,
     coverage,
     drop,
@@ -59,7 +59,7 @@ def test_files_must_be_there_and_told_apart(tmp_path: Path) -> None:
 
 
 def test_a_dropped_view_is_not_used_and_may_come_back() -> None:
-    views = tuple(View(name, _found()) for name in "abc")
+    views = tuple(BoardImage(name, _found()) for name in "abc")
     fewer = drop(views, ["b"])
     assert list(used(fewer, 2)) == ["a", "c"]
     assert list(used(drop(fewer, []), 3)) == ["a", "b", "c"]
@@ -68,7 +68,11 @@ def test_a_dropped_view_is_not_used_and_may_come_back() -> None:
 
 
 def test_too_few_views_say_what_was_wrong_with_the_others() -> None:
-    views = [View("a", _found()), View("b", None, "too dark"), View("c", None, "too dark")]
+    views = [
+        BoardImage("a", _found()),
+        BoardImage("b", None, "too dark"),
+        BoardImage("c", None, "too dark"),
+    ]
     with pytest.raises(ViewsError, match=r"1 of 3 images used, at least 2 .* mostly: too dark"):
         used(views, 2)
 
@@ -91,8 +95,8 @@ def test_coverage_counts_the_views_with_a_corner_in_each_cell() -> None:
 
 
 def test_pairs_end_in_the_same_number() -> None:
-    left = [View(f"left{number:02}.jpg", None) for number in (1, 2, 4)]
-    right = [View(f"2nd_right_{number}.png", None) for number in (4, 2, 3)]
+    left = [BoardImage(f"left{number:02}.jpg", None) for number in (1, 2, 4)]
+    right = [BoardImage(f"2nd_right_{number}.png", None) for number in (4, 2, 3)]
     pairs = pair_views(left, right)
     assert [(a.name, b.name) for a, b in pairs] == [
         ("left02.jpg", "2nd_right_2.png"),
@@ -101,10 +105,10 @@ def test_pairs_end_in_the_same_number() -> None:
     with pytest.raises(ViewsError, match="no two images belong together"):
         pair_views(left[:1], right)
     with pytest.raises(ViewsError, match="end in the same number"):
-        pair_views([View("a1", None), View("b1", None)], right)
+        pair_views([BoardImage("a1", None), BoardImage("b1", None)], right)
 
 
 def test_a_pair_is_left_out_if_one_of_its_views_is() -> None:
-    left = drop([View(f"left{number}.png", None) for number in (1, 2)], ["left1.png"])
-    pairs = pair_views(left, [View(f"right{number}.png", None) for number in (1, 2)])
+    left = drop([BoardImage(f"left{number}.png", None) for number in (1, 2)], ["left1.png"])
+    pairs = pair_views(left, [BoardImage(f"right{number}.png", None) for number in (1, 2)])
     assert [(a.dropped, b.dropped) for a, b in pairs] == [(True, True), (False, False)]

@@ -6,7 +6,7 @@ import pytest
 from handcal.display import eye_projection
 from handcal.geometry import image_points, project, rigid, transform
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
-from handcal.rig.cube import Cube, corners_m, find_cube
+from handcal.rig.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter, draw_cube
@@ -49,7 +49,7 @@ def rendered(real: dict[int, Float64], shift_m: Float64) -> CubeMisalignment:
 
 def predicted(shift_m: Float64, markers: list[int]) -> CubeMisalignment:
     """Return the same by geometry alone."""
-    points_m = transform(T_E_T, corners_m(CUBE, markers))
+    points_m = transform(T_E_T, marker_corners_m(CUBE, markers))
     drawn_px = project(eye_projection(DISPLAY, shift_m), points_m)
     homogeneous = np.column_stack([drawn_px, np.ones(len(drawn_px))])
     rays = np.linalg.solve(eye_projection(DISPLAY, TRUE_M)[:, :3], homogeneous.T).T

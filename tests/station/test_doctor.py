@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,8 +15,11 @@ from handcal.camera.sdk_devices import Device
 from handcal.camera.usb import explain_absence
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.link.pairing import KEY_VARIABLE
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import write_rig
 from handcal.station import doctor
 from handcal.station.doctor import Finding, Health, examine
+from handcal.types import CameraIdentity
 
 
 def fail_with(error: Exception) -> object:
@@ -31,8 +35,8 @@ def quick_detector(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "load_detector", lambda: SimpleNamespace(model=Path("some.onnx")))
 
 
-def of(what: str) -> Finding:
-    findings = [finding for finding in examine() if finding.what == what]
+def of(what: str, rig: Path | None = None) -> Finding:
+    findings = [finding for finding in examine(rig) if finding.what == what]
     assert len(findings) == 1
     assert bool(findings[0].advice) is (findings[0].health is not Health.GOOD)
     return findings[0]
@@ -117,6 +121,22 @@ def test_the_camera(
     monkeypatch.setattr(doctor, "explain_absence", lambda: explain_absence(Path("nowhere")))
     assert found in of("Camera").found
     assert of("Camera").health is health
+
+
+def test_another_camera_than_the_rig_s_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    d415, path = Device("D415", "123", "5.16", "3.2"), tmp_path / "rig.yaml"
+    monkeypatch.setattr(doctor, "connected_devices", lambda: [d415])
+    write_rig(path, replace(example_rig(), depth_camera=d415.identity))
+    assert of("Camera", path).health is Health.GOOD
+    write_rig(path, replace(example_rig(), depth_camera=CameraIdentity("D435", "456")))
+    assert of("Camera", path).health is Health.LIMITED
+    assert "another model: D415, not D435; another serial number" in of("Camera", path).found
+    assert of("Rig file", path).health is Health.GOOD
+    path.write_text("")
+    assert of("Rig file", path).health is Health.BROKEN
+    assert of("Camera", path).health is Health.GOOD
 
 
 def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:

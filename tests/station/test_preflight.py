@@ -21,11 +21,13 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.errors import LinkError
 from handcal.io.resources import resource_path
 from handcal.link.pairing import new_pairing_key
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import write_rig
 from handcal.station import preflight
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part, check_station, is_ready
 from handcal.station.settings import StationSettings
-from handcal.types import Frame, Intrinsics
+from handcal.types import CameraIdentity, Frame, Intrinsics
 
 KEY = new_pairing_key()
 D415 = Device("Intel RealSense D415", "123", "5.16", "3.2")
@@ -135,6 +137,30 @@ def test_a_recorded_folder_needs_no_sdk(
     assert finding.health is Health.GOOD
     once = replace(played, recording=str(tmp_path / "hand"), playback=PlaybackSettings())
     assert find("camera", once).found == "Recording hand, played once"
+
+
+def test_another_camera_than_the_rig_s_is_told(
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = replace(example_rig(), depth_camera=D415.identity)
+    write_rig(tmp_path / "rig.yaml", rig)
+    monkeypatch.setattr(preflight, "connected_devices", lambda: [D415])
+    live = replace(settings, source="realsense", headset="network", rig=str(tmp_path / "rig.yaml"))
+    assert find("camera", live).health is Health.GOOD
+    write_rig(tmp_path / "rig.yaml", replace(rig, depth_camera=CameraIdentity("", "456")))
+    assert find("camera", live).health is Health.LIMITED
+    assert "another serial number: 123, not 456" in find("camera", live).found
+    assert find("camera", replace(live, rig="")).health is Health.GOOD
+    (tmp_path / "rig.yaml").write_text("")
+    assert find("camera", live).health is Health.GOOD  # the rig's own finding names it
+    assert find("rig", live).health is Health.BROKEN
+
+    lens = replace(rig.depth_intrinsics, fx=0.96 * rig.depth_intrinsics.fx)
+    depth = np.ones((lens.height, lens.width), np.uint16)
+    record_folder(tmp_path / "hand", [Frame(1, 1, 0, depth, 1e-3, lens)], D415.identity)
+    write_rig(tmp_path / "rig.yaml", rig)
+    played = replace(live, source="recording", recording=str(tmp_path / "hand"))
+    assert "the rig: focal length 4.0 % shorter" in find("camera", played).found
 
 
 def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: Path) -> None:

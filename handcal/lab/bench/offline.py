@@ -30,7 +30,7 @@ from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
 from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.viewpoint import viewpoint_from_stereo
-from handcal.rig.views import View, view
+from handcal.rig.views import BoardImage, board_image
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 from handcal.statistics import MeanInterval
@@ -200,12 +200,12 @@ class _Studio:
             camera: BoardPainter(self._board, camera, settings.pictures) for camera in cameras
         }
 
-    def board_views(self, camera: Intrinsics) -> list[View]:
+    def board_views(self, camera: Intrinsics) -> list[BoardImage]:
         """Photograph the board with one camera."""
         poses = board_poses(self._board, camera, self._settings.views, self.rng)
         return [self._photograph(camera, T, number) for number, T in enumerate(poses)]
 
-    def pairs(self, camera: Intrinsics, T_H_camera: Float64) -> list[tuple[View, View]]:
+    def pairs(self, camera: Intrinsics, T_H_camera: Float64) -> list[tuple[BoardImage, BoardImage]]:
         """Photograph the board with one camera and the headset's."""
         headset = self._settings.headset_camera
         poses = board_poses(
@@ -248,5 +248,7 @@ class _Studio:
         back_px = cv2.perspectiveTransform(undistort(pixels, camera)[None], H_S_C)[0]
         return float(np.linalg.norm(back_px - display_px, axis=1).max())
 
-    def _photograph(self, camera: Intrinsics, T_C_B: Float64, number: int) -> View:
-        return view(f"board {number}", self._painters[camera].paint(T_C_B, self.rng), self._board)
+    def _photograph(self, camera: Intrinsics, T_C_B: Float64, number: int) -> BoardImage:
+        return board_image(
+            f"board {number}", self._painters[camera].paint(T_C_B, self.rng), self._board
+        )

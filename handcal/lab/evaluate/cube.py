@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.geometry import camera_matrix, transform
-from handcal.rig.cube import MIN_FACES, Cube, CubeError, corners_m, cube_pose
+from handcal.rig.cube import MIN_FACES, Cube, CubeError, cube_pose, marker_corners_m
 from handcal.types import Float64, Intrinsics, freeze
 
 
@@ -72,7 +72,7 @@ def compare_cubes(
     real_px, virtual_px = ({i: px[i] for i in shared} for px in (real_px, virtual_px))
     T_real, T_virtual = (cube_pose(px, cube, camera) for px in (real_px, virtual_px))
     real, virtual = (_plane(px, camera) for px in (real_px, virtual_px))
-    depths_m = transform(T_real, corners_m(cube, shared))[:, 2:]
+    depths_m = transform(T_real, marker_corners_m(cube, shared))[:, 2:]
     turn = Rotation.from_matrix(T_virtual[:3, :3] @ T_real[:3, :3].T)
     return CubeMisalignment(
         faces=len(shared),

@@ -21,7 +21,7 @@ from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import DisplayEntries, Distance
-from handcal_gui.windows.rig.solve import Solved, solve_display
+from handcal_gui.windows.rig.solve import SolvedPart, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
 
 _DISTANCES: dict[Distance, str] = {
@@ -162,7 +162,7 @@ class DisplayPage(StepPage):
         """Show the rig's present calibration of this display."""
         self.box.show_origin(self.project.rig.origins.get(self._eye))
 
-    def _show_solved(self, solved: tuple[Solved, Solved]) -> None:
+    def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
         display, place = solved
         self.box.show_solved(display, self.project.take_part(display))
         self._grid.show_solved(display)

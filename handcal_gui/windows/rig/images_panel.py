@@ -20,7 +20,7 @@ from handcal_gui.windows.rig.coverage_map import CoverageMap
 from handcal_gui.windows.rig.shot_list import ShotList
 from handcal_gui.windows.rig.shot_view import ShotView
 from handcal_gui.windows.rig.shots import Shot, look
-from handcal_gui.windows.rig.solve import Solved
+from handcal_gui.windows.rig.solve import SolvedPart
 
 
 class ImagesPanel(QWidget):
@@ -101,7 +101,7 @@ class ImagesPanel(QWidget):
         """Make the next `look` read the folders again."""
         self._question = None
 
-    def show_solved(self, solved: Solved) -> None:
+    def show_solved(self, solved: SolvedPart) -> None:
         """Show the residual of each image."""
         worst = (solved.worst.name, solved.worst.why) if solved.worst else ("", "")
         self._list.show_results(solved.residuals_px, solved.tilts_rad, worst)

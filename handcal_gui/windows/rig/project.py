@@ -15,7 +15,7 @@ from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
 from handcal_gui.windows.rig.project_folder import ProjectFolder
-from handcal_gui.windows.rig.solve import Solved
+from handcal_gui.windows.rig.solve import SolvedPart
 
 _SETTLE_MS = 500
 
@@ -90,7 +90,7 @@ class RigProject(QObject):
         """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""
         self.take_rig(read_rig(path))
 
-    def take_part(self, solved: Solved) -> str:
+    def take_part(self, solved: SolvedPart) -> str:
         """Add a calibrated part to the rig; return the outcome as a message."""
         if solved.put is None:
             return "it was not added to the rig"

@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from handcal.rig.board import BoardView
-from handcal.rig.views import View
+from handcal.rig.views import BoardImage
 from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX, colors
@@ -80,7 +80,7 @@ def _read(files: tuple[Path, ...]) -> tuple[UInt8, ...]:
     return tuple(read_color(file) for file in files)
 
 
-def _what(view: View) -> str:
+def _what(view: BoardImage) -> str:
     if view.found is None:
         return view.problem
     blur_px = view.found.blur_px

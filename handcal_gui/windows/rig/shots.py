@@ -13,7 +13,7 @@ from handcal.errors import FileError
 from handcal.io.images import read_image
 from handcal.progress import Progress
 from handcal.rig.board import Board
-from handcal.rig.views import View, image_files, pair_views, read_views
+from handcal.rig.views import BoardImage, image_files, pair_views, read_views
 from handcal.types import UInt8
 
 _SMALL_PX = 96
@@ -24,7 +24,7 @@ _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
 class Shot:
     """One image, or the two of a pair taken at the same time."""
 
-    views: tuple[View, ...]
+    views: tuple[BoardImage, ...]
     """One for each camera."""
     files: tuple[Path, ...]
     small: UInt8 | None
@@ -71,7 +71,7 @@ def look(
     return tuple(shots)
 
 
-def without(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[View, ...]]:
+def without(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[BoardImage, ...]]:
     """Return the views; those of the named shots are marked as excluded."""
     return [
         tuple(replace(view, dropped=shot.name in names) for view in shot.views) for shot in shots

@@ -16,12 +16,13 @@ from handcal.rig.steps import (
     calibrate_depth_camera,
     calibrate_eye_display,
     calibrate_viewpoint,
+    identity_in,
     intrinsics_in,
     pose_in,
 )
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import board_pose
-from handcal.rig.views import View, WorstView
+from handcal.rig.views import BoardImage, WorstView
 from handcal.types import Eye, Intrinsics, Rig
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (
@@ -35,7 +36,7 @@ from handcal_gui.windows.rig.shots import Shot, without
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class SolvedPart:
     """The result of a step."""
 
     verdict: CalibrationVerdict
@@ -49,7 +50,7 @@ class Solved:
     """Returns a rig with this part added; None if it is bad or not part of a rig."""
 
 
-def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
+def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
     """Solve the pose of the depth camera, like ``handcal rig stereo`` and ``make``."""
     pairs = [(first, second) for first, second in without(shots, entries.dropped)]
     result = calibrate_depth_camera(
@@ -63,8 +64,9 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
         stereo=result,
         depth_intrinsics=intrinsics_in(entered_path(entries.imager_intrinsics)),
         T_C_D=pose_in(entered_path(entries.depth_to_color)),
+        depth_camera=identity_in(entered_path(entries.imager_intrinsics)),
     )
-    return Solved(
+    return SolvedPart(
         result.verdict,
         stereo_rows(result),
         result.residuals_px,
@@ -74,13 +76,13 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> Solved:
     )
 
 
-def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Path) -> Solved:
+def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Path) -> SolvedPart:
     """Solve the viewpoint camera's intrinsics, and write them to a file unless bad."""
     views = [view for (view,) in without(shots, entries.dropped)]
     result = calibrate_camera(views, CameraSettings(lens=entries.lens))
     if result.verdict.name != "bad":
         write_json(output, camera_json(result))
-    return Solved(
+    return SolvedPart(
         result.verdict,
         camera_rows(result),
         result.residuals_px,
@@ -96,7 +98,7 @@ def solve_display(
     eye: Eye,
     rig: Rig,
     camera_file: Path,
-) -> tuple[Solved, Solved]:
+) -> tuple[SolvedPart, SolvedPart]:
     """Calibrate an eye's display; return its result and the viewpoint camera's pose."""
     if not camera_file.exists():
         raise HandcalError("the viewpoint camera's intrinsics are missing: solve its step first")
@@ -104,11 +106,11 @@ def solve_display(
     stereo, tracked = entered_path(entries.stereo), entered_path(entries.tracked)
     boards = [] if stereo else [view for (view,) in without(board_shots, entries.dropped_board)]
     pose = calibrate_viewpoint(boards, camera, stereo, tracked)
-    of_pose = Solved(pose.verdict, (), pose.residuals_px, _tilts(boards, camera))
+    of_pose = SolvedPart(pose.verdict, (), pose.residuals_px, _tilts(boards, camera))
     grids = [view for (view,) in without(grid_shots, entries.dropped_grid)]
     result = calibrate_eye_display(rig, eye, grids, camera, pose, entries.inputs)
     put = partial(with_display, eye=eye, calibration=result)
-    solved = Solved(
+    solved = SolvedPart(
         result.verdict,
         display_rows(result),
         result.homography.residuals_px,
@@ -117,6 +119,6 @@ def solve_display(
     return solved, of_pose
 
 
-def _tilts(views: Sequence[View], camera: Intrinsics) -> dict[str, float]:
+def _tilts(views: Sequence[BoardImage], camera: Intrinsics) -> dict[str, float]:
     found = {view.name: view.found for view in views if view.found}
     return {name: tilt(board_pose(seen, camera), seen) for name, seen in found.items()}

@@ -17,7 +17,7 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.rows import COLUMNS
-from handcal_gui.windows.rig.solve import Solved
+from handcal_gui.windows.rig.solve import SolvedPart
 
 HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
 
@@ -69,7 +69,7 @@ class SolveBox(QWidget):
         """Show a message about the result."""
         self._verdict.show_finding(finding)
 
-    def show_solved(self, solved: Solved, kept: str) -> None:
+    def show_solved(self, solved: SolvedPart, kept: str) -> None:
         """Show a result; `kept` describes its use."""
         verdict = solved.verdict
         text = f"{verdict.name}: {verdict.reason}"

@@ -13,7 +13,7 @@ from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import intrinsics_field, lens_field
 from handcal_gui.windows.rig.project import RigProject
-from handcal_gui.windows.rig.solve import Solved, solve_stereo
+from handcal_gui.windows.rig.solve import SolvedPart, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage
 
 _HINT = (
@@ -78,7 +78,7 @@ class StereoPage(StepPage):
         """Show the rig's present pose of the depth camera."""
         self.box.show_origin(self.project.rig.origins.get("T_H_D"))
 
-    def _show_solved(self, solved: Solved) -> None:
+    def _show_solved(self, solved: SolvedPart) -> None:
         self.box.show_solved(solved, self.project.take_part(solved))
         self.panel.show_solved(solved)
 

@@ -15,7 +15,7 @@ from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings, ViewSelector
-from handcal.rig.views import View, view
+from handcal.rig.views import BoardImage, board_image
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
@@ -64,7 +64,7 @@ class TakeDialog(QDialog):
         self._cameras = LiveCameras(
             tuple(folders),
             realsense,
-            lambda title, frame: keep_imager(folders[title], frame),
+            lambda title, frame, identity: keep_imager(folders[title], frame, identity),
             open_source,
         )
         self._found = FindingLine("taken")
@@ -114,7 +114,9 @@ class TakeDialog(QDialog):
 
         def work(_progress: Progress) -> object:
             names = keep_images(images, tuple(self._folders.values()))
-            return [view(name, one, self._board) for name, one in zip(names, images, strict=True)]
+            return [
+                board_image(name, one, self._board) for name, one in zip(names, images, strict=True)
+            ]
 
         self._bar.run("Looking for the board", work, self._show_taken)
 
@@ -164,7 +166,7 @@ class TakeDialog(QDialog):
         self._cameras.stop()
         self._found.show_finding(Finding("", Health.BROKEN, why))
 
-    def _show_taken(self, views: list[View]) -> None:
+    def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
         if problem:
             found = Finding("", Health.LIMITED, problem, "take another")

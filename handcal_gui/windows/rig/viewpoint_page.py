@@ -13,7 +13,7 @@ from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import lens_field
 from handcal_gui.windows.rig.project import RigProject
-from handcal_gui.windows.rig.solve import Solved, solve_viewpoint
+from handcal_gui.windows.rig.solve import SolvedPart, solve_viewpoint
 from handcal_gui.windows.rig.step_page import StepPage
 
 _HINT = (
@@ -67,7 +67,7 @@ class ViewpointPage(StepPage):
         if file.exists():
             self.box.show_finding(Finding("", Health.GOOD, f"the intrinsics are in {file}"))
 
-    def _show_solved(self, solved: Solved) -> None:
+    def _show_solved(self, solved: SolvedPart) -> None:
         is_bad = solved.verdict.name == "bad"
         kept = "it is not used" if is_bad else "the displays will be calibrated with it"
         self.project.camera_solved()

@@ -44,7 +44,7 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
 """By title: the step's purpose, and the part of the rig that it calibrates."""
 
 
-class Page(Protocol):
+class RigPage(Protocol):
     """Interface of a page of the wizard."""
 
     def enter(self) -> None:
@@ -88,7 +88,7 @@ class RigWizard(QDialog):
         self._title, self._purpose = QLabel(), QLabel()
         self._stack = QStackedWidget()
         result = ResultPage(self.project)
-        self._pages: list[Page] = []
+        self._pages: list[RigPage] = []
         for page in (
             BoardPage(self.project),
             StereoPage(self.project),
@@ -124,7 +124,7 @@ class RigWizard(QDialog):
         return self._rail.currentRow()
 
     @property
-    def page(self) -> Page:
+    def page(self) -> RigPage:
         """The page shown."""
         return self._pages[self.step]
 

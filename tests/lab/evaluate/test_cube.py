@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from handcal.display import eye_projection
 from handcal.geometry import image_points, project, rigid, transform
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
-from handcal.rig.cube import Cube, CubeError, corners_m
+from handcal.rig.cube import Cube, CubeError, marker_corners_m
 from handcal.rig.example import example_rig
 from handcal.types import Float64, Intrinsics
 
@@ -23,14 +23,14 @@ def by_marker(pixels: Float64) -> dict[int, Float64]:
 
 
 def seen(pose: Float64) -> dict[int, Float64]:
-    return by_marker(image_points(transform(pose, corners_m(CUBE, FACES)), CAMERA))
+    return by_marker(image_points(transform(pose, marker_corners_m(CUBE, FACES)), CAMERA))
 
 
 def drawn_and_seen(
     pose: Float64, shift_m: list[float], true_shift_m: list[float]
 ) -> CubeMisalignment:
     """Compare a cube seen by an eye at one φ with the same drawn with another, without images."""
-    points_m = transform(pose, corners_m(CUBE, FACES))
+    points_m = transform(pose, marker_corners_m(CUBE, FACES))
     drawn_px = project(eye_projection(DISPLAY, shift_m), points_m)
     # From the eye's rays through these pixels of the display to the camera in its place.
     homogeneous = np.column_stack([drawn_px, np.ones(len(drawn_px))])
@@ -71,7 +71,7 @@ def test_an_eye_aside_misses_by_what_similar_triangles_say() -> None:
     """Drawn on S at distance z_S, a point at z misses by δ (1 - z / z_S) where the eye is off δ."""
     delta_m = np.array([0.004, -0.003])
     found = drawn_and_seen(POSE, [0.0, 0.0, 0.0], [*delta_m, 0.0])
-    depths_m = transform(POSE, corners_m(CUBE, FACES))[:, 2:]
+    depths_m = transform(POSE, marker_corners_m(CUBE, FACES))[:, 2:]
     expected_m = delta_m * (1.0 - depths_m / DISPLAY.z_C0_S_m)
     np.testing.assert_allclose(found.offset_m, expected_m, atol=2e-5)
     # 3 mm of 4 at half a metre: about 20 arcminutes.

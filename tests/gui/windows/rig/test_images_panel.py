@@ -14,7 +14,7 @@ from handcal.rig.views import WorstView
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.coverage_map import CoverageMap
 from handcal_gui.windows.rig.images_panel import ImagesPanel
-from handcal_gui.windows.rig.solve import Solved
+from handcal_gui.windows.rig.solve import SolvedPart
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_results_stand_beside_the_images(full: ImagesPanel) -> None:
     worst = WorstView("headset camera's of depth-002.png", 0.7, "it is blurred")
     verdict = CalibrationVerdict("good", "as told")
     residuals = {"depth-001.png": 0.25, "depth-002.png": 0.7}
-    full.show_solved(Solved(verdict, (), residuals, {"depth-001.png": 0.5}, worst))
+    full.show_solved(SolvedPart(verdict, (), residuals, {"depth-001.png": 0.5}, worst))
     assert [item(full, 0).text(column) for column in (2, 3)] == ["0.25", "29°"]
     assert item(full, 1).text(0) == "depth-002.png\nWorst: it is blurred"
     assert item(full, 2).text(2) == "–"

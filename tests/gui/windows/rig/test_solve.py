@@ -30,7 +30,7 @@ from handcal.sim.photographs import BOARD
 from handcal_gui.windows.rig.project_folder import DisplayEntries
 from handcal_gui.windows.rig.shots import Shot, look
 from handcal_gui.windows.rig.solve import (
-    Solved,
+    SolvedPart,
     solve_display,
     solve_stereo,
     solve_viewpoint,
@@ -84,7 +84,7 @@ def test_too_few_images_are_told(photographs: Any, tmp_path: Path) -> None:
 
 def solve_left(
     photographs: Any, shots: Any, folder: Path, entries: DisplayEntries | None = None
-) -> tuple[Solved, Solved]:
+) -> tuple[SolvedPart, SolvedPart]:
     camera = folder / "viewpoint.json"
     write_intrinsics(camera, photographs.viewpoint, "json")
     entries = entries or photographs.work.left
