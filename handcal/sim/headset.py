@@ -1,12 +1,15 @@
 """The virtual headset: a process of its own that speaks the real datagrams.
 
 It hosts the simulated wearer, shows what the PC sends, and reports poses and confirmations on its
-own clock, as a real headset does. The true poses go only to the simulated camera, as light.
+own clock, as a real headset does. The true poses go only to the simulated camera, as light. Without
+the wearer it is a device at rest: it prints what a headset would show, and confirms on Enter.
 """
 
 from __future__ import annotations
 
 import signal
+import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -15,16 +18,18 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.display import projection_matrix, view_of_eye
+from handcal import __version__
+from handcal.display import projection_matrix
 from handcal.errors import LinkError
 from handcal.geometry import rigid
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.impair import UNIMPAIRED, Impairment
+from handcal.link.wire import VERSION, hkdf
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
-from handcal.sim.wearer import DisplayView, Wearer, WearerSettings
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings
+from handcal.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +37,7 @@ class HeadsetSettings:
     """Settings of the virtual headset and its connection."""
 
     rig_path: str
-    """The PC's rig, which the headset uses."""
+    """The PC's rig, whose views the headset reports as its runtime's."""
     port: int
     """Address of the PC."""
     scene_port: int | None = None
@@ -57,6 +62,11 @@ class HeadsetSettings:
     """Longest time without a connection."""
     duration_s: float | None = None
     """Time after which to end; None to run until stopped."""
+    device_id: str = ""
+    """The headset's identity, 16 hexadecimal digits; empty to derive it from the pairing key."""
+    name: str = "Virtual headset"
+    has_wearer: bool = True
+    """False: a device at rest, without a simulated wearer."""
 
 
 def run_headset(
@@ -80,7 +90,10 @@ def run_headset(
     """
     rig = read_rig(Path(settings.rig_path))
     worn_rig = read_rig(Path(settings.worn_rig_path or settings.rig_path))
-    wearer = Wearer(settings.seed, worn_rig, make_hand(settings.seed), settings.wearer)
+    hand = make_hand(settings.seed)
+    wearer = (
+        Wearer(settings.seed, worn_rig, hand, settings.wearer) if settings.has_wearer else _Device()
+    )
     rng = np.random.default_rng(settings.seed)
     clock_ns = _clock(settings)
     start_s = heard_s = next_s = time.monotonic()
@@ -90,6 +103,7 @@ def run_headset(
         HeadsetClient(
             (settings.host, settings.port),
             pairing_key,
+            _identity(settings, pairing_key, rig),
             lambda: clock_ns(time.monotonic_ns()),
             impairment=settings.impairment,
         ) as client,
@@ -97,25 +111,63 @@ def run_headset(
     ):
         while not is_stopped() and not client.dismissed and next_s < end_s:
             t_ns = time.monotonic_ns()
-            view = _view(client.state(), rig, t_ns / 1e9 - start_s)
-            action = wearer.step(view)
+            state = client.state()
+            action = wearer.step(_view(state, rig, t_ns / 1e9 - start_s))
             if scene is not None:
                 scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
-            T_W_H = action.T_W_H @ _tracking_error(rng, settings)
-            client.send_pose(T_W_H, clock_ns(t_ns))
+            client.send_pose(action.T_W_H @ _tracking_error(rng, settings), clock_ns(t_ns))
             if action.confirm:
-                T_E_W = {eye: view_of_eye(rig.eyes[eye], T_W_H) for eye in EYES}
-                client.confirm(T_E_W, clock_ns(t_ns), view.cursor_id)
+                client.confirm(clock_ns(t_ns), state)
             now_s = time.monotonic()
             if client.connected:
                 heard_s = now_s
             elif now_s - heard_s > settings.patience_s:
                 raise LinkError(
-                    f"no PC answered at {settings.host}:{settings.port} for "
+                    client.refusal
+                    or f"no PC answered at {settings.host}:{settings.port} for "
                     f"{settings.patience_s:g} s; check that it runs with the same pairing key"
                 )
             next_s = max(next_s + 1.0 / settings.rate_hz, now_s)
             time.sleep(next_s - now_s)
+
+
+class _Device:
+    """Stands in for the wearer of a device at rest, with a person at the keyboard."""
+
+    def __init__(self) -> None:
+        self._told = ""
+        self._presses: list[str] = []
+        threading.Thread(target=lambda: self._presses.extend(sys.stdin), daemon=True).start()
+
+    def step(self, view: DisplayView) -> WearerAction:
+        """Print what is shown when it changes; confirm if Enter has been pressed."""
+        cursor = "no cursor" if view.cursor_W_m is None else f"cursor {view.cursor_id}"
+        told = f"{cursor}; {' and '.join(view.eyes)}; {view.prompt or 'no prompt'}"
+        if told != self._told:
+            self._told = told
+            print(told, flush=True)  # noqa: T201 (the display)
+        is_pressed = bool(self._presses)
+        self._presses.clear()
+        return WearerAction(np.eye(4), np.eye(4), is_pressed and view.cursor_W_m is not None)
+
+
+def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> HeadsetIdentity:
+    return HeadsetIdentity(
+        settings.device_id or hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
+        name=settings.name,
+        runtime="simulator",
+        app=f"handcal {__version__}",
+        protocol=VERSION,
+        views={eye: _runtime_view(rig.eyes[eye]) for eye in EYES},
+    )
+
+
+def _runtime_view(display: EyeDisplay) -> HeadsetView:
+    """Return the view as a runtime would report it: without the display's homography."""
+    (fx, _, cx), (_, fy, cy) = display.K[:2]
+    width, height = display.width_px, display.height_px
+    tangents = [-cx / fx, (width - cx) / fx, -cy / fy, (height - cy) / fy]
+    return HeadsetView(display.T_V_H, np.array(tangents), width, height)
 
 
 def until_terminated() -> Callable[[], bool]:
@@ -139,18 +191,19 @@ def _clock(settings: HeadsetSettings) -> Callable[[int], int]:
 
 
 def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
-    """Return the displays' content; an eye without a new projection shows the rig's."""
+    """Return the displays' content; nothing is drawn before both projections have arrived."""
+    drawn = state.drawn
+    is_ready = len(drawn) == len(EYES)
 
     def rendered(eye: Eye) -> Float64:
-        projection = state.projections.get(eye)
-        return projection_matrix(rig.eyes[eye]) if projection is None else projection.P
+        return drawn[eye].P if is_ready else projection_matrix(rig.eyes[eye])
 
     return DisplayView(
         t_s=t_s,
-        cursor_W_m=state.cursor_W_m,
+        cursor_W_m=state.cursor_W_m if is_ready else None,
         cursor_id=state.cursor_id,
         P={eye: rendered(eye) for eye in EYES},
-        T_V_H={eye: rig.eyes[eye].T_V_H for eye in EYES},
+        T_V_H={eye: drawn[eye].T_V_H if is_ready else rig.eyes[eye].T_V_H for eye in EYES},
         eyes=state.eyes,
         guard_red=state.is_over_limit,
         prompt=state.prompt,

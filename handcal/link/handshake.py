@@ -1,0 +1,172 @@
+"""The PC's side of the handshake. No sockets; time is an argument.
+
+A stranger costs no memory: the first hello is answered with a cookie, a MAC over the sender's
+address under a secret that changes every two minutes (as WireGuard's cookie and QUIC's Retry). Only
+a hello that returns the cookie is passed on. A hello is heard once: its time must be greater than
+that of every earlier one of its device.
+"""
+
+from __future__ import annotations
+
+import hmac
+import math
+import secrets
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from handcal.link import handcal_pb2 as pb
+from handcal.link import messages, wire
+from handcal.link.pairing import Pairing, Pairings, device_number
+from handcal.link.transport import Address
+from handcal.link.wire import Keys, Packet, Rejection
+
+SECRET_LIFE_S = 120.0
+"""Time between two changes of the secret; a cookie is valid for one to two of them."""
+MAX_ANSWERS = 64
+"""Addresses to which one hello is answered with a cookie."""
+_COOKIE_BYTES = 16
+_MAX_DEVICES = 64
+_FOREIGN_KEYS_S = 20.0
+
+_keys = lru_cache(64)(wire.handshake_keys)
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """A device that has proved its key and its address, and asks for a session."""
+
+    pairing: Pairing
+    """The pairing whose key it has; it may belong to another device."""
+    device_id: str
+    name: str
+    nonce: bytes
+    keys: Keys
+    """Of its handshake."""
+
+
+@dataclass(slots=True)
+class _Heard:
+    """Hellos of one device."""
+
+    changed_s: float
+    newest_ns: int = -1
+    """Time of the newest hello."""
+    admitted_ns: int = -1
+    """Time of the newest hello with a valid cookie."""
+    answered: set[Address] = field(default_factory=set)
+    """Addresses to which the newest was answered with a cookie."""
+
+
+class Limiter:
+    """Allows something at most `rate_hz` times a second, one second's worth at once."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._left = rate_hz
+        self._counted_s = -math.inf
+
+    def allows(self, now_s: float) -> bool:
+        """Return whether it is allowed now, and count it."""
+        passed_s = min(1.0, now_s - self._counted_s)
+        self._left = min(self._rate_hz, self._left + self._rate_hz * passed_s)
+        self._counted_s = now_s
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class Reception:
+    """Hears hellos, and admits the devices of a list of pairings."""
+
+    def __init__(self, pairings: Pairings) -> None:
+        self._pairings = pairings
+        self._heard: dict[int, _Heard] = {}
+        self._secrets = (b"", b"")
+        self._changed_s = -math.inf
+        self._foreign = Limiter(_FOREIGN_KEYS_S)
+
+    def hear(
+        self, packet: Packet, datagram: bytes, address: Address, now_s: float
+    ) -> Caller | bytes | Rejection:
+        """Return who calls, or the datagram to answer with, or the reason for no answer.
+
+        Raises
+        ------
+        MalformedError
+            If the datagram is authentic, but no hello.
+        """
+        device = packet.sequence
+        pairing = self._find(device, datagram, now_s)
+        if pairing is None:
+            return Rejection.UNPAIRED
+        keys = _keys(pairing.key.encode(), device)
+        hello = messages.read_hello(messages.parse(packet.payload))
+        heard = self._recall(device, now_s)
+        if self._is_cookie(hello.cookie, device, address, now_s):
+            if hello.time_ns <= heard.admitted_ns:
+                return Rejection.REPLAYED
+            heard.changed_s = now_s
+            heard.admitted_ns = hello.time_ns
+            heard.newest_ns = max(heard.newest_ns, hello.time_ns)
+            return Caller(pairing, f"{device:016x}", hello.name, hello.nonce, keys)
+        if hello.time_ns > heard.newest_ns:
+            heard.changed_s = now_s
+            heard.newest_ns = hello.time_ns
+            heard.answered.clear()
+        elif (
+            hello.time_ns < heard.newest_ns
+            or address in heard.answered
+            or len(heard.answered) >= MAX_ANSWERS
+        ):
+            return Rejection.REPLAYED
+        heard.answered.add(address)
+        retry = messages.retry(hello.nonce, self._cookie(0, device, address, now_s))
+        return seal(keys.to_headset, device, retry)
+
+    def _find(self, device: int, datagram: bytes, now_s: float) -> Pairing | None:
+        """Return the pairing whose key signed a hello: its own, an open one, or another's."""
+
+        def signed(pairing: Pairing) -> bool:
+            # Strangers' identities must not push those of known devices out of the cache.
+            derive = _keys if pairing.device_id else wire.handshake_keys
+            return wire.is_authentic(derive(pairing.key.encode(), device).to_pc, datagram)
+
+        everyone = self._pairings.all
+        own = [one for one in everyone if one.device_id and device_number(one.device_id) == device]
+        unbound = [one for one in everyone if not one.device_id]
+        for pairing in (*own, *unbound):
+            if signed(pairing):
+                return pairing
+        if not own and self._foreign.allows(now_s):
+            return next((one for one in everyone if one not in unbound and signed(one)), None)
+        return None
+
+    def _recall(self, device: int, now_s: float) -> _Heard:
+        heard = self._heard.get(device)
+        # By now every cookie that was valid then has ended, and no old hello can return one.
+        if heard is None or now_s - heard.changed_s > 2 * SECRET_LIFE_S:
+            self._heard.pop(device, None)
+            if len(self._heard) >= _MAX_DEVICES:
+                del self._heard[next(iter(self._heard))]
+            heard = self._heard[device] = _Heard(now_s)
+        return heard
+
+    def _is_cookie(self, cookie: bytes, device: int, address: Address, now_s: float) -> bool:
+        return bool(cookie) and any(
+            hmac.compare_digest(cookie, self._cookie(age, device, address, now_s)) for age in (0, 1)
+        )
+
+    def _cookie(self, age: int, device: int, address: Address, now_s: float) -> bytes:
+        if now_s - self._changed_s > SECRET_LIFE_S:
+            is_next = now_s - self._changed_s < 2 * SECRET_LIFE_S
+            older = self._secrets[0] if is_next else secrets.token_bytes(32)
+            self._secrets = secrets.token_bytes(32), older
+            self._changed_s = now_s
+        who = f"{device:016x} {address[1]} {address[0]}".encode()
+        return hmac.digest(self._secrets[age], who, "sha256")[:_COOKIE_BYTES]
+
+
+def seal(key: bytes, device: int, envelope: pb.Envelope) -> bytes:
+    """Return a datagram of the handshake."""
+    return wire.seal(key, Packet(envelope.SerializeToString(), sequence=device))
