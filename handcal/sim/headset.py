@@ -14,11 +14,11 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from handcal import __version__
 from handcal.display import projection_matrix
 from handcal.errors import LinkError
 from handcal.geometry import rigid
@@ -156,7 +156,7 @@ def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> Headse
         settings.device_id or hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
         name=settings.name,
         runtime="simulator",
-        app=f"handcal {__version__}",
+        app=f"handcal {version('handcal')}",
         protocol=VERSION,
         views={eye: _runtime_view(rig.eyes[eye]) for eye in EYES},
     )

@@ -471,6 +471,32 @@ def test_the_pc_may_confirm_but_only_with_a_hand_in_view(stage: Stage) -> None:
         )
 
 
+def test_a_headset_that_keeps_stale_projections_is_refused(stage: Stage, session: Session) -> None:
+    stale = {eye: replace(one, P=one.P + 1e-3) for eye, one in stage.shown().projections.items()}
+    stage.make_cursor()
+    stage.see(T_D_NEAR)
+    stage.press(shown=replace(stage.shown(), projections=stale))
+    assert stage.see(T_D_NEAR).state is State.ALIGN
+    assert stage.calibration.refusal.startswith("The headset does not show what it should.")
+    assert events(session)[-1][1]["reason"] == "drawn otherwise"
+    eventually(lambda: stage.shown().prompt == stage.calibration.refusal)
+    stage.see(T_D_NEAR)
+    stage.press()
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+
+
+def test_the_pc_confirms_nothing_that_the_headset_has_not_received(
+    stage: Stage, client: HeadsetClient
+) -> None:
+    stage.make_cursor()
+    stage.see(T_D_NEAR)
+    eventually(lambda: stage.calibration.is_applied)
+    client.close()
+    stage.calibration._send_projections(stage.calibration.applied_shift_m)
+    with pytest.raises(ProcedureError, match="has not received the cursor and projections"):
+        stage.calibration.confirm()
+
+
 def test_a_moving_or_absent_hand_is_not_steady(stage: Stage) -> None:
     for i in range(8):
         seen = stage.see(rigid([-0.2, 0.0, 0.0], [0.004 * (i % 2), 0.003 * (i % 4), 0.5]))
