@@ -12,7 +12,6 @@ import hmac
 import math
 import secrets
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
@@ -26,9 +25,8 @@ MAX_ANSWERS = 64
 """Addresses to which one hello is answered with a cookie."""
 _COOKIE_BYTES = 16
 _MAX_DEVICES = 64
-_FOREIGN_KEYS_S = 20.0
-
-_keys = lru_cache(64)(wire.handshake_keys)
+_MAX_DROPPED = 4096
+_FOREIGN_KEYS_HZ = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +82,16 @@ class Reception:
         self._heard: dict[int, _Heard] = {}
         self._secrets = (b"", b"")
         self._changed_s = -math.inf
-        self._foreign = Limiter(_FOREIGN_KEYS_S)
+        self._foreign = Limiter(_FOREIGN_KEYS_HZ)
+        self._dropped: set[bytes | tuple[bytes, Address]] = set()
+        self._indexed: tuple[Pairing, ...] = ()
+        self._bound: dict[int, tuple[Pairing, Keys]] = {}
+        self._unbound: list[Pairing] = []
+
+    def has_dropped(self, datagram: bytes, address: Address) -> bool:
+        """Return whether a datagram was dropped before; replays in masses cost almost nothing."""
+        mac = datagram[-wire.MAC_BYTES :]
+        return mac in self._dropped or (mac, address) in self._dropped
 
     def hear(
         self, packet: Packet, datagram: bytes, address: Address, now_s: float
@@ -97,15 +104,15 @@ class Reception:
             If the datagram is authentic, but no hello.
         """
         device = packet.sequence
-        pairing = self._find(device, datagram, now_s)
-        if pairing is None:
+        found = self._find(device, datagram, now_s)
+        if found is None:
             return Rejection.UNPAIRED
-        keys = _keys(pairing.key.encode(), device)
+        pairing, keys = found
         hello = messages.read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)
         if self._is_cookie(hello.cookie, device, address, now_s):
             if hello.time_ns <= heard.admitted_ns:
-                return Rejection.REPLAYED
+                return self._drop(datagram, address)
             heard.changed_s = now_s
             heard.admitted_ns = hello.time_ns
             heard.newest_ns = max(heard.newest_ns, hello.time_ns)
@@ -114,33 +121,47 @@ class Reception:
             heard.changed_s = now_s
             heard.newest_ns = hello.time_ns
             heard.answered.clear()
-        elif (
-            hello.time_ns < heard.newest_ns
-            or address in heard.answered
-            or len(heard.answered) >= MAX_ANSWERS
-        ):
-            return Rejection.REPLAYED
+        elif hello.time_ns < heard.newest_ns:
+            return self._drop(datagram)
+        elif address in heard.answered or len(heard.answered) >= MAX_ANSWERS:
+            return self._drop(datagram, address)
         heard.answered.add(address)
         retry = messages.retry(hello.nonce, self._cookie(0, device, address, now_s))
         return seal(keys.to_headset, device, retry)
 
-    def _find(self, device: int, datagram: bytes, now_s: float) -> Pairing | None:
+    def _drop(self, datagram: bytes, address: Address | None = None) -> Rejection:
+        """Remember that a hello gets no answer, from one address or from any."""
+        if len(self._dropped) >= _MAX_DROPPED:
+            self._dropped.clear()
+        mac = datagram[-wire.MAC_BYTES :]
+        self._dropped.add(mac if address is None else (mac, address))
+        return Rejection.REPLAYED
+
+    def _find(self, device: int, datagram: bytes, now_s: float) -> tuple[Pairing, Keys] | None:
         """Return the pairing whose key signed a hello: its own, an open one, or another's."""
-
-        def signed(pairing: Pairing) -> bool:
-            # Strangers' identities must not push those of known devices out of the cache.
-            derive = _keys if pairing.device_id else wire.handshake_keys
-            return wire.is_authentic(derive(pairing.key.encode(), device).to_pc, datagram)
-
-        everyone = self._pairings.all
-        own = [one for one in everyone if one.device_id and device_number(one.device_id) == device]
-        unbound = [one for one in everyone if not one.device_id]
-        for pairing in (*own, *unbound):
-            if signed(pairing):
-                return pairing
-        if not own and self._foreign.allows(now_s):
-            return next((one for one in everyone if one not in unbound and signed(one)), None)
+        self._index()
+        own = self._bound.get(device)
+        if own is not None and wire.is_authentic(own[1].to_pc, datagram):
+            return own
+        others = [one for one, _ in self._bound.values()]
+        try_all = own is None and bool(others) and self._foreign.allows(now_s)
+        for pairing in (*self._unbound, *(others if try_all else ())):
+            keys = wire.handshake_keys(pairing.key.encode(), device)
+            if wire.is_authentic(keys.to_pc, datagram):
+                return pairing, keys
         return None
+
+    def _index(self) -> None:
+        """Derive the keys of the known devices, if the pairings have changed."""
+        if self._indexed is self._pairings.all:
+            return
+        self._indexed = self._pairings.all
+        self._unbound = [one for one in self._indexed if not one.device_id]
+        self._bound = {}
+        for one in self._indexed:
+            if one.device_id:
+                device = device_number(one.device_id)
+                self._bound[device] = one, wire.handshake_keys(one.key.encode(), device)
 
     def _recall(self, device: int, now_s: float) -> _Heard:
         heard = self._heard.get(device)

@@ -345,6 +345,12 @@ class HeadsetServer(Endpoint):
                 notice=self._notice if time.monotonic() < self._notice_until_s else "",
             )
 
+    def _take(self, datagram: bytes, address: Address) -> None:
+        if self._reception.has_dropped(datagram, address):
+            self._rejected[Rejection.REPLAYED] += 1
+        else:
+            super()._take(datagram, address)
+
     def _greet(self, packet: Packet, datagram: bytes, address: Address) -> Rejection | None:
         heard = self._reception.hear(packet, datagram, address, time.monotonic())
         if isinstance(heard, Rejection):
