@@ -8,7 +8,7 @@ import re
 import secrets
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 
 from handcal.errors import FileError, LinkError
 from handcal.io.files import make_folder, read_limited, write_atomic
@@ -103,7 +103,7 @@ class Pairings:
     def __init__(self, pairings: tuple[Pairing, ...], path: Path | None = None) -> None:
         self.all = pairings[-MAX_DEVICES:]
         self._path = path
-        self._lock = Lock()
+        self._lock = RLock()
 
     @classmethod
     def read(cls, path: Path) -> Pairings:
@@ -140,12 +140,13 @@ class Pairings:
         FileError
             If it cannot be written.
         """
-        for pairing in self.all:
-            if not pairing.device_id:
-                return pairing.key
-        made = Pairing(new_pairing_key())
-        self._change((*self.all, made))
-        return made.key
+        with self._lock:
+            for pairing in self.all:
+                if not pairing.device_id:
+                    return pairing.key
+            made = Pairing(new_pairing_key())
+            self._change((*self.all, made))
+            return made.key
 
     def bind(self, pairing: Pairing, device_id: str, name: str) -> None:
         """Give an open key to a device, in place of the device's older key.
@@ -157,8 +158,9 @@ class Pairings:
         FileError
             If the file cannot be written; the key belongs to the device until the program ends.
         """
-        others = (one for one in self.all if one is not pairing and one.device_id != device_id)
-        self._change((*others, Pairing(pairing.key, device_id, name)))
+        with self._lock:
+            others = (one for one in self.all if one is not pairing and one.device_id != device_id)
+            self._change((*others, Pairing(pairing.key, device_id, name)))
 
     def renew(self) -> str:
         """Forget every device and return a new key.
@@ -168,13 +170,13 @@ class Pairings:
         FileError
             If it cannot be written.
         """
-        self._change(())
-        return self.open_key()
+        with self._lock:
+            self._change(())
+            return self.open_key()
 
     def _change(self, pairings: tuple[Pairing, ...]) -> None:
-        with self._lock:
-            self.all = pairings[-MAX_DEVICES:]
-            if self._path is not None:
-                content = json.dumps({"devices": [asdict(one) for one in self.all]}, indent=2)
-                make_folder(self._path.parent)
-                write_atomic(self._path, f"{content}\n".encode(), mode=0o600)
+        self.all = pairings[-MAX_DEVICES:]
+        if self._path is not None:
+            content = json.dumps({"devices": [asdict(one) for one in self.all]}, indent=2)
+            make_folder(self._path.parent)
+            write_atomic(self._path, f"{content}\n".encode(), mode=0o600)

@@ -90,10 +90,11 @@ def run_headset(
     """
     rig = read_rig(Path(settings.rig_path))
     worn_rig = read_rig(Path(settings.worn_rig_path or settings.rig_path))
-    hand = make_hand(settings.seed)
-    wearer = (
-        Wearer(settings.seed, worn_rig, hand, settings.wearer) if settings.has_wearer else _Device()
-    )
+    if settings.has_wearer:
+        hand = make_hand(settings.seed)
+        act = _as_wearer(Wearer(settings.seed, worn_rig, hand, settings.wearer), rig)
+    else:
+        act = _at_keyboard()
     rng = np.random.default_rng(settings.seed)
     clock_ns = _clock(settings)
     start_s = heard_s = next_s = time.monotonic()
@@ -112,7 +113,7 @@ def run_headset(
         while not is_stopped() and not client.dismissed and next_s < end_s:
             t_ns = time.monotonic_ns()
             state = client.state()
-            action = wearer.step(_view(state, rig, t_ns / 1e9 - start_s))
+            action = act(state, t_ns / 1e9 - start_s)
             if scene is not None:
                 scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
             client.send_pose(action.T_W_H @ _tracking_error(rng, settings), clock_ns(t_ns))
@@ -131,24 +132,42 @@ def run_headset(
             time.sleep(next_s - now_s)
 
 
-class _Device:
-    """Stands in for the wearer of a device at rest, with a person at the keyboard."""
+def _as_wearer(wearer: Wearer, rig: Rig) -> Callable[[HeadsetState, float], WearerAction]:
+    return lambda state, t_s: wearer.step(_view(state, rig, t_s))
 
-    def __init__(self) -> None:
-        self._told = ""
-        self._presses: list[str] = []
-        threading.Thread(target=lambda: self._presses.extend(sys.stdin), daemon=True).start()
 
-    def step(self, view: DisplayView) -> WearerAction:
-        """Print what is shown when it changes; confirm if Enter has been pressed."""
-        cursor = "no cursor" if view.cursor_W_m is None else f"cursor {view.cursor_id}"
-        told = f"{cursor}; {' and '.join(view.eyes)}; {view.prompt or 'no prompt'}"
-        if told != self._told:
-            self._told = told
+def _at_keyboard() -> Callable[[HeadsetState, float], WearerAction]:
+    """Return the actions of a device at rest: it prints what is shown, and confirms on Enter."""
+    presses: list[str] = []
+    threading.Thread(target=lambda: presses.extend(sys.stdin), daemon=True).start()
+    told = ""
+
+    def act(state: HeadsetState, _t_s: float) -> WearerAction:
+        nonlocal told
+        telling = _told(state)
+        if telling != told:
+            told = telling
             print(told, flush=True)  # noqa: T201 (the display)
-        is_pressed = bool(self._presses)
-        self._presses.clear()
-        return WearerAction(np.eye(4), np.eye(4), is_pressed and view.cursor_W_m is not None)
+        is_pressed = bool(presses)
+        presses.clear()
+        return WearerAction(np.eye(4), np.eye(4), is_pressed and state.cursor_W_m is not None)
+
+    return act
+
+
+def _told(state: HeadsetState) -> str:
+    """Return in words what is shown."""
+    what = [
+        f"projections of {state.owner.wearer or 'nobody'}: {' and '.join(state.drawn) or 'none'}",
+        "offline calibration" if state.is_offline else "",
+        "" if state.cursor_W_m is None else f"cursor {state.cursor_id}",
+        "" if state.live_W_m is None else f"live {'outline' if state.is_outline else 'hand'}",
+        "" if state.target is None else f"target for the {state.target.eye} eye",
+        "" if state.shape is None else f"shape of {len(state.shape.corners_W_m)} corners",
+        f"open: {' and '.join(state.eyes)}",
+        state.prompt,
+    ]
+    return "; ".join(part for part in what if part)
 
 
 def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> HeadsetIdentity:

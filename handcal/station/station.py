@@ -112,6 +112,7 @@ class Station(Closable):
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
         self._revision = self.session.revision
+        self._is_offline = False
         self._target_E_m: dict[Eye, Float64] = {}  # only for the eye to which it is shown
         self._views: dict[Eye, EyeView] = {}
         self._viewed: Eye = "right"
@@ -147,6 +148,7 @@ class Station(Closable):
             self._not_applied = ""
         if self.calibration.state is not State.APPLIED:
             self.hide_target()
+            self.show_offline(False)
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -242,6 +244,22 @@ class Station(Closable):
             self._link.send_target(None)
             self._target_E_m = {}
 
+    def show_offline(self, is_shown: bool) -> None:
+        """Have the headset draw with the offline calibration, or with the applied one again.
+
+        Raises
+        ------
+        ProcedureError
+            Unless the solved φ is applied.
+        LinkError
+            If the link is closed.
+        """
+        if is_shown and self.calibration.state is not State.APPLIED:
+            raise ProcedureError("solve and apply first")
+        if is_shown != self._is_offline:
+            self._link.send_show(is_shown)
+            self._is_offline = is_shown
+
     def require_headset(self) -> None:
         """Raise LinkError if the virtual headset has ended."""
         if self._simulation is not None:
@@ -302,7 +320,7 @@ class Station(Closable):
 
     def _see(self, eye: Eye, hand: PlacedHand) -> EyeView:
         calibration, display = self.calibration, self.rig.eyes[eye]
-        drawn_shift_m = calibration.applied_shift_m[eye]
+        drawn_shift_m = np.zeros(3) if self._is_offline else calibration.applied_shift_m[eye]
         cursor = calibration.cursor
         T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
         image = None

@@ -142,7 +142,7 @@ def test_a_device_without_a_wearer_shows_and_confirms_on_enter(
     run_headset(replace(settings, duration_s=10.0), KEY.encode(), is_stopped)
     presses.put("")
     assert (heard[0].cursor_id, heard[0].problem) == (3, "")
-    assert "cursor 3; left and right" in capsys.readouterr().out
+    assert "left and right; cursor 3; open: left and right" in capsys.readouterr().out
 
 
 def test_it_ends_when_the_pc_says_good_bye(
