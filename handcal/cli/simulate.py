@@ -135,12 +135,6 @@ def demo(arguments: argparse.Namespace) -> None:
         help="stop after this time (default: run until terminated)",
     ),
     arg(
-        "--device-id",
-        metavar="ID",
-        default="",
-        help="the headset's identity, 16 hexadecimal digits (default: from the pairing key)",
-    ),
-    arg(
         "--as-device",
         action="store_true",
         help="no simulated wearer: print what is shown, confirm on Enter",
@@ -168,7 +162,6 @@ def headset(arguments: argparse.Namespace) -> None:
         ),
         clock_offset_s=arguments.clock_offset_ms / 1e3,
         duration_s=arguments.duration_s,
-        device_id=arguments.device_id,
         has_wearer=not arguments.as_device,
     )
     run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())

@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import handshake, messages, wire
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
@@ -228,13 +228,13 @@ class HeadsetClient(Endpoint):
         match body:
             case "retry":
                 is_first = not self._cookie
-                self._cookie = envelope.retry.cookie[: messages.MAX_COOKIE_BYTES]
+                self._cookie = envelope.retry.cookie[: greetings.MAX_COOKIE_BYTES]
                 if is_first:  # or a PC that takes no cookie would be asked without a pause
                     self._say_hello()
             case "welcome":
-                self._join(messages.read_welcome(envelope.welcome))
+                self._join(greetings.read_welcome(envelope.welcome))
             case "refused":
-                self._refusal = str(messages.read_refused(envelope.refused))
+                self._refusal = str(greetings.read_refused(envelope.refused))
                 self._begin_again()
                 self._next_hello_s = time.monotonic() + _REFUSED_PERIOD_S
         return None
@@ -357,5 +357,5 @@ class HeadsetClient(Endpoint):
 
     def _say_hello(self) -> None:
         self._hello_ns = max(time.time_ns(), self._hello_ns + 1)
-        hello = messages.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
-        self._post(handshake.seal(self._keys.to_pc, self._device, hello), self._server)
+        hello = greetings.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
+        self._post(greetings.seal(self._keys.to_pc, self._device, hello), self._server)

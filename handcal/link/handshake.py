@@ -1,8 +1,8 @@
 """The PC's side of the handshake. No sockets; time is an argument.
 
 A stranger costs no memory: the first hello is answered with a cookie, a MAC over the sender's
-address under a secret that changes every two minutes (as WireGuard's cookie and QUIC's Retry). Only
-a hello that returns the cookie is passed on. A hello is heard once: its time must be greater than
+address and the time in periods of two minutes (as WireGuard's cookie and QUIC's Retry). Only a
+hello that returns the cookie is passed on. A hello is heard once: its time must be greater than
 that of every earlier one of its device.
 """
 
@@ -13,14 +13,13 @@ import math
 import secrets
 from dataclasses import dataclass, field
 
-from handcal.link import handcal_pb2 as pb
-from handcal.link import messages, wire
+from handcal.link import greetings, messages, wire
 from handcal.link.pairing import Pairing, Pairings, device_number
 from handcal.link.transport import Address
 from handcal.link.wire import Keys, Packet, Rejection
 
-SECRET_LIFE_S = 120.0
-"""Time between two changes of the secret; a cookie is valid for one to two of them."""
+PERIOD_S = 120.0
+"""A cookie is valid until the end of the period after the one in which it was made."""
 MAX_ANSWERS = 64
 """Addresses to which one hello is answered with a cookie."""
 _COOKIE_BYTES = 16
@@ -80,8 +79,7 @@ class Reception:
     def __init__(self, pairings: Pairings) -> None:
         self._pairings = pairings
         self._heard: dict[int, _Heard] = {}
-        self._secrets = (b"", b"")
-        self._changed_s = -math.inf
+        self._secret = secrets.token_bytes(32)
         self._foreign = Limiter(_FOREIGN_KEYS_HZ)
         self._dropped: set[bytes | tuple[bytes, Address]] = set()
         self._indexed: tuple[Pairing, ...] = ()
@@ -108,7 +106,7 @@ class Reception:
         if found is None:
             return Rejection.UNPAIRED
         pairing, keys = found
-        hello = messages.read_hello(messages.parse(packet.payload))
+        hello = greetings.read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)
         if self._is_cookie(hello.cookie, device, address, now_s):
             if hello.time_ns <= heard.admitted_ns:
@@ -126,8 +124,8 @@ class Reception:
         elif address in heard.answered or len(heard.answered) >= MAX_ANSWERS:
             return self._drop(datagram, address)
         heard.answered.add(address)
-        retry = messages.retry(hello.nonce, self._cookie(0, device, address, now_s))
-        return seal(keys.to_headset, device, retry)
+        retry = greetings.retry(hello.nonce, self._cookie(0, device, address, now_s))
+        return greetings.seal(keys.to_headset, device, retry)
 
     def _drop(self, datagram: bytes, address: Address | None = None) -> Rejection:
         """Remember that a hello gets no answer, from one address or from any."""
@@ -166,7 +164,7 @@ class Reception:
     def _recall(self, device: int, now_s: float) -> _Heard:
         heard = self._heard.get(device)
         # By now every cookie that was valid then has ended, and no old hello can return one.
-        if heard is None or now_s - heard.changed_s > 2 * SECRET_LIFE_S:
+        if heard is None or now_s - heard.changed_s > 2 * PERIOD_S:
             self._heard.pop(device, None)
             if len(self._heard) >= _MAX_DEVICES:
                 del self._heard[next(iter(self._heard))]
@@ -179,15 +177,7 @@ class Reception:
         )
 
     def _cookie(self, age: int, device: int, address: Address, now_s: float) -> bytes:
-        if now_s - self._changed_s > SECRET_LIFE_S:
-            is_next = now_s - self._changed_s < 2 * SECRET_LIFE_S
-            older = self._secrets[0] if is_next else secrets.token_bytes(32)
-            self._secrets = secrets.token_bytes(32), older
-            self._changed_s = now_s
-        who = f"{device:016x} {address[1]} {address[0]}".encode()
-        return hmac.digest(self._secrets[age], who, "sha256")[:_COOKIE_BYTES]
-
-
-def seal(key: bytes, device: int, envelope: pb.Envelope) -> bytes:
-    """Return a datagram of the handshake."""
-    return wire.seal(key, Packet(envelope.SerializeToString(), sequence=device))
+        """Return the cookie of the present period, or of the one before with `age` 1."""
+        period = math.floor(now_s / PERIOD_S) - age
+        who = f"{period} {device:016x} {address[1]} {address[0]}".encode()
+        return hmac.digest(self._secret, who, "sha256")[:_COOKIE_BYTES]

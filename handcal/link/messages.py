@@ -19,7 +19,7 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import DIGEST_BYTES
 from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.reliable import Receipt
-from handcal.link.wire import MAX_FRAGMENTS, NONCE_BYTES, Slot, Welcome
+from handcal.link.wire import MAX_FRAGMENTS, Slot
 from handcal.types import (
     EYES,
     Eye,
@@ -37,7 +37,6 @@ CHUNK_POINTS = 200
 MAX_CHUNKS = MAX_POINTS // CHUNK_POINTS
 MAX_PROMPT_CHARACTERS = 500
 MAX_OWNER_CHARACTERS = 200
-MAX_COOKIE_BYTES = 32
 MAX_DISPLAY_PX = 65_535
 
 PROJECTION_SLOTS: Mapping[Eye, Slot] = {
@@ -60,73 +59,6 @@ def parse(payload: bytes) -> pb.Envelope:
         return pb.Envelope.FromString(payload)
     except DecodeError as error:
         raise MalformedError(str(error)) from error
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """The PC's reason for refusing a session."""
-
-    is_key_taken: bool
-    """True: the pairing key belongs to another device. False: another headset is connected."""
-    other: str
-    """Name of the other device."""
-
-    def __str__(self) -> str:
-        if self.is_key_taken:
-            return f"this pairing key belongs to {self.other}; ask the PC for a key of your own"
-        return f"{self.other} is connected to the PC; disconnect it first"
-
-
-def hello(nonce: bytes, time_ns: int, cookie: bytes, name: str) -> pb.Envelope:
-    """Make a hello, with the PC's cookie once it is known."""
-    return pb.Envelope(hello=pb.Hello(nonce=nonce, time_ns=time_ns, cookie=cookie, name=name))
-
-
-def read_hello(envelope: pb.Envelope) -> pb.Hello:
-    """Return the hello in an envelope."""
-    message = envelope.hello
-    if (
-        envelope.WhichOneof("body") != "hello"
-        or len(message.nonce) != NONCE_BYTES
-        or len(message.cookie) > MAX_COOKIE_BYTES
-    ):
-        raise MalformedError("a session begins with a hello")
-    _text(message.name, MAX_NAME_CHARACTERS)
-    return message
-
-
-def retry(nonce: bytes, cookie: bytes) -> pb.Envelope:
-    """Make the request to say hello again with a cookie."""
-    return pb.Envelope(retry=pb.Retry(nonce=nonce, cookie=cookie))
-
-
-def welcome(value: Welcome) -> pb.Envelope:
-    """Make the offer of a session."""
-    return pb.Envelope(
-        welcome=pb.Welcome(
-            nonce=value.headset_nonce, session=value.session, pc_nonce=value.pc_nonce
-        )
-    )
-
-
-def read_welcome(message: pb.Welcome) -> Welcome:
-    """Read the offer of a session."""
-    if len(message.pc_nonce) != NONCE_BYTES or not message.session:
-        raise MalformedError("a welcome without a session")
-    return Welcome(message.session, message.nonce, message.pc_nonce)
-
-
-def refused(nonce: bytes, refusal: Refusal) -> pb.Envelope:
-    """Make a refusal."""
-    reason = pb.REFUSAL_KEY_TAKEN if refusal.is_key_taken else pb.REFUSAL_BUSY
-    return pb.Envelope(refused=pb.Refused(nonce=nonce, reason=reason, other=refusal.other))
-
-
-def read_refused(message: pb.Refused) -> Refusal:
-    """Read a refusal; an unknown reason reads as another headset being connected."""
-    return Refusal(
-        message.reason == pb.REFUSAL_KEY_TAKEN, _text(message.other, MAX_NAME_CHARACTERS)
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,9 +114,9 @@ def read_device(message: pb.Device, device_id: str) -> tuple[HeadsetIdentity, Ow
         raise MalformedError("an eye distance that no wearer has")
     identity = HeadsetIdentity(
         device_id,
-        name=_text(message.name, MAX_NAME_CHARACTERS),
-        runtime=_text(message.runtime, MAX_NAME_CHARACTERS),
-        app=_text(message.app, MAX_NAME_CHARACTERS),
+        name=read_text(message.name, MAX_NAME_CHARACTERS),
+        runtime=read_text(message.runtime, MAX_NAME_CHARACTERS),
+        app=read_text(message.app, MAX_NAME_CHARACTERS),
         protocol=message.protocol,
         views={
             _eye(view.eye): HeadsetView(
@@ -467,14 +399,15 @@ def _eye(code: int) -> Eye:
     return eye
 
 
-def _text(text: str, most: int) -> str:
+def read_text(text: str, most: int) -> str:
+    """Return a text of at most this many characters, without control characters."""
     if len(text) > most or any(character < " " for character in text):
         raise MalformedError(f"a text of more than {most} characters, or with control characters")
     return text
 
 
 def _owner(wearer: str, rig: str) -> Owner:
-    return Owner(_text(wearer, MAX_OWNER_CHARACTERS), _text(rig, MAX_OWNER_CHARACTERS))
+    return Owner(read_text(wearer, MAX_OWNER_CHARACTERS), read_text(rig, MAX_OWNER_CHARACTERS))
 
 
 def _size(width_px: int, height_px: int) -> tuple[int, int]:

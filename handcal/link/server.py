@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.errors import FileError
+from handcal.link import greetings, messages, version1, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import handshake, messages, version1, wire
 from handcal.link.clock import ClockEstimator
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
+from handcal.link.greetings import Refusal
 from handcal.link.handshake import Caller, Limiter, Reception
-from handcal.link.messages import Owner, Refusal
+from handcal.link.messages import Owner
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.poses import PoseBuffer
 from handcal.link.reliable import Outgoing
@@ -129,10 +130,8 @@ class HeadsetServer(Endpoint):
         self._device: HeadsetIdentity | None = None
         self._shown = Owner()
         self._notice, self._notice_until_s = "", 0.0
-        self._version_1, self._version_1_notices = (
-            Limiter(_VERSION_1_HZ),
-            Limiter(_VERSION_1_NOTICES_HZ),
-        )
+        self._version_1 = Limiter(_VERSION_1_HZ)
+        self._version_1_notices = Limiter(_VERSION_1_NOTICES_HZ)
         self._projections: dict[Eye, Projection] = {}
         self._cursor: pb.Cursor | None = None
         self._is_offline = False
@@ -356,7 +355,7 @@ class HeadsetServer(Endpoint):
         if isinstance(heard, Rejection):
             return heard
         if isinstance(heard, Caller):
-            heard = handshake.seal(
+            heard = greetings.seal(
                 heard.keys.to_headset, packet.sequence, self._meet(heard, address)
             )
         self._post(heard, address)
@@ -364,25 +363,25 @@ class HeadsetServer(Endpoint):
 
     def _meet(self, caller: Caller, address: Address) -> pb.Envelope:
         """Return the answer to a device that has proved its key and its address."""
-        name = caller.name or "a headset without a name"
+        name = caller.name or caller.device_id
         owner_id = caller.pairing.device_id
         if owner_id not in ("", caller.device_id):
             owner = caller.pairing.name or "another headset"
             self._tell(f"headset {name} asks to connect with the pairing key of {owner}")
-            return messages.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
+            return greetings.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
         channel, session = self._channel, self._session
         if channel is not None and session is not None:
             is_same = session.caller.device_id == caller.device_id
             if is_same and session.caller.nonce == caller.nonce and channel.address == address:
-                return messages.welcome(session.welcome)  # the first one was lost
+                return greetings.welcome(session.welcome)  # the first one was lost
             # A device whose app has been restarted is silent in its old session.
             patience_s = _RESTART_S if is_same else self._settings.silence_s
             if time.monotonic() - channel.heard_s <= patience_s:
-                holder = session.caller.name or "a headset without a name"
+                holder = session.caller.name or session.caller.device_id
                 if not is_same:
                     self._tell(f"headset {name} asks to connect; {holder} is connected")
-                return messages.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
-        return messages.welcome(self._open(caller, address))
+                return greetings.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
+        return greetings.welcome(self._open(caller, address))
 
     def _open(self, caller: Caller, address: Address) -> Welcome:
         if not caller.pairing.device_id:

@@ -62,8 +62,6 @@ class HeadsetSettings:
     """Longest time without a connection."""
     duration_s: float | None = None
     """Time after which to end; None to run until stopped."""
-    device_id: str = ""
-    """The headset's identity, 16 hexadecimal digits; empty to derive it from the pairing key."""
     name: str = "Virtual headset"
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
@@ -172,7 +170,8 @@ def _told(state: HeadsetState) -> str:
 
 def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> HeadsetIdentity:
     return HeadsetIdentity(
-        settings.device_id or hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
+        # The same after a restart: the key belongs to this identity.
+        hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
         name=settings.name,
         runtime="simulator",
         app=f"handcal {version('handcal')}",

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from handcal.link import greetings, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import handshake, messages, wire
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
 from handcal.link.transport import Address
@@ -41,7 +41,7 @@ class RawPeer:
         self._session = self._pair(wire.session_keys(self._key, self.device, welcome))
 
     def greeting(self, envelope: pb.Envelope) -> bytes:
-        return handshake.seal(self._handshake[0], self.device, envelope)
+        return greetings.seal(self._handshake[0], self.device, envelope)
 
     def seal(self, envelope: pb.Envelope, session: int, sequence: int) -> bytes:
         return self.seal_payload(envelope.SerializeToString(), session, sequence)
@@ -85,7 +85,7 @@ class RawHeadset(RawPeer):
 
     def hello(self, cookie: bytes = b"", nonce: bytes = NONCE) -> bytes:
         self.time_ns += 1
-        return self.greeting(messages.hello(nonce, self.time_ns, cookie, f"Headset {self.device}"))
+        return self.greeting(greetings.hello(nonce, self.time_ns, cookie, f"Headset {self.device}"))
 
     def cookie(self) -> bytes:
         """Say hello and return the cookie of the answer."""
@@ -98,17 +98,17 @@ class RawHeadset(RawPeer):
         """Do the handshake and return the session."""
         self.send(self.hello(self.cookie(), nonce))
         envelope = self.receive_greeting()
-        welcome = messages.read_welcome(envelope.welcome)
+        welcome = greetings.read_welcome(envelope.welcome)
         assert welcome.headset_nonce == nonce
         self.use_session(welcome)
         return welcome.session
 
-    def refusal(self) -> messages.Refusal:
+    def refusal(self) -> greetings.Refusal:
         """Do the handshake and return the refusal."""
         self.send(self.hello(self.cookie()))
         envelope = self.receive_greeting()
         assert envelope.WhichOneof("body") == "refused"
-        return messages.read_refused(envelope.refused)
+        return greetings.read_refused(envelope.refused)
 
 
 class RawServer(RawPeer):

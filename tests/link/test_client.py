@@ -1,5 +1,6 @@
 """The headset's end: against the real server over a bad network, and against a hostile one."""
 
+import random
 import threading
 import time
 from dataclasses import replace
@@ -12,11 +13,12 @@ import pytest
 from handcal.display import target_corners_m
 from handcal.errors import LinkError
 from handcal.geometry import rigid
-from handcal.link import messages, wire
-from handcal.link.client import HeadsetClient, HeadsetState
+from handcal.link import greetings, messages, wire
+from handcal.link.client import MAX_WEARERS, HeadsetClient, HeadsetState
 from handcal.link.impair import Impairment
 from handcal.link.messages import Owner
 from handcal.link.pairing import Pairings
+from handcal.link.reliable import Receipt
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.types import (
@@ -234,14 +236,14 @@ def test_silence_is_noticed(pairing_key: bytes, raw_server: Any) -> None:
     settings = LinkSettings(silence_s=0.3)
     with HeadsetClient(raw_server.address, pairing_key, IDENTITY, settings=settings) as client:
         hello, address = raw_server.wait_for("hello")
-        retry = raw_server.greeting(messages.retry(hello.hello.nonce, b"cookie"))
+        retry = raw_server.greeting(greetings.retry(hello.hello.nonce, b"cookie"))
         raw_server.socket.sendto(retry, address)
         second, _ = raw_server.wait_for("hello")
         assert second.hello.cookie == b"cookie"
         assert second.hello.nonce == hello.hello.nonce
         assert second.hello.time_ns > hello.hello.time_ns
         welcome = wire.Welcome(9, hello.hello.nonce, bytes(16))
-        greeting = raw_server.greeting(messages.welcome(welcome))
+        greeting = raw_server.greeting(greetings.welcome(welcome))
         raw_server.socket.sendto(greeting, address)
         raw_server.use_session(welcome)
         raw_server.wait_for("ack")
@@ -256,6 +258,37 @@ def test_silence_is_noticed(pairing_key: bytes, raw_server: Any) -> None:
         time.sleep(0.05)
         assert not client.connected
         assert client.state().prompt == ""
+
+
+def test_a_pc_gone_mad_stops_nothing(pairing_key: bytes, raw_server: Any) -> None:
+    chance = random.Random(0)
+    made = [
+        messages.cursor(hand(count=3), 2**32 - 1),
+        *messages.live_hand(hand(count=450), True, 1, is_outline=True),
+        messages.prompt("x" * 500, EYES),
+        messages.projection(replace(projection("left", 1.0), wearer="w", rig="r")),
+        messages.target(TARGET),
+        messages.shape(Shape(np.ones((8, 3)))),
+        messages.ack([Receipt(7, 1, 2**200)]),
+    ]
+    with HeadsetClient(raw_server.address, pairing_key, IDENTITY) as client:
+        hello, address = raw_server.wait_for("hello")
+        welcome = wire.Welcome(9, hello.hello.nonce, bytes(16))
+        raw_server.socket.sendto(raw_server.greeting(greetings.welcome(welcome)), address)
+        raw_server.use_session(welcome)
+        client.wait_connected(3.0)
+        for sequence in range(1, 3000):
+            payload = bytearray(chance.choice(made).SerializeToString())
+            for _ in range(chance.randrange(4)):
+                payload[chance.randrange(1, len(payload))] = chance.randrange(256)
+            with client._changed:
+                client._take(
+                    raw_server.seal_payload(bytes(payload), 9, sequence), raw_server.address
+                )
+            client.state()
+        assert client._rejected["corrupt"] > 300
+        assert client.state().cursor_message is not None
+        assert len(client.kept) <= MAX_WEARERS
 
 
 def test_a_headset_introduces_itself_and_says_what_has_changed(

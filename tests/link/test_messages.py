@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from handcal.geometry import rigid
+from handcal.link import greetings, messages
 from handcal.link import handcal_pb2 as pb
-from handcal.link import messages
 from handcal.link.messages import MalformedError
 from handcal.link.reliable import Receipt
 from handcal.link.wire import MAX_PAYLOAD_BYTES
@@ -145,10 +145,10 @@ def read_device(message: pb.Device) -> object:
         (read_device, pb.Device(eye_distance_m=np.nan)),
         (read_device, pb.Device(views=[pb.View()] * 3)),
         (read_device, pb.Device(views=[pb.View(eye=pb.EYE_LEFT, T_V_H=rotated(1.0))])),
-        (messages.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
-        (messages.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
-        (messages.read_hello, pb.Envelope(bye=pb.Bye())),
-        (messages.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
+        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
+        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
+        (greetings.read_hello, pb.Envelope(bye=pb.Bye())),
+        (greetings.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
     ],
 )
 def test_nonsense_is_malformed(read: Callable[[Any], object], message: object) -> None:

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from handcal.geometry import rigid
+from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import handshake, messages, wire
 from handcal.link.drawn import drawn_digest, drawn_projections
-from handcal.link.messages import Owner, Refusal
+from handcal.link.greetings import Refusal
+from handcal.link.messages import Owner
 from handcal.link.reliable import Receipt
 from handcal.link.wire import Keys, Packet, Slot, Welcome
 from handcal.types import Eye, HeadsetIdentity, HeadsetView, Projection, Shape, Target
@@ -73,7 +74,7 @@ def build() -> dict[str, Any]:
         (Slot.UNRELIABLE, messages.ack([Receipt(Slot.CURSOR, 2, 1)])),
         (Slot.UNRELIABLE, pb.Envelope(bye=pb.Bye())),
     ]
-    busy = messages.refused(NONCE, Refusal(is_key_taken=False, other="Lab 1"))
+    busy = greetings.refused(NONCE, Refusal(is_key_taken=False, other="Lab 1"))
     offline = drawn_digest(drawn_projections(projections, is_offline=True), cursor.cursor)
     return {
         "protocol": wire.VERSION,
@@ -84,10 +85,10 @@ def build() -> dict[str, Any]:
         "session": f"{WELCOME.session:016x}",
         "keys": {"handshake": _hex(greeting), "session": _hex(session)},
         "handshake": [
-            _greeting(greeting.to_pc, messages.hello(NONCE, T_NS, b"", "Lab 2")),
-            _greeting(greeting.to_headset, messages.retry(NONCE, COOKIE)),
-            _greeting(greeting.to_pc, messages.hello(NONCE, T_NS + 1, COOKIE, "Lab 2")),
-            _greeting(greeting.to_headset, messages.welcome(WELCOME)),
+            _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS, b"", "Lab 2")),
+            _greeting(greeting.to_headset, greetings.retry(NONCE, COOKIE)),
+            _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS + 1, COOKIE, "Lab 2")),
+            _greeting(greeting.to_headset, greetings.welcome(WELCOME)),
         ],
         "refused": _greeting(greeting.to_headset, busy),
         "to_headset": _messages(session.to_headset, to_headset),
@@ -107,7 +108,7 @@ def _hex(keys: Keys) -> dict[str, str]:
 
 def _greeting(key: bytes, envelope: pb.Envelope) -> dict[str, str]:
     body = str(envelope.WhichOneof("body"))
-    return {"message": body, "datagram": handshake.seal(key, DEVICE, envelope).hex()}
+    return {"message": body, "datagram": greetings.seal(key, DEVICE, envelope).hex()}
 
 
 def _messages(key: bytes, envelopes: list[tuple[Slot, pb.Envelope]]) -> list[dict[str, str]]:
