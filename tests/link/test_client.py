@@ -21,6 +21,7 @@ from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.settings import LinkSettings
+from handcal.link.wire import Rejection
 from handcal.types import (
     EYES,
     Eye,
@@ -286,7 +287,7 @@ def test_a_pc_gone_mad_stops_nothing(pairing_key: bytes, raw_server: Any) -> Non
                     raw_server.seal_payload(bytes(payload), 9, sequence), raw_server.address
                 )
             client.state()
-        assert client._rejected["corrupt"] > 300
+        assert client._rejected[Rejection.CORRUPT] > 300
         assert client.state().cursor_message is not None
         assert len(client.kept) <= MAX_WEARERS
 
