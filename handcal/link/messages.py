@@ -78,8 +78,10 @@ def device(value: HeadsetIdentity, shown: Owner) -> pb.Envelope:
         If a text is too long, or a view is not finite.
     """
     texts = (value.name, value.runtime, value.app)
-    if max(map(len, texts)) > MAX_NAME_CHARACTERS:
-        raise ValueError(f"name, runtime and app have at most {MAX_NAME_CHARACTERS} characters")
+    if not all(_is_text(text, MAX_NAME_CHARACTERS) for text in texts):
+        raise ValueError(
+            f"name, runtime and app have at most {MAX_NAME_CHARACTERS} characters in one line"
+        )
     if not all(np.isfinite([*v.T_V_H.ravel(), *v.tangents]).all() for v in value.views.values()):
         raise ValueError("the views must be finite")
     return pb.Envelope(
@@ -239,7 +241,7 @@ def projection(value: Projection) -> pb.Envelope:
     offline = value.P if value.P_offline is None else value.P_offline
     if not np.isfinite(np.concatenate([value.P, offline, value.T_V_H])).all():
         raise ValueError("the projection must be finite")
-    if max(len(value.wearer), len(value.rig)) > MAX_OWNER_CHARACTERS:
+    if not all(_is_text(text, MAX_OWNER_CHARACTERS) for text in (value.wearer, value.rig)):
         raise ValueError(f"wearer and rig have at most {MAX_OWNER_CHARACTERS} characters")
     return pb.Envelope(
         projection=pb.Projection(
@@ -401,9 +403,13 @@ def _eye(code: int) -> Eye:
 
 def read_text(text: str, most: int) -> str:
     """Return a text of at most this many characters, without control characters."""
-    if len(text) > most or any(character < " " for character in text):
+    if not _is_text(text, most):
         raise MalformedError(f"a text of more than {most} characters, or with control characters")
     return text
+
+
+def _is_text(text: str, most: int) -> bool:
+    return len(text) <= most and all(character >= " " for character in text)
 
 
 def _owner(wearer: str, rig: str) -> Owner:

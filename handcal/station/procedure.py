@@ -181,7 +181,7 @@ class Calibration:
         self._sent: dict[Eye, Outgoing] = {}
         self._sent_cursor: Outgoing | None = None
         self._wearer = wearer
-        self._rig_name = f"{rig.name[:80]} {_rig_digest(rig)}"
+        self._rig_name = _rig_name(rig)
         self._apply_until_s = 0.0
         if resume is not None:
             self._resume(resume)
@@ -609,13 +609,14 @@ class Calibration:
             self.store_waiting()
 
 
-def _rig_digest(rig: Rig) -> str:
-    """Return eight digits that change with the rig's displays."""
+def _rig_name(rig: Rig) -> str:
+    """Return the rig's name in one line, with eight digits that change with its displays."""
     offline = {
         eye: Projection(eye, projection_matrix(one), one.width_px, one.height_px, one.T_V_H)
         for eye, one in rig.eyes.items()
     }
-    return drawn_digest(offline, None).hex()[:8]
+    name = "".join(character for character in rig.name if character >= " ")
+    return f"{name[:80]} {drawn_digest(offline, None).hex()[:8]}"
 
 
 def _align_prompt(eyes: Sequence[Eye]) -> str:

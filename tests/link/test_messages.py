@@ -103,6 +103,11 @@ def test_receipts_survive(receipts: list[Receipt]) -> None:
 
 
 def test_what_cannot_be_sent_is_refused() -> None:
+    for name in ("x" * 41, "two\nlines"):
+        with pytest.raises(ValueError, match="40 characters in one line"):
+            messages.device(HeadsetIdentity("0" * 16, name), messages.Owner())
+    with pytest.raises(ValueError, match="200 characters"):
+        messages.projection(Projection("left", np.eye(3, 4), 9, 8, wearer="x" * 201))
     with pytest.raises(ValueError, match="500 characters"):
         messages.prompt("x" * 501, EYES)
     with pytest.raises(ValueError, match="finite"):
