@@ -378,8 +378,7 @@ class HeadsetServer(Endpoint):
             patience_s = _RESTART_S if is_same else self._settings.silence_s
             if time.monotonic() - channel.heard_s <= patience_s:
                 holder = session.caller.name or session.caller.device_id
-                if not is_same:
-                    self._tell(f"headset {name} asks to connect; {holder} is connected")
+                self._tell(f"headset {name} asks to connect; {holder} is connected")
                 return greetings.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
         return greetings.welcome(self._open(caller, address))
 

@@ -131,6 +131,7 @@ def test_a_device_that_restarts_takes_over_its_own_session(
     old = first.join()
     restarted.time_ns = 1000
     assert not restarted.refusal().is_key_taken  # the old session was heard just now
+    assert "asks to connect" in server.statistics().notice
     time.sleep(0.6)
     assert server.connected
     assert restarted.join(nonce=b"n" * 16) != old
