@@ -2,8 +2,8 @@
 
     HANDCAL_PAIRING_KEY=KEY python 08_headset_client.py HOST PORT
 
-It tells its pose 60 times a second, says what it is to draw whenever that changes, and confirms an
-alignment on Enter. Ctrl+C, or the PC, ends it.
+It introduces itself, tells its pose 60 times a second, says what it is to draw whenever that
+changes, and confirms an alignment on Enter. It needs no rig file. Ctrl+C, or the PC, ends it.
 """
 
 from __future__ import annotations
@@ -14,16 +14,13 @@ import time
 
 import numpy as np
 
-from handcal.display import view_of_eye
 from handcal.errors import HandcalError
-from handcal.io.resources import resource_path
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.pairing import read_pairing_key
-from handcal.rig.rig_file import read_rig
-from handcal.types import EYES, Float64
+from handcal.types import Float64, HeadsetIdentity
 
-RIG = read_rig(resource_path("example_rig.yaml"))
-"""Of this headset: its T_V_H and t(C0→V) belong into the confirmation."""
+IDENTITY = HeadsetIdentity("0123456789abcdef", "Example", runtime="none", app="example 08")
+"""A real app makes its identity at random once, stores it, and reports the views of its runtime."""
 PERIOD_S = 1 / 60
 
 
@@ -31,12 +28,14 @@ def main() -> None:
     """Connect, and go on until the PC is closed."""
     host, port = sys.argv[1], int(sys.argv[2])
     told = ""
-    with HeadsetClient((host, port), read_pairing_key()) as client:
+    with HeadsetClient((host, port), read_pairing_key(), IDENTITY) as client:
         threading.Thread(target=confirm_on_enter, args=(client,), daemon=True).start()
         while not client.dismissed:
             client.send_pose(pose_of_headset(), time.monotonic_ns())
             state = client.state()
-            telling = what_to_draw(state) if client.connected else "Waiting for the PC"
+            telling = what_to_draw(state)
+            if not client.connected:
+                telling = client.refusal or "Waiting for the PC"
             if telling != told:
                 told = telling
                 tell(told)
@@ -55,18 +54,19 @@ def what_to_draw(state: HeadsetState) -> str:
     hand = (
         "no hand" if state.live_W_m is None else f"{'red' if state.is_over_limit else 'blue'} hand"
     )
+    shape = (
+        "no shape" if state.shape is None else f"a shape of {len(state.shape.corners_W_m)} corners"
+    )
     target = "no target" if state.target is None else f"the target of the {state.target.eye} eye"
-    eyes = " and ".join(sorted(state.projections)) or "no eye"
-    what = f"{cursor}, {hand}, {target}"
-    return f"Draw {what}, with new projections for {eyes}; say “{state.prompt}”"
+    eyes = " and ".join(sorted(state.drawn)) or "no eye"
+    what = f"{cursor}, {hand}, {target}, {shape}"
+    return f"Draw {what}, with P and T_V_H of {eyes}; say “{state.prompt}”"
 
 
 def confirm_on_enter(client: HeadsetClient) -> None:
-    """Confirm that the hand covers the cursor, with both eyes' views at that moment."""
+    """Confirm that the hand covers the cursor, with what is drawn at that moment."""
     for _line in sys.stdin:
-        t_ns, T_W_H = time.monotonic_ns(), pose_of_headset()
-        T_E_W = {eye: view_of_eye(RIG.eyes[eye], T_W_H) for eye in EYES}
-        client.confirm(T_E_W, t_ns, client.state().cursor_id)
+        client.confirm(time.monotonic_ns(), client.state())
 
 
 def tell(text: str) -> None:

@@ -372,11 +372,37 @@ class Projection:
     width_px: int
     height_px: int
     """Size of the display."""
+    T_V_H: Float64 = field(default_factory=lambda: np.eye(4))
+    """(4, 4); from the headset rig to V, as in the rig file: the view that belongs to `P`."""
+    P_offline: Float64 | None = None
+    """(3, 4); the offline calibration, drawn with on request; None: `P`."""
+    wearer: str = ""
+    rig: str = ""
+    """Wearer and rig for which `P` was solved."""
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "P", np.float64, 3, 4)
+        freeze(self, "T_V_H", np.float64, 4, 4)
+        freeze(self, "P_offline", np.float64, 3, 4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """A shape that the headset draws fixed in the world."""
+
+    corners_W_m: Float64
+    """(4, 3), a quadrilateral in order; or (8, 3), a cube: two opposite faces in the same order."""
+    eyes: tuple[Eye, ...] = EYES
+    """The eyes that draw it."""
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        freeze(self, "corners_W_m", np.float64, None, 3)
+        if len(self.corners_W_m) not in (4, 8):
+            raise ValueError("Shape.corners_W_m: a quadrilateral has 4 corners, a cube 8")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -53,8 +53,10 @@ _HEADSET = """
 import sys, time
 import numpy as np
 from handcal.link.client import HeadsetClient
+from handcal.link.pairing import new_device_id
+from handcal.types import HeadsetIdentity
 pc, key = ("127.0.0.1", int(sys.argv[1])), sys.stdin.readline().strip().encode()
-with HeadsetClient(pc, key) as headset:
+with HeadsetClient(pc, key, HeadsetIdentity(new_device_id())) as headset:
     while not headset.dismissed:
         headset.send_pose(np.eye(4), time.monotonic_ns())
         time.sleep(1 / 60)
@@ -108,7 +110,7 @@ class _FilmStation(Station):
 
     def __init__(self, film: _Film, settings: StationSettings) -> None:
         self._film = film
-        super().__init__(settings, "Benchmark", pairing_key=_KEY)
+        super().__init__(settings, "Benchmark", pairings=_KEY)
 
     def _open_camera(self) -> Camera:
         return _FilmCamera(self._film)

@@ -9,11 +9,11 @@ from typing import Literal, Self, TypeAlias
 
 from PySide6.QtCore import QStandardPaths
 
-from handcal.errors import FileError, HandcalError
+from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
 from handcal.io.settings import read_settings, settings_json
-from handcal.link.pairing import read_pairing_key, write_pairing_key
+from handcal.link.pairing import Pairings
 from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
@@ -60,12 +60,12 @@ class Preferences:
 
 
 class PreferencesFile:
-    """The file of the preferences (JSON), and the pairing key, which only the user can read.
+    """The file of the preferences (JSON), and the pairing keys, which only the user can read.
 
     Parameters
     ----------
     path : Path, optional
-        By default in the user's configuration folder; the key is stored beside it.
+        By default in the user's configuration folder; the keys are stored beside it.
 
     Attributes
     ----------
@@ -99,27 +99,29 @@ class PreferencesFile:
         make_folder(self.path.parent)
         write_json(self.path, settings_json(preferences))
 
-    def pairing_key(self) -> str:
-        """Return the key for network headsets; create one if there is none that can be read.
+    def pairings(self) -> Pairings:
+        """Return the paired headsets, with a key for the next one.
 
         Raises
         ------
         FileError
-            If a new key cannot be written.
+            If the file is damaged, or a new key cannot be written.
         """
-        with suppress(HandcalError, UnicodeDecodeError):
-            return read_pairing_key(self._key_path).decode()
-        return self.renew_pairing_key()
+        pairings = Pairings.read(self._key_path)
+        pairings.open_key()
+        return pairings
 
-    def renew_pairing_key(self) -> str:
-        """Replace the key; headsets with the old key can no longer connect.
+    def renew_pairing_key(self) -> Pairings:
+        """Forget all headsets and make a new key; headsets with an old key can no longer connect.
 
         Raises
         ------
         FileError
             If the key cannot be written.
         """
-        return write_pairing_key(self._key_path)
+        pairings = Pairings((), self._key_path)
+        pairings.open_key()
+        return pairings
 
 
 def _default_path() -> Path:

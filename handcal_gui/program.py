@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
+from handcal.link.pairing import Pairings
 from handcal.session.session import SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
@@ -93,7 +94,11 @@ class Program(QObject):
         self._preferences, complaint = file.load()
         self._use_theme()
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._use_theme)
-        self._pairing_key = file.pairing_key()
+        try:
+            self._pairings = file.pairings()
+        except FileError as error:
+            self._pairings = Pairings(())  # for this run: the damaged file stays as it is
+            complaint = f"{complaint} {error}".strip()
         panels = Panels(
             camera=CameraPanel(),
             cloud=CloudPanel(),
@@ -105,7 +110,7 @@ class Program(QObject):
             session=SessionPanel(),
             link=LinkPanel(),
         )
-        self.start = StartPage(self._preferences, self._pairing_key)
+        self.start = StartPage(self._preferences, self._pairings.open_key())
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
@@ -126,12 +131,12 @@ class Program(QObject):
     def start_calibration(self, settings: StationSettings, wearer: str) -> None:
         """Open a station for a wearer."""
         self._remember(replace(self._preferences.with_wearer(wearer), station=settings))
-        self._run(lambda: Station(settings, wearer, pairing_key=self._pairing_key))
+        self._run(lambda: Station(settings, wearer, pairings=self._pairings))
 
     def resume_session(self, path: Path) -> None:
         """Resume a session, at the station that was used last."""
         settings = self._preferences.station
-        self._run(lambda: Station(settings, resume=path, pairing_key=self._pairing_key))
+        self._run(lambda: Station(settings, resume=path, pairings=self._pairings))
 
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""
@@ -314,8 +319,8 @@ class Program(QObject):
             self.start.set_opening(False)
 
     def _renew_key(self) -> None:
-        self._pairing_key = self._file.renew_pairing_key()
-        self.start.set_pairing_key(self._pairing_key)
+        self._pairings = self._file.renew_pairing_key()
+        self.start.set_pairing_key(self._pairings.open_key())
         self.window.banner.show_message(
             "New pairing key created. Enter it in the headset; it takes effect at the next "
             "calibration."

@@ -134,6 +134,11 @@ def demo(arguments: argparse.Namespace) -> None:
         metavar="S",
         help="stop after this time (default: run until terminated)",
     ),
+    arg(
+        "--as-device",
+        action="store_true",
+        help="no simulated wearer: print what is shown, confirm on Enter",
+    ),
 )
 def headset(arguments: argparse.Namespace) -> None:
     """Run a virtual headset with a simulated wearer, connected by the real protocol."""
@@ -157,6 +162,7 @@ def headset(arguments: argparse.Namespace) -> None:
         ),
         clock_offset_s=arguments.clock_offset_ms / 1e3,
         duration_s=arguments.duration_s,
+        has_wearer=not arguments.as_device,
     )
     run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())
 

@@ -7,20 +7,26 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
+from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import messages, wire
+from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
+from handcal.link.messages import Owner
+from handcal.link.pairing import device_number
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
-from handcal.link.wire import Slot
-from handcal.types import EYES, Eye, Float64, Projection, Target
+from handcal.link.wire import Packet, Rejection, Slot
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection, Shape, Target
 
+MAX_WEARERS = 16
 _POSES_PER_DATAGRAM = 3
+_REFUSED_PERIOD_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,15 +37,37 @@ class HeadsetState:
     cursor_id: int = 0
     live_W_m: Float64 | None = None
     """(N, 3); the frozen and the live hand, frame W; None if not shown."""
+    live_eyes: tuple[Eye, ...] = EYES
+    """The eyes that draw the live hand."""
+    is_outline: bool = False
+    """True if `live_W_m` is the closed outline of the hand, point by point."""
     is_over_limit: bool = False
     """True if the live hand is rotated too far; the headset then draws it red."""
     prompt: str = ""
     eyes: tuple[Eye, ...] = EYES
     """The eyes to keep open."""
     projections: Mapping[Eye, Projection] = field(default_factory=dict)
-    """The projection of each eye, once the PC has sent it."""
+    """The projection of each eye, once the PC has sent it; all of one wearer and rig."""
+    is_offline: bool = False
+    """True while the offline calibration is to be drawn with."""
     target: Target | None = None
     """The user test's target; None if not shown."""
+    shape: Shape | None = None
+    """The shape fixed in the world; None if not shown."""
+    cursor_message: pb.Cursor | None = None
+    """The message by which the cursor came."""
+
+    @property
+    def drawn(self) -> dict[Eye, Projection]:
+        """The projections to draw with: `projections`, or those of the offline calibration."""
+        return drawn_projections(self.projections, self.is_offline)
+
+    @property
+    def owner(self) -> Owner:
+        """Wearer and rig of the projections."""
+        for projection in self.projections.values():
+            return Owner(projection.wearer, projection.rig)
+        return Owner()
 
 
 class HeadsetClient(Endpoint):
@@ -50,6 +78,8 @@ class HeadsetClient(Endpoint):
     server : (host, port)
     pairing_key : bytes
         Shared with the PC; at least 16 bytes.
+    identity : HeadsetIdentity
+        The headset's own; its `device_id` has 16 hexadecimal digits, and belongs to this device.
     clock_ns : callable
         The headset's clock, ns.
     settings : LinkSettings
@@ -61,35 +91,91 @@ class HeadsetClient(Endpoint):
     LinkError
         If the server's name or network is unknown.
     ValueError
-        If the key is too short.
+        If the key is too short, or the identity invalid.
     """
 
     def __init__(
         self,
         server: Address,
         pairing_key: bytes,
+        identity: HeadsetIdentity,
         clock_ns: Callable[[], int] = time.monotonic_ns,
         settings: LinkSettings = DEFAULT_SETTINGS,
         impairment: Impairment = UNIMPAIRED,
     ) -> None:
-        keys = wire.derive_keys(pairing_key)
+        if len(pairing_key) < wire.MIN_PAIRING_KEY_BYTES:
+            raise ValueError(f"the pairing key has fewer than {wire.MIN_PAIRING_KEY_BYTES} bytes")
+        self._device = device_number(identity.device_id)
+        messages.device(identity, Owner())  # ValueError before anything is opened
+        self._pairing_key = pairing_key
+        self._keys = wire.handshake_keys(pairing_key, self._device)
         self._server = resolve(*server)
         transport = UdpTransport(local_address(self._server), settings.receive_buffer_bytes)
-        super().__init__(
-            ImpairedTransport(transport, impairment), keys.to_pc, keys.to_headset, settings
-        )
+        super().__init__(ImpairedTransport(transport, impairment), settings)
+        self._identity = identity
         self._clock_ns = clock_ns
         self._recent_poses: deque[tuple[int, Float64]] = deque(maxlen=_POSES_PER_DATAGRAM)
         self._state = HeadsetState()
+        self._kept: dict[Owner, Mapping[Eye, Projection]] = {}
         self._live_frame = 0
+        self._live_count = 1
         self._live_chunks: dict[int, Float64] = {}
-        self._nonce = secrets.randbits(64)
-        self._joined_s = 0.0
+        self._nonce = secrets.token_bytes(wire.NONCE_BYTES)
+        self._cookie = b""
+        self._refusal = ""
+        self._hello_ns = 0
         self._next_hello_s = 0.0
         self._start()
 
+    @property
+    def refusal(self) -> str:
+        """The PC's reason for not connecting; empty if it has none."""
+        with self._changed:
+            return self._refusal
+
+    @property
+    def kept(self) -> Mapping[Owner, Mapping[Eye, Projection]]:
+        """The projections received, by wearer, of the rig that came last."""
+        with self._changed:
+            return MappingProxyType(dict(self._kept))
+
+    def show_kept(self, owner: Owner) -> None:
+        """Draw with the kept projections of a wearer until the PC sends others.
+
+        Raises
+        ------
+        KeyError
+            If there are none.
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            self._require_running()
+            self._state = replace(self._state, projections=self._kept[owner])
+            self._introduce()
+
+    def set_identity(self, identity: HeadsetIdentity) -> None:
+        """Send the identity again after it has changed, as when the runtime moves its view.
+
+        Raises
+        ------
+        ValueError
+            If it is invalid, or of another device.
+        LinkError
+            If the link is closed.
+        """
+        if identity.device_id != self._identity.device_id:
+            raise ValueError("a headset keeps its device_id")
+        messages.device(identity, Owner())
+        with self._changed:
+            self._require_running()
+            self._identity = identity
+            self._introduce()
+
     def send_pose(self, T_W_H: Float64, t_headset_ns: int) -> None:
         """Send the headset's pose at a time of its own clock.
+
+        The time is the one that the pose is for: of a pose predicted for display, that of display.
 
         Raises
         ------
@@ -101,15 +187,17 @@ class HeadsetClient(Endpoint):
             self._recent_poses.append((t_headset_ns, T_W_H))
             self._send(messages.poses(self._recent_poses))
 
-    def confirm(self, T_E_W: Mapping[Eye, Float64], t_headset_ns: int, cursor_id: int) -> Outgoing:
-        """Confirm reliably that the hand covers the cursor, with E0 of both eyes at that time.
+    def confirm(self, t_headset_ns: int, state: HeadsetState) -> Outgoing:
+        """Confirm reliably that the hand covers the cursor, with the state drawn at that time.
 
         Raises
         ------
         LinkError
             If the link is closed.
         """
-        return self._send_reliably(Slot.CONFIRM, messages.confirm(T_E_W, t_headset_ns, cursor_id))
+        digest = drawn_digest(state.drawn, state.cursor_message)
+        message = messages.confirm(t_headset_ns, state.cursor_id, digest)
+        return self._send_reliably(Slot.CONFIRM, message)
 
     def state(self) -> HeadsetState:
         """Return the state that the PC wants shown.
@@ -121,21 +209,56 @@ class HeadsetClient(Endpoint):
         """
         with self._changed:
             self._require_running()
-            points = np.concatenate([np.empty((0, 3)), *self._live_chunks.values()])
-            return replace(self._state, live_W_m=points if len(points) else None)
+            return replace(self._state, live_W_m=self._live_hand())
 
-    def _greet(self, envelope: pb.Envelope, address: Address) -> None:
-        welcome = envelope.welcome
-        is_mine = welcome.nonce == self._nonce and address == self._server
-        if self._channel is None and is_mine:
-            self._channel = Channel(welcome.session, address)
-            self._nonce = secrets.randbits(64)  # used once, so that no old welcome is accepted
-            self._dismissed = False
-            self._joined_s = time.monotonic()
-            self._next_hello_s = 0.0
-            self._live_frame = 0
-            self._live_chunks.clear()
-            self._state = HeadsetState(projections=self._state.projections)
+    def _silence(self, timeout_s: float) -> str:
+        return self._refusal or super()._silence(timeout_s)
+
+    def _greet(self, packet: Packet, datagram: bytes, address: Address) -> Rejection | None:
+        if address != self._server or packet.sequence != self._device:
+            return Rejection.WRONG_SESSION
+        if not wire.is_authentic(self._keys.to_headset, datagram):
+            return Rejection.UNPAIRED
+        envelope = messages.parse(packet.payload)
+        body = envelope.WhichOneof("body")
+        if body not in ("retry", "welcome", "refused"):
+            raise messages.MalformedError(f"no handshake has a {body}")
+        if self._channel is not None or getattr(envelope, body).nonce != self._nonce:
+            return Rejection.REPLAYED
+        match body:
+            case "retry":
+                is_first = not self._cookie
+                self._cookie = envelope.retry.cookie[: greetings.MAX_COOKIE_BYTES]
+                if is_first:  # or a PC that takes no cookie would be asked without a pause
+                    self._say_hello()
+            case "welcome":
+                self._join(greetings.read_welcome(envelope.welcome))
+            case "refused":
+                self._refusal = str(greetings.read_refused(envelope.refused))
+                self._begin_again()
+                self._next_hello_s = time.monotonic() + _REFUSED_PERIOD_S
+        return None
+
+    def _join(self, welcome: wire.Welcome) -> None:
+        keys = wire.session_keys(self._pairing_key, self._device, welcome)
+        self._channel = Channel(welcome.session, self._server, keys.to_pc, keys.to_headset)
+        self._begin_again()
+        self._dismissed = False
+        self._refusal = ""
+        self._next_hello_s = 0.0
+        self._live_frame = 0
+        self._live_chunks.clear()
+        self._state = HeadsetState(projections=self._state.projections)
+        self._introduce()
+
+    def _begin_again(self) -> None:
+        """Forget the handshake, so that no old answer is accepted."""
+        self._nonce = secrets.token_bytes(wire.NONCE_BYTES)
+        self._cookie = b""
+
+    def _introduce(self) -> None:
+        message = messages.device(self._identity, self._state.owner)
+        self._outbox.send(Slot.DEVICE, message.SerializeToString(), time.monotonic())
 
     def _handle(self, envelope: pb.Envelope) -> None:
         match envelope.WhichOneof("body"):
@@ -148,6 +271,7 @@ class HeadsetClient(Endpoint):
                     self._state,
                     cursor_W_m=points if len(points) else None,
                     cursor_id=cursor.cursor_id,
+                    cursor_message=cursor,
                 )
             case "live_hand":
                 self._take_live_hand(envelope.live_hand)
@@ -155,14 +279,30 @@ class HeadsetClient(Endpoint):
                 text, eyes = messages.read_prompt(envelope.prompt)
                 self._state = replace(self._state, prompt=text, eyes=eyes)
             case "projection":
-                projection = messages.read_projection(envelope.projection)
-                projections = {**self._state.projections, projection.eye: projection}
-                self._state = replace(self._state, projections=projections)
+                self._keep(messages.read_projection(envelope.projection))
+            case "show":
+                self._state = replace(self._state, is_offline=envelope.show.offline)
+            case "shape":
+                shape = messages.read_shape(envelope.shape)
+                self._state = replace(self._state, shape=shape)
             case "target":
                 target = messages.read_target(envelope.target)
                 self._state = replace(self._state, target=target)
             case other:
                 raise messages.MalformedError(f"a PC sends no {other}")
+
+    def _keep(self, projection: Projection) -> None:
+        """Draw with a projection, and keep it by its wearer; those of another rig are dropped."""
+        owner = Owner(projection.wearer, projection.rig)
+        previous = self._state.owner
+        projections = {**self._kept.pop(owner, {}), projection.eye: projection}
+        self._kept = {one: kept for one, kept in self._kept.items() if one.rig == owner.rig}
+        while len(self._kept) >= MAX_WEARERS:
+            del self._kept[next(iter(self._kept))]
+        self._kept[owner] = projections
+        self._state = replace(self._state, projections=projections)
+        if owner != previous:
+            self._introduce()
 
     def _take_live_hand(self, live: pb.LiveHand) -> None:
         if live.frame < self._live_frame:
@@ -171,8 +311,24 @@ class HeadsetClient(Endpoint):
             self._live_frame = live.frame
             self._live_chunks.clear()
         if live.chunk < messages.MAX_CHUNKS:
+            self._live_count = max(1, live.chunk_count)
             self._live_chunks[live.chunk] = messages.read_points(live.points)
-            self._state = replace(self._state, is_over_limit=live.red)
+            self._state = replace(
+                self._state,
+                is_over_limit=live.red,
+                is_outline=live.outline,
+                live_eyes=messages.read_eyes(live.eyes) or EYES,
+            )
+
+    def _live_hand(self) -> Float64 | None:
+        """Return the points of the chunks that have arrived, in order if all have."""
+        chunks = [points for _, points in sorted(self._live_chunks.items())]
+        points = np.concatenate([np.empty((0, 3)), *chunks])
+        shares = [len(points[chunk :: self._live_count]) for chunk in range(len(chunks))]
+        if len(chunks) == self._live_count and shares == [len(chunk) for chunk in chunks]:
+            for number, chunk in enumerate(chunks):
+                points[number :: self._live_count] = chunk
+        return points if len(points) else None
 
     def _answer(self, ping: pb.Ping) -> None:
         received_ns = self._clock_ns()
@@ -192,13 +348,14 @@ class HeadsetClient(Endpoint):
         if now_s < self._next_hello_s:
             return
         self._next_hello_s = now_s + self._settings.hello_period_s
-        channel = self._channel
-        if channel is not None and now_s - max(channel.heard_s, self._joined_s) > (
-            self._settings.silence_s
-        ):
-            self._channel = channel = None
-        if channel is None:
-            self._send_greeting(pb.Envelope(hello=pb.Hello(nonce=self._nonce)), self._server)
+        if self._channel is not None and self._is_silent(self._channel):
+            self._channel = None
+        if self._channel is None:
+            self._say_hello()
         else:
-            # The first opens the session on the PC; the others keep it alive.
-            self._send(messages.ack())
+            self._send(messages.ack())  # keeps the session alive
+
+    def _say_hello(self) -> None:
+        self._hello_ns = max(time.time_ns(), self._hello_ns + 1)
+        hello = greetings.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
+        self._post(greetings.seal(self._keys.to_pc, self._device, hello), self._server)

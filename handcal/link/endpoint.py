@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import threading
 import time
 from abc import abstractmethod
@@ -19,10 +18,9 @@ from handcal.link.messages import MalformedError
 from handcal.link.reliable import Delivery, Inbox, Outbox, Outgoing
 from handcal.link.settings import LinkSettings
 from handcal.link.transport import Address, Transport
-from handcal.link.wire import Packet, Rejection, ReplayWindow, Slot
+from handcal.link.wire import HANDSHAKE_SESSION, Packet, Rejection, ReplayWindow, Slot
 
 _LOG = logging.getLogger(__name__)
-_HANDSHAKE_SESSION = 0
 _BYES = 3
 
 
@@ -32,7 +30,9 @@ class Channel:
 
     session: int
     address: Address
-    heard_s: float = -math.inf
+    send_key: bytes
+    receive_key: bytes
+    heard_s: float = field(default_factory=time.monotonic)
     sequence: int = 0
     window: ReplayWindow = field(default_factory=ReplayWindow)
     inbox: Inbox = field(default_factory=Inbox)
@@ -45,12 +45,8 @@ class Endpoint(Closable):
     subclasses, which hold `_changed` while they use state shared with the thread.
     """
 
-    def __init__(
-        self, transport: Transport, send_key: bytes, receive_key: bytes, settings: LinkSettings
-    ) -> None:
+    def __init__(self, transport: Transport, settings: LinkSettings) -> None:
         self._transport = transport
-        self._send_key = send_key
-        self._receive_key = receive_key
         self._settings = settings
         self._changed = threading.Condition(threading.RLock())
         self._closing = threading.Event()
@@ -93,10 +89,7 @@ class Endpoint(Closable):
         with self._changed:
             self._wait_for(lambda: self.connected, timeout_s)
             if not self.connected:
-                raise LinkError(
-                    f"no device with this pairing key answered within {timeout_s:g} s; "
-                    "check the address, the key and the firewall"
-                )
+                raise LinkError(self._silence(timeout_s))
 
     def wait_acked(self, message: Outgoing, timeout_s: float) -> None:
         """Wait until the other end has acknowledged a message.
@@ -128,9 +121,16 @@ class Endpoint(Closable):
         self._thread.join()
         self._transport.close()
 
+    def _silence(self, timeout_s: float) -> str:
+        """Return the message for a connection that did not come about."""
+        return (
+            f"no device with this pairing key answered within {timeout_s:g} s; "
+            "check the address, the key and the firewall"
+        )
+
     @abstractmethod
-    def _greet(self, envelope: pb.Envelope, address: Address) -> None:
-        """Handle a message of the handshake."""
+    def _greet(self, packet: Packet, datagram: bytes, address: Address) -> Rejection | None:
+        """Handle a datagram of the handshake, not yet authenticated; return why it is dropped."""
 
     @abstractmethod
     def _handle(self, envelope: pb.Envelope) -> None:
@@ -177,29 +177,36 @@ class Endpoint(Closable):
         return self._settings.burst_pause_s if is_busy else self._settings.idle_wait_s
 
     def _take(self, datagram: bytes, address: Address) -> None:
-        packet = wire.unseal(self._receive_key, datagram)
-        if isinstance(packet, Rejection):
-            self._rejected[packet] += 1
-            return
         try:
-            if packet.session == _HANDSHAKE_SESSION:
-                self._greet(messages.parse(packet.payload), address)
-            elif (channel := self._find_channel(packet.session, address)) is None:
-                self._rejected[Rejection.WRONG_SESSION] += 1
-            elif not channel.window.accept(packet.sequence):
-                self._rejected[Rejection.REPLAYED] += 1
-            else:
-                self._received["datagrams"] += 1
-                self._received["bytes"] += len(datagram)
-                self._accept(channel, packet)
+            rejection = self._sort(datagram, address)
         except MalformedError:
-            self._rejected[Rejection.CORRUPT] += 1
+            rejection = Rejection.CORRUPT
+        if rejection is not None:
+            self._rejected[rejection] += 1
 
-    def _find_channel(self, session: int, address: Address) -> Channel | None:
+    def _sort(self, datagram: bytes, address: Address) -> Rejection | None:
+        """Handle a datagram; return the reason if it is dropped."""
+        packet = wire.read(datagram)
+        if packet is Rejection.WRONG_VERSION:
+            self._take_other_version(datagram, address)
+        if isinstance(packet, Rejection):
+            return packet
+        if packet.session == HANDSHAKE_SESSION:
+            return self._greet(packet, datagram, address)
         channel = self._channel
-        if channel is None or (channel.session, channel.address) != (session, address):
-            return None
-        return channel
+        if channel is None or (channel.session, channel.address) != (packet.session, address):
+            return Rejection.WRONG_SESSION
+        if not wire.is_authentic(channel.receive_key, datagram):
+            return Rejection.UNPAIRED
+        if not channel.window.accept(packet.sequence):
+            return Rejection.REPLAYED
+        self._received["datagrams"] += 1
+        self._received["bytes"] += len(datagram)
+        self._accept(channel, packet)
+        return None
+
+    def _take_other_version(self, datagram: bytes, address: Address) -> None:
+        """Handle a datagram of another version."""
 
     def _accept(self, channel: Channel, packet: Packet) -> None:
         channel.heard_s = time.monotonic()
@@ -257,15 +264,10 @@ class Endpoint(Closable):
         if channel is None:
             return
         channel.sequence += 1
-        self._post(
-            replace(packet, session=channel.session, sequence=channel.sequence), channel.address
-        )
+        packet = replace(packet, session=channel.session, sequence=channel.sequence)
+        self._post(wire.seal(channel.send_key, packet), channel.address)
 
-    def _send_greeting(self, envelope: pb.Envelope, address: Address) -> None:
-        self._post(Packet(envelope.SerializeToString(), _HANDSHAKE_SESSION), address)
-
-    def _post(self, packet: Packet, address: Address) -> None:
-        datagram = wire.seal(self._send_key, packet)
+    def _post(self, datagram: bytes, address: Address) -> None:
         self._sent["datagrams"] += 1
         self._sent["bytes"] += len(datagram)
         self._transport.send(datagram, address)

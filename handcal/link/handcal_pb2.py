@@ -24,47 +24,61 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\rhandcal.proto\x12\x0chandcal.link\"\x93\x04\n\x08\x45nvelope\x12$\n\x05hello\x18\x01 \x01(\x0b\x32\x13.handcal.link.HelloH\x00\x12$\n\x05poses\x18\x02 \x01(\x0b\x32\x13.handcal.link.PosesH\x00\x12(\n\x07\x63onfirm\x18\x03 \x01(\x0b\x32\x15.handcal.link.ConfirmH\x00\x12\"\n\x04pong\x18\x04 \x01(\x0b\x32\x12.handcal.link.PongH\x00\x12(\n\x07welcome\x18\x05 \x01(\x0b\x32\x15.handcal.link.WelcomeH\x00\x12\"\n\x04ping\x18\x06 \x01(\x0b\x32\x12.handcal.link.PingH\x00\x12&\n\x06\x63ursor\x18\x07 \x01(\x0b\x32\x14.handcal.link.CursorH\x00\x12+\n\tlive_hand\x18\x08 \x01(\x0b\x32\x16.handcal.link.LiveHandH\x00\x12&\n\x06prompt\x18\t \x01(\x0b\x32\x14.handcal.link.PromptH\x00\x12.\n\nprojection\x18\n \x01(\x0b\x32\x18.handcal.link.ProjectionH\x00\x12&\n\x06target\x18\r \x01(\x0b\x32\x14.handcal.link.TargetH\x00\x12 \n\x03\x61\x63k\x18\x0b \x01(\x0b\x32\x11.handcal.link.AckH\x00\x12 \n\x03\x62ye\x18\x0c \x01(\x0b\x32\x11.handcal.link.ByeH\x00\x42\x06\n\x04\x62ody\"\x16\n\x05Hello\x12\r\n\x05nonce\x18\x01 \x01(\x06\")\n\x07Welcome\x12\r\n\x05nonce\x18\x01 \x01(\x06\x12\x0f\n\x07session\x18\x02 \x01(\x06\"+\n\x04Pose\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\r\n\x05T_W_H\x18\x02 \x03(\x01\"*\n\x05Poses\x12!\n\x05poses\x18\x01 \x03(\x0b\x32\x12.handcal.link.Pose\"[\n\x07\x43onfirm\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\x11\n\tcursor_id\x18\x02 \x01(\r\x12\x12\n\nT_E_W_left\x18\x03 \x03(\x01\x12\x13\n\x0bT_E_W_right\x18\x04 \x03(\x01\"\x1e\n\x04Ping\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\"\x84\x01\n\x04Pong\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\x12\x1d\n\x15t_received_headset_ns\x18\x02 \x01(\x10\x12\x19\n\x11t_sent_headset_ns\x18\x03 \x01(\x10\x12\x18\n\x10highest_sequence\x18\x04 \x01(\x04\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x05 \x01(\x04\"+\n\x06Points\x12\x10\n\x08origin_m\x18\x01 \x03(\x01\x12\x0f\n\x07offsets\x18\x02 \x01(\x0c\"A\n\x06\x43ursor\x12\x11\n\tcursor_id\x18\x01 \x01(\r\x12$\n\x06points\x18\x02 \x01(\x0b\x32\x14.handcal.link.Points\"p\n\x08LiveHand\x12\r\n\x05\x66rame\x18\x01 \x01(\r\x12\r\n\x05\x63hunk\x18\x02 \x01(\r\x12\x13\n\x0b\x63hunk_count\x18\x03 \x01(\r\x12\x0b\n\x03red\x18\x04 \x01(\x08\x12$\n\x06points\x18\x05 \x01(\x0b\x32\x14.handcal.link.Points\"7\n\x06Prompt\x12\x0c\n\x04text\x18\x01 \x01(\t\x12\x1f\n\x04\x65yes\x18\x02 \x03(\x0e\x32\x11.handcal.link.Eye\"\\\n\nProjection\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\t\n\x01P\x18\x02 \x03(\x01\x12\x10\n\x08width_px\x18\x03 \x01(\r\x12\x11\n\theight_px\x18\x04 \x01(\r\"=\n\x06Target\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\x13\n\x0b\x63orners_V_m\x18\x02 \x03(\x01\"t\n\x03\x41\x63k\x12,\n\x08received\x18\x01 \x03(\x0b\x32\x1a.handcal.link.Ack.Received\x1a?\n\x08Received\x12\x0c\n\x04slot\x18\x01 \x01(\r\x12\x12\n\nmessage_id\x18\x02 \x01(\r\x12\x11\n\tfragments\x18\x03 \x01(\x0c\"\x05\n\x03\x42ye*7\n\x03\x45ye\x12\x13\n\x0f\x45YE_UNSPECIFIED\x10\x00\x12\x0c\n\x08\x45YE_LEFT\x10\x01\x12\r\n\tEYE_RIGHT\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\rhandcal.proto\x12\x0chandcal.link\"\xd5\x05\n\x08\x45nvelope\x12$\n\x05hello\x18\x01 \x01(\x0b\x32\x13.handcal.link.HelloH\x00\x12$\n\x05poses\x18\x02 \x01(\x0b\x32\x13.handcal.link.PosesH\x00\x12(\n\x07\x63onfirm\x18\x03 \x01(\x0b\x32\x15.handcal.link.ConfirmH\x00\x12\"\n\x04pong\x18\x04 \x01(\x0b\x32\x12.handcal.link.PongH\x00\x12&\n\x06\x64\x65vice\x18\x10 \x01(\x0b\x32\x14.handcal.link.DeviceH\x00\x12$\n\x05retry\x18\x0e \x01(\x0b\x32\x13.handcal.link.RetryH\x00\x12(\n\x07refused\x18\x0f \x01(\x0b\x32\x15.handcal.link.RefusedH\x00\x12(\n\x07welcome\x18\x05 \x01(\x0b\x32\x15.handcal.link.WelcomeH\x00\x12\"\n\x04ping\x18\x06 \x01(\x0b\x32\x12.handcal.link.PingH\x00\x12&\n\x06\x63ursor\x18\x07 \x01(\x0b\x32\x14.handcal.link.CursorH\x00\x12+\n\tlive_hand\x18\x08 \x01(\x0b\x32\x16.handcal.link.LiveHandH\x00\x12&\n\x06prompt\x18\t \x01(\x0b\x32\x14.handcal.link.PromptH\x00\x12.\n\nprojection\x18\n \x01(\x0b\x32\x18.handcal.link.ProjectionH\x00\x12&\n\x06target\x18\r \x01(\x0b\x32\x14.handcal.link.TargetH\x00\x12$\n\x05shape\x18\x11 \x01(\x0b\x32\x13.handcal.link.ShapeH\x00\x12\"\n\x04show\x18\x12 \x01(\x0b\x32\x12.handcal.link.ShowH\x00\x12 \n\x03\x61\x63k\x18\x0b \x01(\x0b\x32\x11.handcal.link.AckH\x00\x12 \n\x03\x62ye\x18\x0c \x01(\x0b\x32\x11.handcal.link.ByeH\x00\x42\x06\n\x04\x62ody\"E\n\x05Hello\x12\r\n\x05nonce\x18\x01 \x01(\x0c\x12\x0f\n\x07time_ns\x18\x02 \x01(\x06\x12\x0e\n\x06\x63ookie\x18\x03 \x01(\x0c\x12\x0c\n\x04name\x18\x04 \x01(\t\"&\n\x05Retry\x12\r\n\x05nonce\x18\x01 \x01(\x0c\x12\x0e\n\x06\x63ookie\x18\x02 \x01(\x0c\";\n\x07Welcome\x12\r\n\x05nonce\x18\x01 \x01(\x0c\x12\x0f\n\x07session\x18\x02 \x01(\x06\x12\x10\n\x08pc_nonce\x18\x03 \x01(\x0c\"N\n\x07Refused\x12\r\n\x05nonce\x18\x01 \x01(\x0c\x12%\n\x06reason\x18\x02 \x01(\x0e\x32\x15.handcal.link.Refusal\x12\r\n\x05other\x18\x03 \x01(\t\"l\n\x04View\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\r\n\x05T_V_H\x18\x02 \x03(\x01\x12\x10\n\x08tangents\x18\x03 \x03(\x01\x12\x10\n\x08width_px\x18\x04 \x01(\r\x12\x11\n\theight_px\x18\x05 \x01(\r\"\xaa\x01\n\x06\x44\x65vice\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0f\n\x07runtime\x18\x02 \x01(\t\x12\x0b\n\x03\x61pp\x18\x03 \x01(\t\x12\x10\n\x08protocol\x18\x04 \x01(\r\x12!\n\x05views\x18\x05 \x03(\x0b\x32\x12.handcal.link.View\x12\x16\n\x0e\x65ye_distance_m\x18\x06 \x01(\x01\x12\x14\n\x0cshown_wearer\x18\x07 \x01(\t\x12\x11\n\tshown_rig\x18\x08 \x01(\t\"+\n\x04Pose\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\r\n\x05T_W_H\x18\x02 \x03(\x01\"*\n\x05Poses\x12!\n\x05poses\x18\x01 \x03(\x0b\x32\x12.handcal.link.Pose\"A\n\x07\x43onfirm\x12\x14\n\x0ct_headset_ns\x18\x01 \x01(\x10\x12\x11\n\tcursor_id\x18\x02 \x01(\r\x12\r\n\x05\x64rawn\x18\x03 \x01(\x0c\"\x1e\n\x04Ping\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\"\x84\x01\n\x04Pong\x12\x16\n\x0et_sent_host_ns\x18\x01 \x01(\x10\x12\x1d\n\x15t_received_headset_ns\x18\x02 \x01(\x10\x12\x19\n\x11t_sent_headset_ns\x18\x03 \x01(\x10\x12\x18\n\x10highest_sequence\x18\x04 \x01(\x04\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x05 \x01(\x04\"+\n\x06Points\x12\x10\n\x08origin_m\x18\x01 \x03(\x01\x12\x0f\n\x07offsets\x18\x02 \x01(\x0c\"A\n\x06\x43ursor\x12\x11\n\tcursor_id\x18\x01 \x01(\r\x12$\n\x06points\x18\x02 \x01(\x0b\x32\x14.handcal.link.Points\"\xa2\x01\n\x08LiveHand\x12\r\n\x05\x66rame\x18\x01 \x01(\r\x12\r\n\x05\x63hunk\x18\x02 \x01(\r\x12\x13\n\x0b\x63hunk_count\x18\x03 \x01(\r\x12\x0b\n\x03red\x18\x04 \x01(\x08\x12$\n\x06points\x18\x05 \x01(\x0b\x32\x14.handcal.link.Points\x12\x0f\n\x07outline\x18\x06 \x01(\x08\x12\x1f\n\x04\x65yes\x18\x07 \x03(\x0e\x32\x11.handcal.link.Eye\"7\n\x06Prompt\x12\x0c\n\x04text\x18\x01 \x01(\t\x12\x1f\n\x04\x65yes\x18\x02 \x03(\x0e\x32\x11.handcal.link.Eye\"\x9b\x01\n\nProjection\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\t\n\x01P\x18\x02 \x03(\x01\x12\x10\n\x08width_px\x18\x03 \x01(\r\x12\x11\n\theight_px\x18\x04 \x01(\r\x12\r\n\x05T_V_H\x18\x05 \x03(\x01\x12\x11\n\tP_offline\x18\x06 \x03(\x01\x12\x0e\n\x06wearer\x18\x07 \x01(\t\x12\x0b\n\x03rig\x18\x08 \x01(\t\"=\n\x06Target\x12\x1e\n\x03\x65ye\x18\x01 \x01(\x0e\x32\x11.handcal.link.Eye\x12\x13\n\x0b\x63orners_V_m\x18\x02 \x03(\x01\"=\n\x05Shape\x12\x13\n\x0b\x63orners_W_m\x18\x01 \x03(\x01\x12\x1f\n\x04\x65yes\x18\x02 \x03(\x0e\x32\x11.handcal.link.Eye\"\x17\n\x04Show\x12\x0f\n\x07offline\x18\x01 \x01(\x08\"t\n\x03\x41\x63k\x12,\n\x08received\x18\x01 \x03(\x0b\x32\x1a.handcal.link.Ack.Received\x1a?\n\x08Received\x12\x0c\n\x04slot\x18\x01 \x01(\r\x12\x12\n\nmessage_id\x18\x02 \x01(\r\x12\x11\n\tfragments\x18\x03 \x01(\x0c\"\x05\n\x03\x42ye*7\n\x03\x45ye\x12\x13\n\x0f\x45YE_UNSPECIFIED\x10\x00\x12\x0c\n\x08\x45YE_LEFT\x10\x01\x12\r\n\tEYE_RIGHT\x10\x02*K\n\x07Refusal\x12\x17\n\x13REFUSAL_UNSPECIFIED\x10\x00\x12\x10\n\x0cREFUSAL_BUSY\x10\x01\x12\x15\n\x11REFUSAL_KEY_TAKEN\x10\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'handcal_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_EYE']._serialized_start=1546
-  _globals['_EYE']._serialized_end=1601
+  _globals['_EYE']._serialized_start=2385
+  _globals['_EYE']._serialized_end=2440
+  _globals['_REFUSAL']._serialized_start=2442
+  _globals['_REFUSAL']._serialized_end=2517
   _globals['_ENVELOPE']._serialized_start=32
-  _globals['_ENVELOPE']._serialized_end=563
-  _globals['_HELLO']._serialized_start=565
-  _globals['_HELLO']._serialized_end=587
-  _globals['_WELCOME']._serialized_start=589
-  _globals['_WELCOME']._serialized_end=630
-  _globals['_POSE']._serialized_start=632
-  _globals['_POSE']._serialized_end=675
-  _globals['_POSES']._serialized_start=677
-  _globals['_POSES']._serialized_end=719
-  _globals['_CONFIRM']._serialized_start=721
-  _globals['_CONFIRM']._serialized_end=812
-  _globals['_PING']._serialized_start=814
-  _globals['_PING']._serialized_end=844
-  _globals['_PONG']._serialized_start=847
-  _globals['_PONG']._serialized_end=979
-  _globals['_POINTS']._serialized_start=981
-  _globals['_POINTS']._serialized_end=1024
-  _globals['_CURSOR']._serialized_start=1026
-  _globals['_CURSOR']._serialized_end=1091
-  _globals['_LIVEHAND']._serialized_start=1093
-  _globals['_LIVEHAND']._serialized_end=1205
-  _globals['_PROMPT']._serialized_start=1207
-  _globals['_PROMPT']._serialized_end=1262
-  _globals['_PROJECTION']._serialized_start=1264
-  _globals['_PROJECTION']._serialized_end=1356
-  _globals['_TARGET']._serialized_start=1358
-  _globals['_TARGET']._serialized_end=1419
-  _globals['_ACK']._serialized_start=1421
-  _globals['_ACK']._serialized_end=1537
-  _globals['_ACK_RECEIVED']._serialized_start=1474
-  _globals['_ACK_RECEIVED']._serialized_end=1537
-  _globals['_BYE']._serialized_start=1539
-  _globals['_BYE']._serialized_end=1544
+  _globals['_ENVELOPE']._serialized_end=757
+  _globals['_HELLO']._serialized_start=759
+  _globals['_HELLO']._serialized_end=828
+  _globals['_RETRY']._serialized_start=830
+  _globals['_RETRY']._serialized_end=868
+  _globals['_WELCOME']._serialized_start=870
+  _globals['_WELCOME']._serialized_end=929
+  _globals['_REFUSED']._serialized_start=931
+  _globals['_REFUSED']._serialized_end=1009
+  _globals['_VIEW']._serialized_start=1011
+  _globals['_VIEW']._serialized_end=1119
+  _globals['_DEVICE']._serialized_start=1122
+  _globals['_DEVICE']._serialized_end=1292
+  _globals['_POSE']._serialized_start=1294
+  _globals['_POSE']._serialized_end=1337
+  _globals['_POSES']._serialized_start=1339
+  _globals['_POSES']._serialized_end=1381
+  _globals['_CONFIRM']._serialized_start=1383
+  _globals['_CONFIRM']._serialized_end=1448
+  _globals['_PING']._serialized_start=1450
+  _globals['_PING']._serialized_end=1480
+  _globals['_PONG']._serialized_start=1483
+  _globals['_PONG']._serialized_end=1615
+  _globals['_POINTS']._serialized_start=1617
+  _globals['_POINTS']._serialized_end=1660
+  _globals['_CURSOR']._serialized_start=1662
+  _globals['_CURSOR']._serialized_end=1727
+  _globals['_LIVEHAND']._serialized_start=1730
+  _globals['_LIVEHAND']._serialized_end=1892
+  _globals['_PROMPT']._serialized_start=1894
+  _globals['_PROMPT']._serialized_end=1949
+  _globals['_PROJECTION']._serialized_start=1952
+  _globals['_PROJECTION']._serialized_end=2107
+  _globals['_TARGET']._serialized_start=2109
+  _globals['_TARGET']._serialized_end=2170
+  _globals['_SHAPE']._serialized_start=2172
+  _globals['_SHAPE']._serialized_end=2233
+  _globals['_SHOW']._serialized_start=2235
+  _globals['_SHOW']._serialized_end=2258
+  _globals['_ACK']._serialized_start=2260
+  _globals['_ACK']._serialized_end=2376
+  _globals['_ACK_RECEIVED']._serialized_start=2313
+  _globals['_ACK_RECEIVED']._serialized_end=2376
+  _globals['_BYE']._serialized_start=2378
+  _globals['_BYE']._serialized_end=2383
 # @@protoc_insertion_point(module_scope)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -15,15 +16,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from handcal.geometry import is_rigid
 from handcal.link import handcal_pb2 as pb
+from handcal.link.drawn import DIGEST_BYTES
+from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.reliable import Receipt
 from handcal.link.wire import MAX_FRAGMENTS, Slot
-from handcal.types import EYES, Eye, Float64, Projection, Target
+from handcal.types import (
+    EYES,
+    Eye,
+    Float64,
+    HeadsetIdentity,
+    HeadsetView,
+    Projection,
+    Shape,
+    Target,
+)
 
 QUANTUM_M = 1e-4
 MAX_POINTS = 50_000
 CHUNK_POINTS = 200
 MAX_CHUNKS = MAX_POINTS // CHUNK_POINTS
 MAX_PROMPT_CHARACTERS = 500
+MAX_OWNER_CHARACTERS = 200
+MAX_DISPLAY_PX = 65_535
 
 PROJECTION_SLOTS: Mapping[Eye, Slot] = {
     "left": Slot.PROJECTION_LEFT,
@@ -32,6 +46,7 @@ PROJECTION_SLOTS: Mapping[Eye, Slot] = {
 _EYE_CODES: Mapping[Eye, pb.Eye] = {"left": pb.EYE_LEFT, "right": pb.EYE_RIGHT}
 _EYES: Mapping[int, Eye] = {code: eye for eye, code in _EYE_CODES.items()}
 _REACH_M = 1e3
+_MAX_EYE_DISTANCE_M = 0.2
 
 
 class MalformedError(Exception):
@@ -44,6 +59,78 @@ def parse(payload: bytes) -> pb.Envelope:
         return pb.Envelope.FromString(payload)
     except DecodeError as error:
         raise MalformedError(str(error)) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Owner:
+    """Wearer and rig of projections; empty if there are none."""
+
+    wearer: str = ""
+    rig: str = ""
+
+
+def device(value: HeadsetIdentity, shown: Owner) -> pb.Envelope:
+    """Make the headset's introduction, with the owner of the projections it shows.
+
+    Raises
+    ------
+    ValueError
+        If a text is too long, or a view is not finite.
+    """
+    texts = (value.name, value.runtime, value.app)
+    if not all(_is_text(text, MAX_NAME_CHARACTERS) for text in texts):
+        raise ValueError(
+            f"name, runtime and app have at most {MAX_NAME_CHARACTERS} characters in one line"
+        )
+    if not all(np.isfinite([*v.T_V_H.ravel(), *v.tangents]).all() for v in value.views.values()):
+        raise ValueError("the views must be finite")
+    return pb.Envelope(
+        device=pb.Device(
+            name=value.name,
+            runtime=value.runtime,
+            app=value.app,
+            protocol=value.protocol,
+            views=[
+                pb.View(
+                    eye=_EYE_CODES[eye],
+                    T_V_H=_flat(view.T_V_H),
+                    tangents=view.tangents.tolist(),
+                    width_px=view.width_px,
+                    height_px=view.height_px,
+                )
+                for eye, view in value.views.items()
+            ],
+            eye_distance_m=value.eye_distance_m or 0.0,
+            shown_wearer=shown.wearer,
+            shown_rig=shown.rig,
+        )
+    )
+
+
+def read_device(message: pb.Device, device_id: str) -> tuple[HeadsetIdentity, Owner]:
+    """Read a headset's introduction, and the owner of the projections that it shows."""
+    if len(message.views) > len(EYES):
+        raise MalformedError("more views than eyes")
+    distance_m = message.eye_distance_m
+    if not 0.0 <= distance_m < _MAX_EYE_DISTANCE_M:
+        raise MalformedError("an eye distance that no wearer has")
+    identity = HeadsetIdentity(
+        device_id,
+        name=read_text(message.name, MAX_NAME_CHARACTERS),
+        runtime=read_text(message.runtime, MAX_NAME_CHARACTERS),
+        app=read_text(message.app, MAX_NAME_CHARACTERS),
+        protocol=message.protocol,
+        views={
+            _eye(view.eye): HeadsetView(
+                _rigid(view.T_V_H),
+                _numbers(view.tangents, 4),
+                *_size(view.width_px, view.height_px),
+            )
+            for view in message.views
+        },
+        eye_distance_m=distance_m or None,
+    )
+    return identity, _owner(message.shown_wearer, message.shown_rig)
 
 
 def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
@@ -59,7 +146,13 @@ def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
     return pb.Envelope(cursor=pb.Cursor(cursor_id=cursor_id, points=points))
 
 
-def live_hand(points_W_m: ArrayLike, is_over_limit: bool, frame: int) -> list[pb.Envelope]:
+def live_hand(
+    points_W_m: ArrayLike,
+    is_over_limit: bool,
+    frame: int,
+    eyes: Sequence[Eye] = EYES,
+    is_outline: bool = False,
+) -> list[pb.Envelope]:
     """Make the chunks of a live hand, interleaved so that a lost chunk leaves no hole.
 
     Raises
@@ -77,6 +170,8 @@ def live_hand(points_W_m: ArrayLike, is_over_limit: bool, frame: int) -> list[pb
                 chunk_count=count,
                 red=is_over_limit,
                 points=pb.Points(origin_m=origin_m, offsets=offsets[chunk::count].tobytes()),
+                outline=is_outline,
+                eyes=[_EYE_CODES[eye] for eye in eyes],
             )
         )
         for chunk in range(count)
@@ -125,7 +220,14 @@ def read_prompt(message: pb.Prompt) -> tuple[str, tuple[Eye, ...]]:
     """Read a text and the eyes to keep open."""
     if len(message.text) > MAX_PROMPT_CHARACTERS or len(message.eyes) > len(EYES):
         raise MalformedError("a prompt that is too long")
-    return message.text, tuple(_eye(code) for code in message.eyes)
+    return message.text, read_eyes(message.eyes)
+
+
+def read_eyes(codes: Sequence[int]) -> tuple[Eye, ...]:
+    """Read a list of eyes."""
+    if len(codes) > len(EYES):
+        raise MalformedError("more eyes than two")
+    return tuple(_eye(code) for code in codes)
 
 
 def projection(value: Projection) -> pb.Envelope:
@@ -134,16 +236,23 @@ def projection(value: Projection) -> pb.Envelope:
     Raises
     ------
     ValueError
-        If it is not finite.
+        If it is not finite, or a text is too long.
     """
-    if not np.isfinite(value.P).all():
+    offline = value.P if value.P_offline is None else value.P_offline
+    if not np.isfinite(np.concatenate([value.P, offline, value.T_V_H])).all():
         raise ValueError("the projection must be finite")
+    if not all(_is_text(text, MAX_OWNER_CHARACTERS) for text in (value.wearer, value.rig)):
+        raise ValueError(f"wearer and rig have at most {MAX_OWNER_CHARACTERS} characters")
     return pb.Envelope(
         projection=pb.Projection(
             eye=_EYE_CODES[value.eye],
             P=value.P.ravel().tolist(),
             width_px=value.width_px,
             height_px=value.height_px,
+            T_V_H=_flat(value.T_V_H),
+            P_offline=offline.ravel().tolist(),
+            wearer=value.wearer,
+            rig=value.rig,
         )
     )
 
@@ -151,7 +260,16 @@ def projection(value: Projection) -> pb.Envelope:
 def read_projection(message: pb.Projection) -> Projection:
     """Read a projection."""
     P = _numbers(message.P, 12).reshape(3, 4)
-    return Projection(_eye(message.eye), P, message.width_px, message.height_px)
+    owner = _owner(message.wearer, message.rig)
+    return Projection(
+        _eye(message.eye),
+        P,
+        *_size(message.width_px, message.height_px),
+        _rigid(message.T_V_H),
+        _numbers(message.P_offline, 12).reshape(3, 4) if message.P_offline else P,
+        owner.wearer,
+        owner.rig,
+    )
 
 
 def target(value: Target | None) -> pb.Envelope:
@@ -177,6 +295,33 @@ def read_target(message: pb.Target) -> Target | None:
     return Target(_eye(message.eye), _numbers(message.corners_V_m, 12).reshape(4, 3))
 
 
+def shape(value: Shape | None) -> pb.Envelope:
+    """Make a shape fixed in the world; None removes it.
+
+    Raises
+    ------
+    ValueError
+        If it is not finite.
+    """
+    if value is None:
+        return pb.Envelope(shape=pb.Shape())
+    if not np.isfinite(value.corners_W_m).all():
+        raise ValueError("the shape must be finite")
+    corners = value.corners_W_m.ravel().tolist()
+    eyes = [_EYE_CODES[eye] for eye in value.eyes]
+    return pb.Envelope(shape=pb.Shape(corners_W_m=corners, eyes=eyes))
+
+
+def read_shape(message: pb.Shape) -> Shape | None:
+    """Read a shape; None if it is removed."""
+    count = len(message.corners_W_m)
+    if not count:
+        return None
+    if count not in (12, 24):
+        raise MalformedError("a shape with neither 4 corners nor 8")
+    return Shape(_numbers(message.corners_W_m, count).reshape(-1, 3), read_eyes(message.eyes))
+
+
 def poses(recent: Iterable[tuple[int, Float64]]) -> pb.Envelope:
     """Make a message of ``(t_headset_ns, T_W_H)``."""
     return pb.Envelope(
@@ -190,21 +335,18 @@ def read_poses(message: pb.Poses) -> Iterator[tuple[int, Float64]]:
         yield pose.t_headset_ns, _rigid(pose.T_W_H)
 
 
-def confirm(T_E_W: Mapping[Eye, Float64], t_headset_ns: int, cursor_id: int) -> pb.Envelope:
-    """Make a confirmation with E0(t_b) of both eyes."""
+def confirm(t_headset_ns: int, cursor_id: int, drawn: bytes) -> pb.Envelope:
+    """Make a confirmation with the digest of what is drawn at that time."""
     return pb.Envelope(
-        confirm=pb.Confirm(
-            t_headset_ns=t_headset_ns,
-            cursor_id=cursor_id,
-            T_E_W_left=_flat(T_E_W["left"]),
-            T_E_W_right=_flat(T_E_W["right"]),
-        )
+        confirm=pb.Confirm(t_headset_ns=t_headset_ns, cursor_id=cursor_id, drawn=drawn)
     )
 
 
-def read_confirm(message: pb.Confirm) -> dict[Eye, Float64]:
-    """Read ``T_E_W`` of both eyes."""
-    return {"left": _rigid(message.T_E_W_left), "right": _rigid(message.T_E_W_right)}
+def read_confirm(message: pb.Confirm) -> pb.Confirm:
+    """Return a confirmation whose digest has the right size."""
+    if len(message.drawn) != DIGEST_BYTES:
+        raise MalformedError("a confirmation without a digest")
+    return message
 
 
 def ack(receipts: Iterable[Receipt] = ()) -> pb.Envelope:
@@ -257,3 +399,24 @@ def _eye(code: int) -> Eye:
     if eye is None:
         raise MalformedError(f"unknown eye {code}")
     return eye
+
+
+def read_text(text: str, most: int) -> str:
+    """Return a text of at most this many characters, without control characters."""
+    if not _is_text(text, most):
+        raise MalformedError(f"a text of more than {most} characters, or with control characters")
+    return text
+
+
+def _is_text(text: str, most: int) -> bool:
+    return len(text) <= most and all(character >= " " for character in text)
+
+
+def _owner(wearer: str, rig: str) -> Owner:
+    return Owner(read_text(wearer, MAX_OWNER_CHARACTERS), read_text(rig, MAX_OWNER_CHARACTERS))
+
+
+def _size(width_px: int, height_px: int) -> tuple[int, int]:
+    if not (0 < width_px <= MAX_DISPLAY_PX and 0 < height_px <= MAX_DISPLAY_PX):
+        raise MalformedError("a display of an impossible size")
+    return width_px, height_px

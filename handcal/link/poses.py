@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import bisect
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from handcal.errors import PoseError, PosePendingError
 from handcal.geometry import interpolate_pose
 from handcal.types import Float64
+
+SLOW_M = 0.005
+SLOW_RAD = 0.01
+"""A head that has moved and turned less than this across a gap is slow."""
 
 
 class PoseBuffer:
@@ -16,13 +23,16 @@ class PoseBuffer:
     ----------
     capacity : int
         Number of poses stored.
-    max_gap_s : float
-        Longest gap between two poses that is interpolated.
+    max_gap_s, max_slow_gap_s : float
+        Longest gap between two poses that is interpolated, and longest of a slow head.
     """
 
-    def __init__(self, capacity: int = 1000, max_gap_s: float = 0.05) -> None:
+    def __init__(
+        self, capacity: int = 1000, max_gap_s: float = 0.05, max_slow_gap_s: float = 0.25
+    ) -> None:
         self._capacity = capacity
         self._max_gap_ns = round(max_gap_s * 1e9)
+        self._max_slow_gap_ns = round(max_slow_gap_s * 1e9)
         self._times_ns: list[int] = []
         self._poses: list[Float64] = []
 
@@ -59,14 +69,17 @@ class PoseBuffer:
         if index == 0:
             late_ms = (times[0] - t_headset_ns) / 1e6
             raise PoseError(f"the time lies {late_ms:.0f} ms before the oldest pose kept")
+        before, after = self._poses[index - 1 : index + 1]
         gap_ns = times[index] - times[index - 1]
-        if gap_ns > self._max_gap_ns:
+        limit_ns = self._max_gap_ns
+        if gap_ns > limit_ns and _is_slow(before, after):
+            limit_ns = self._max_slow_gap_ns
+        if gap_ns > limit_ns:
             raise PoseError(
                 f"the headset's poses have a gap of {gap_ns / 1e6:.0f} ms at this time; "
-                f"at most {self._max_gap_ns / 1e6:.0f} ms can be interpolated"
+                f"at most {limit_ns / 1e6:.0f} ms can be interpolated at this speed of the head"
             )
-        fraction = (t_headset_ns - times[index - 1]) / gap_ns
-        return interpolate_pose(self._poses[index - 1], self._poses[index], fraction)
+        return interpolate_pose(before, after, (t_headset_ns - times[index - 1]) / gap_ns)
 
     def rate_hz(self) -> float:
         """Return the mean rate over the newest second of poses; 0 with fewer than two."""
@@ -75,3 +88,9 @@ class PoseBuffer:
         )
         recent = self._times_ns[first:]
         return (len(recent) - 1) / (recent[-1] - recent[0]) * 1e9 if len(recent) > 1 else 0.0
+
+
+def _is_slow(before: Float64, after: Float64) -> bool:
+    turn = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).magnitude()
+    moved_m = np.linalg.norm(after[:3, 3] - before[:3, 3])
+    return bool(moved_m < SLOW_M and turn < SLOW_RAD)

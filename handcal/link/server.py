@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import secrets
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handcal.errors import FileError
+from handcal.link import greetings, messages, version1, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import messages, wire
 from handcal.link.clock import ClockEstimator
+from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
+from handcal.link.greetings import Refusal
+from handcal.link.handshake import Caller, Limiter, Reception
+from handcal.link.messages import Owner
+from handcal.link.pairing import Pairing, Pairings
 from handcal.link.poses import PoseBuffer
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.transport import Address, UdpTransport
-from handcal.link.wire import Rejection, Slot
-from handcal.types import EYES, Eye, Float64, Projection, Target
+from handcal.link.wire import Packet, Rejection, Slot, Welcome
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection, Shape, Target
 
 LOOPBACK: Address = ("127.0.0.1", 0)
-_MAX_OFFERS = 16
+_LOG = logging.getLogger(__name__)
 _MAX_CONFIRMATIONS = 64
+_NOTICE_S = 5.0
+_RESTART_S = 0.5
+_VERSION_1_HZ = 20.0
+_VERSION_1_NOTICES_HZ = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +46,9 @@ class Confirmation:
     t_headset_ns: int
     t_host_ns: int
     """t_b on the headset's clock, and on the host's monotonic clock."""
-    T_E_W: Mapping[Eye, Float64]
-    """each (4, 4); E0(t_b)."""
     cursor_id: int
+    problem: str = ""
+    """Difference between what the headset drew and what it was sent; empty if there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,18 +80,28 @@ class LinkStatistics:
     """Headset's clock minus the host's; None until it is known."""
     bytes_sent: int
     bytes_received: int
+    notice: str = ""
+    """Another headset that asks to connect now, and why it is refused; empty if there is none."""
+
+
+@dataclass(slots=True)
+class _Session:
+    """The present session's device and its welcome."""
+
+    caller: Caller
+    welcome: Welcome
 
 
 class HeadsetServer(Endpoint):
     """Waits for the headset, streams to it, and stores its poses.
 
-    A headset that reconnects is sent the newest cursor, prompt, projections and target again. One
-    headset is served at a time: the one that connected last.
+    A headset that reconnects is sent the newest cursor, prompt, projections and so on again. One
+    headset is served at a time; others are refused until it has been silent for a while.
 
     Parameters
     ----------
-    pairing_key : bytes
-        Shared with the headset; at least 16 bytes.
+    pairings : Pairings or bytes
+        The headsets that may connect; or a key alone, for the first that connects with it.
     bind : (host, port)
         Default: loopback, any free port.
     settings : LinkSettings
@@ -96,23 +116,44 @@ class HeadsetServer(Endpoint):
 
     def __init__(
         self,
-        pairing_key: bytes,
+        pairings: Pairings | bytes,
         bind: Address = LOOPBACK,
         settings: LinkSettings = DEFAULT_SETTINGS,
     ) -> None:
-        keys = wire.derive_keys(pairing_key)
+        if isinstance(pairings, bytes):
+            pairings = Pairings((Pairing(pairings.decode()),))
         transport = UdpTransport(bind, settings.receive_buffer_bytes)
-        super().__init__(transport, keys.to_headset, keys.to_pc, settings)
-        self._offers: dict[int, Address] = {}
+        super().__init__(transport, settings)
+        self._pairings = pairings
+        self._reception = Reception(pairings)
+        self._session: _Session | None = None
+        self._device: HeadsetIdentity | None = None
+        self._shown = Owner()
+        self._notice, self._notice_until_s = "", 0.0
+        self._version_1 = Limiter(_VERSION_1_HZ)
+        self._version_1_notices = Limiter(_VERSION_1_NOTICES_HZ)
+        self._projections: dict[Eye, Projection] = {}
+        self._cursor: pb.Cursor | None = None
+        self._is_offline = False
         self._clock = ClockEstimator()
         self._poses = PoseBuffer()
-        self._confirms: deque[tuple[pb.Confirm, dict[Eye, Float64]]] = deque(
-            maxlen=_MAX_CONFIRMATIONS
-        )
+        self._confirms: deque[tuple[pb.Confirm, str]] = deque(maxlen=_MAX_CONFIRMATIONS)
         self._lost = 0
         self._live_frame = 0
         self._next_ping_s = 0.0
         self._start()
+
+    @property
+    def device(self) -> HeadsetIdentity | None:
+        """The connected headset, as it introduced itself last; None before it has."""
+        with self._changed:
+            return self._device
+
+    @property
+    def shown(self) -> Owner:
+        """Wearer and rig of the projections that the headset says it draws with."""
+        with self._changed:
+            return self._shown
 
     def send_cursor(self, points_W_m: ArrayLike, cursor_id: int) -> Outgoing:
         """Send the frozen hand, (N, 3) of frame W, reliably; no points remove it.
@@ -124,13 +165,24 @@ class HeadsetServer(Endpoint):
         LinkError
             If the link is closed.
         """
-        return self._send_reliably(Slot.CURSOR, messages.cursor(points_W_m, cursor_id))
+        message = messages.cursor(points_W_m, cursor_id)
+        with self._changed:
+            outgoing = self._send_reliably(Slot.CURSOR, message)
+            self._cursor = message.cursor
+        return outgoing
 
-    def send_live_hand(self, points_W_m: ArrayLike, is_over_limit: bool) -> None:
+    def send_live_hand(
+        self,
+        points_W_m: ArrayLike,
+        is_over_limit: bool,
+        eyes: Sequence[Eye] = EYES,
+        is_outline: bool = False,
+    ) -> None:
         """Send the live hand, (N, 3) of frame W, thinned evenly to the limit of one frame.
 
-        `is_over_limit` means that it is rotated too far; the headset then draws it red. The hand
-        replaces any that has not been sent yet.
+        `is_over_limit` means that it is rotated too far; the headset then draws it red. `eyes` draw
+        it. `is_outline` means that the points are its closed outline, in order. The hand replaces
+        any that has not been sent yet.
 
         Raises
         ------
@@ -145,7 +197,9 @@ class HeadsetServer(Endpoint):
             self._require_running()
             self._live_frame += 1
             self._stream.clear()
-            self._stream.extend(messages.live_hand(thinned, is_over_limit, self._live_frame))
+            self._stream.extend(
+                messages.live_hand(thinned, is_over_limit, self._live_frame, eyes, is_outline)
+            )
 
     def send_prompt(self, text: str, eyes: Sequence[Eye] = EYES) -> Outgoing:
         """Send a text to show and the eyes to keep open, reliably.
@@ -170,7 +224,24 @@ class HeadsetServer(Endpoint):
             If the link is closed.
         """
         slot = messages.PROJECTION_SLOTS[projection.eye]
-        return self._send_reliably(slot, messages.projection(projection))
+        with self._changed:
+            outgoing = self._send_reliably(slot, messages.projection(projection))
+            self._projections[projection.eye] = projection
+        return outgoing
+
+    def send_show(self, is_offline: bool) -> Outgoing:
+        """Have the headset draw with the offline calibration, or with its projections again.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            show = pb.Show(offline=is_offline)
+            outgoing = self._send_reliably(Slot.SHOW, pb.Envelope(show=show))
+            self._is_offline = is_offline
+        return outgoing
 
     def send_target(self, target: Target | None) -> Outgoing:
         """Send the user test's target, reliably; None removes it.
@@ -183,6 +254,30 @@ class HeadsetServer(Endpoint):
             If the link is closed.
         """
         return self._send_reliably(Slot.TARGET, messages.target(target))
+
+    def send_shape(self, shape: Shape | None) -> Outgoing:
+        """Send a shape fixed in the world, reliably; None removes it.
+
+        Raises
+        ------
+        ValueError
+            If it is not finite.
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.SHAPE, messages.shape(shape))
+
+    def send_again(self) -> None:
+        """Send the newest message of every slot again, as to a headset that has just connected.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            self._require_running()
+            self._outbox.restart(time.monotonic())
 
     def confirmations(self) -> list[Confirmation]:
         """Return the confirmations since the last call.
@@ -200,10 +295,10 @@ class HeadsetServer(Endpoint):
                 Confirmation(
                     confirm.t_headset_ns,
                     self._clock.to_host_ns(confirm.t_headset_ns),
-                    MappingProxyType(T_E_W),
                     confirm.cursor_id,
+                    problem,
                 )
-                for confirm, T_E_W in self._confirms
+                for confirm, problem in self._confirms
             ]
             self._confirms.clear()
             return confirmations
@@ -246,34 +341,85 @@ class HeadsetServer(Endpoint):
                 clock_uncertainty_ms=fit.uncertainty_ns / 1e6 if fit else None,
                 bytes_sent=self._sent["bytes"],
                 bytes_received=self._received["bytes"],
+                notice=self._notice if time.monotonic() < self._notice_until_s else "",
             )
 
-    def _greet(self, envelope: pb.Envelope, address: Address) -> None:
-        if envelope.WhichOneof("body") != "hello":
-            raise messages.MalformedError("a session begins with a hello")
-        # A replayed hello gets only an offer, for a session that has never been confirmed.
-        session = secrets.randbits(64) | 1
-        self._offers[session] = address
-        if len(self._offers) > _MAX_OFFERS:
-            del self._offers[next(iter(self._offers))]
-        welcome = pb.Welcome(nonce=envelope.hello.nonce, session=session)
-        self._send_greeting(pb.Envelope(welcome=welcome), address)
+    def _take(self, datagram: bytes, address: Address) -> None:
+        if self._reception.has_dropped(datagram, address):
+            self._rejected[Rejection.REPLAYED] += 1
+        else:
+            super()._take(datagram, address)
 
-    def _find_channel(self, session: int, address: Address) -> Channel | None:
-        if self._offers.get(session) == address:
-            self._open(session, address)
-        return super()._find_channel(session, address)
+    def _greet(self, packet: Packet, datagram: bytes, address: Address) -> Rejection | None:
+        heard = self._reception.hear(packet, datagram, address, time.monotonic())
+        if isinstance(heard, Rejection):
+            return heard
+        if isinstance(heard, Caller):
+            heard = greetings.seal(
+                heard.keys.to_headset, packet.sequence, self._meet(heard, address)
+            )
+        self._post(heard, address)
+        return None
 
-    def _open(self, session: int, address: Address) -> None:
-        self._channel = Channel(session, address)
+    def _meet(self, caller: Caller, address: Address) -> pb.Envelope:
+        """Return the answer to a device that has proved its key and its address."""
+        name = caller.name or caller.device_id
+        owner_id = caller.pairing.device_id
+        if owner_id not in ("", caller.device_id):
+            owner = caller.pairing.name or "another headset"
+            self._tell(f"headset {name} asks to connect with the pairing key of {owner}")
+            return greetings.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
+        channel, session = self._channel, self._session
+        if channel is not None and session is not None:
+            is_same = session.caller.device_id == caller.device_id
+            if is_same and session.caller.nonce == caller.nonce and channel.address == address:
+                return greetings.welcome(session.welcome)  # the first one was lost
+            # A device whose app has been restarted is silent in its old session.
+            patience_s = _RESTART_S if is_same else self._settings.silence_s
+            if time.monotonic() - channel.heard_s <= patience_s:
+                holder = session.caller.name or session.caller.device_id
+                self._tell(f"headset {name} asks to connect; {holder} is connected")
+                return greetings.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
+        return greetings.welcome(self._open(caller, address))
+
+    def _open(self, caller: Caller, address: Address) -> Welcome:
+        if not caller.pairing.device_id:
+            try:
+                self._pairings.bind(caller.pairing, caller.device_id, caller.name)
+            except FileError as error:
+                _LOG.warning("%s; %s is paired until the program ends", error, caller.device_id)
+        key = caller.pairing.key.encode()
+        nonce = secrets.token_bytes(wire.NONCE_BYTES)
+        welcome = Welcome(secrets.randbits(64) | 1, caller.nonce, nonce)
+        keys = wire.session_keys(key, int(caller.device_id, 16), welcome)
+        self._channel = Channel(welcome.session, address, keys.to_headset, keys.to_pc)
+        self._session = _Session(caller, welcome)
+        self._device = None
+        self._shown = Owner()
         self._dismissed = False
-        self._offers.clear()
         self._clock = ClockEstimator()
         self._poses = PoseBuffer()
         self._confirms.clear()
         self._lost = 0
         self._next_ping_s = 0.0
         self._outbox.restart(time.monotonic())
+        return welcome
+
+    def _tell(self, notice: str) -> None:
+        self._notice, self._notice_until_s = notice, time.monotonic() + _NOTICE_S
+
+    def _take_other_version(self, datagram: bytes, address: Address) -> None:
+        """Tell PC and headset that a paired headset speaks version 1."""
+        now_s = time.monotonic()
+        if not version1.is_hello(datagram) or not self._version_1.allows(now_s):
+            return
+        for pairing in self._pairings.all:
+            if answer := version1.answer(pairing.key.encode(), datagram):
+                self._tell("this headset speaks protocol 1, update its app")
+                if self._version_1_notices.allows(now_s):
+                    for notice in answer:
+                        self._post(notice, address)
+                return
 
     def _handle(self, envelope: pb.Envelope) -> None:
         match envelope.WhichOneof("body"):
@@ -281,12 +427,23 @@ class HeadsetServer(Endpoint):
                 for t_headset_ns, T_W_H in messages.read_poses(envelope.poses):
                     self._poses.add(t_headset_ns, T_W_H)
             case "confirm":
-                T_E_W = messages.read_confirm(envelope.confirm)
-                self._confirms.append((envelope.confirm, T_E_W))
+                confirm = messages.read_confirm(envelope.confirm)
+                self._confirms.append((confirm, self._difference(confirm)))
+            case "device":
+                assert self._session is not None
+                device_id = self._session.caller.device_id
+                self._device, self._shown = messages.read_device(envelope.device, device_id)
             case "pong":
                 self._take_pong(envelope.pong)
             case other:
                 raise messages.MalformedError(f"a headset sends no {other}")
+
+    def _difference(self, confirm: pb.Confirm) -> str:
+        """Return the difference of what a headset has drawn from what it was sent, or nothing."""
+        drawn = drawn_projections(self._projections, self._is_offline)
+        if confirm.drawn == drawn_digest(drawn, self._cursor):
+            return ""
+        return "the headset draws other projections or another cursor than it was sent"
 
     def _take_pong(self, pong: pb.Pong) -> None:
         now_ns = time.monotonic_ns()

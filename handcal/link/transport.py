@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import select
 import socket
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from handcal.errors import LinkError
 from handcal.link.wire import MAX_DATAGRAM_BYTES
 
 Address: TypeAlias = tuple[str, int]
 
+EVERY_NETWORK = ("0.0.0.0", "::")  # noqa: S104
+"""The addresses that listen on all networks: of IPv4, and of both where the system can."""
 _MAX_BATCH = 256
+_MAPPED = "::ffff:"
 _ANYWHERE: Address = ("192.0.2.1", 9)  # reserved for documentation; nothing is sent to it
 
 
@@ -34,7 +37,7 @@ class Transport(Protocol):
 
 
 class UdpTransport:
-    """A bound UDP socket.
+    """A bound UDP socket, of IPv4 or IPv6; bound to ``::``, it serves both where it can.
 
     Raises
     ------
@@ -43,20 +46,30 @@ class UdpTransport:
     """
 
     def __init__(self, bind: Address, receive_buffer_bytes: int) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        family = _family(bind[0])
+        self._is_ipv6 = family is socket.AF_INET6
+        try:
+            self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        except OSError as error:  # no IPv6 in this system
+            raise LinkError(f"cannot listen on {bind[0]}:{bind[1]}: {error.strerror}") from error
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_bytes)
+            if self._is_ipv6:
+                self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
             self._socket.bind(bind)
         except OSError as error:
             self._socket.close()
             raise LinkError(f"cannot listen on {bind[0]}:{bind[1]}: {error.strerror}") from error
         self._socket.setblocking(False)
-        self.address: Address = self._socket.getsockname()
+        self.address: Address = self._socket.getsockname()[:2]
 
     def send(self, datagram: bytes, address: Address) -> None:
         """Send a datagram; one that the system refuses is lost."""
+        host, port = address
+        if self._is_ipv6 and ":" not in host:
+            host = _MAPPED + host
         try:
-            self._socket.sendto(datagram, address)
+            self._socket.sendto(datagram, (host, port))
         except OSError:
             return
 
@@ -67,12 +80,13 @@ class UdpTransport:
         for _ in range(_MAX_BATCH):
             try:
                 # One byte more than allowed, so that an oversized datagram is noticed.
-                arrived.append(self._socket.recvfrom(MAX_DATAGRAM_BYTES + 1))
+                datagram, sender = self._socket.recvfrom(MAX_DATAGRAM_BYTES + 1)
             except BlockingIOError:
                 break
             except OSError:
                 # Windows reports here that an earlier datagram was refused, or one is too large.
                 continue
+            arrived.append((datagram, _plain(sender) if self._is_ipv6 else sender))
         return arrived
 
     def close(self) -> None:
@@ -88,12 +102,12 @@ def local_address(server: Address) -> Address:
     LinkError
         If the server's name or network is unknown.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
+    try:
+        with socket.socket(_family(server[0]), socket.SOCK_DGRAM) as probe:
             probe.connect(server)  # selects a route; sends nothing
-        except OSError as error:
-            raise LinkError(f"cannot reach {server[0]}:{server[1]}: {error.strerror}") from error
-        return probe.getsockname()[0], 0
+            return _plain(probe.getsockname())[0], 0
+    except OSError as error:
+        raise LinkError(f"cannot reach {server[0]}:{server[1]}: {error.strerror}") from error
 
 
 def reachable_address(bound: Address) -> Address:
@@ -105,11 +119,11 @@ def reachable_address(bound: Address) -> Address:
         If it is bound to all networks, but there is none.
     """
     host, port = bound
-    return (local_address(_ANYWHERE)[0], port) if host == "0.0.0.0" else bound  # noqa: S104
+    return (local_address(_ANYWHERE)[0], port) if host in EVERY_NETWORK else bound
 
 
 def resolve(host: str, port: int) -> Address:
-    """Return the IPv4 address of a host.
+    """Return the address of a host: of IPv4 if it has one, else of IPv6.
 
     Raises
     ------
@@ -117,6 +131,21 @@ def resolve(host: str, port: int) -> Address:
         If its name is unknown.
     """
     try:
-        return socket.gethostbyname(host), port
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:  # UnicodeError: not a valid name
         raise LinkError(f"unknown host {host!r}; check its name or use its address") from error
+    best = min(found, key=lambda one: one[0] is not socket.AF_INET)
+    return _plain(best[4])
+
+
+def _family(host: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in host else socket.AF_INET
+
+
+def _plain(address: tuple[Any, ...]) -> Address:
+    """Return host and port of a socket's address: IPv4 as such, a local IPv6 with its network."""
+    host, port, *more = address
+    host = host.removeprefix(_MAPPED) if "." in host else host
+    if len(more) == 2 and more[1] and "%" not in host:
+        host = f"{host}%{more[1]}"
+    return host, port

@@ -1,4 +1,4 @@
-"""Datagrams as bytes: header, keyed MAC, replay window. No sockets, no clocks.
+"""Datagrams as bytes: header, keys, MAC, replay window. No sockets, no clocks.
 
 Layout, big endian (docs/protocol.md): magic ``hC``, version u8, slot u8, session u64, sequence
 u64, message id u32, fragment u16, fragment count u16, payload, MAC (16 bytes) over all of it.
@@ -6,14 +6,13 @@ u64, message id u32, fragment u16, fragment count u16, payload, MAC (16 bytes) o
 
 from __future__ import annotations
 
-import hashlib
 import hmac
 import struct
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 MAGIC = b"hC"
-VERSION = 1
+VERSION = 2
 HEADER = struct.Struct(">2sBBQQIHH")
 MAC_BYTES = 16
 MAX_DATAGRAM_BYTES = 1400
@@ -21,7 +20,10 @@ MAX_PAYLOAD_BYTES = MAX_DATAGRAM_BYTES - HEADER.size - MAC_BYTES
 MAX_FRAGMENTS = 256
 MAX_MESSAGE_BYTES = MAX_FRAGMENTS * MAX_PAYLOAD_BYTES
 MIN_PAIRING_KEY_BYTES = 16
+NONCE_BYTES = 16
+HANDSHAKE_SESSION = 0
 REPLAY_WINDOW = 1024
+_SALT = b"handcal link 2"
 
 
 class Slot(IntEnum):
@@ -34,6 +36,9 @@ class Slot(IntEnum):
     PROJECTION_RIGHT = 4
     CONFIRM = 5
     TARGET = 6
+    DEVICE = 7
+    SHAPE = 8
+    SHOW = 9
 
 
 class Rejection(StrEnum):
@@ -49,11 +54,12 @@ class Rejection(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """One datagram without its MAC. Session 0 is the handshake."""
+    """One datagram without its MAC."""
 
     payload: bytes
-    session: int = 0
+    session: int = HANDSHAKE_SESSION
     sequence: int = 0
+    """In the handshake: the device's identity."""
     slot: Slot = Slot.UNRELIABLE
     message_id: int = 0
     fragment: int = 0
@@ -68,22 +74,47 @@ class Keys:
     to_pc: bytes
 
 
-def derive_keys(pairing_key: bytes) -> Keys:
-    """Derive both directions' keys.
+@dataclass(frozen=True, slots=True)
+class Welcome:
+    """The parameters of a new session."""
 
-    Raises
-    ------
-    ValueError
-        If the pairing key is shorter than 16 bytes.
-    """
-    if len(pairing_key) < MIN_PAIRING_KEY_BYTES:
-        raise ValueError(
-            f"the pairing key has {len(pairing_key)} bytes; at least {MIN_PAIRING_KEY_BYTES} needed"
+    session: int
+    headset_nonce: bytes
+    pc_nonce: bytes
+
+
+def hkdf(key: bytes, salt: bytes, info: bytes, size: int = 32) -> bytes:
+    """Return `size` bytes derived from a key by HKDF-SHA256 (RFC 5869)."""
+    root = hmac.digest(salt, key, "sha256")
+    block = derived = b""
+    while len(derived) < size:
+        block = hmac.digest(root, block + info + bytes([len(derived) // 32 + 1]), "sha256")
+        derived += block
+    return derived[:size]
+
+
+def handshake_keys(pairing_key: bytes, device_id: int) -> Keys:
+    """Derive the keys of a device's handshakes."""
+    return _keys(pairing_key, b"handshake ", device_id.to_bytes(8, "big"))
+
+
+def session_keys(pairing_key: bytes, device_id: int, welcome: Welcome) -> Keys:
+    """Derive the keys of one session of a device."""
+    context = b"".join(
+        (
+            device_id.to_bytes(8, "big"),
+            welcome.session.to_bytes(8, "big"),
+            welcome.headset_nonce,
+            welcome.pc_nonce,
         )
-    root = hashlib.blake2b(pairing_key, person=b"handcal pairing").digest()
+    )
+    return _keys(pairing_key, b"session ", context)
+
+
+def _keys(pairing_key: bytes, label: bytes, context: bytes) -> Keys:
     return Keys(
-        to_headset=hashlib.blake2b(b"to headset", key=root).digest(),
-        to_pc=hashlib.blake2b(b"to pc", key=root).digest(),
+        to_headset=hkdf(pairing_key, _SALT, label + b"to headset" + context),
+        to_pc=hkdf(pairing_key, _SALT, label + b"to pc" + context),
     )
 
 
@@ -114,8 +145,11 @@ def seal(key: bytes, packet: Packet) -> bytes:
     return body + _mac(key, body)
 
 
-def unseal(key: bytes, datagram: bytes) -> Packet | Rejection:
-    """Return the packet in `datagram`, or the reason for dropping it; any bytes are allowed."""
+def read(datagram: bytes) -> Packet | Rejection:
+    """Return the packet in a datagram, or the reason for dropping it; any bytes are allowed.
+
+    Nothing in the packet is to be believed before `is_authentic`.
+    """
     if len(datagram) > MAX_DATAGRAM_BYTES:
         return Rejection.OVERSIZED
     if len(datagram) < HEADER.size + MAC_BYTES or not datagram.startswith(MAGIC):
@@ -123,19 +157,21 @@ def unseal(key: bytes, datagram: bytes) -> Packet | Rejection:
     _, version, slot, session, sequence, message_id, fragment, count = HEADER.unpack_from(datagram)
     if version != VERSION:
         return Rejection.WRONG_VERSION
-    body, mac = datagram[:-MAC_BYTES], datagram[-MAC_BYTES:]
-    if not hmac.compare_digest(mac, _mac(key, body)):
-        return Rejection.UNPAIRED
     if count > MAX_FRAGMENTS:
         return Rejection.OVERSIZED
     if fragment >= count or slot >= len(Slot) or (slot == Slot.UNRELIABLE and count != 1):
         return Rejection.CORRUPT
-    payload = body[HEADER.size :]
+    payload = datagram[HEADER.size : -MAC_BYTES]
     return Packet(payload, session, sequence, Slot(slot), message_id, fragment, count)
 
 
+def is_authentic(key: bytes, datagram: bytes) -> bool:
+    """Return whether a datagram that `read` has accepted bears the MAC of this key."""
+    return hmac.compare_digest(datagram[-MAC_BYTES:], _mac(key, datagram[:-MAC_BYTES]))
+
+
 def _mac(key: bytes, body: bytes) -> bytes:
-    return hashlib.blake2b(body, key=key, digest_size=MAC_BYTES).digest()
+    return hmac.digest(key, body, "sha256")[:MAC_BYTES]
 
 
 def split(message: bytes) -> list[bytes]:

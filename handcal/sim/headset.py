@@ -1,30 +1,35 @@
 """The virtual headset: a process of its own that speaks the real datagrams.
 
 It hosts the simulated wearer, shows what the PC sends, and reports poses and confirmations on its
-own clock, as a real headset does. The true poses go only to the simulated camera, as light.
+own clock, as a real headset does. The true poses go only to the simulated camera, as light. Without
+the wearer it is a device at rest: it prints what a headset would show, and confirms on Enter.
 """
 
 from __future__ import annotations
 
 import signal
+import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from handcal.display import projection_matrix, view_of_eye
+from handcal.display import projection_matrix
 from handcal.errors import LinkError
 from handcal.geometry import rigid
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.impair import UNIMPAIRED, Impairment
+from handcal.link.wire import VERSION, hkdf
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
-from handcal.sim.wearer import DisplayView, Wearer, WearerSettings
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings
+from handcal.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +37,7 @@ class HeadsetSettings:
     """Settings of the virtual headset and its connection."""
 
     rig_path: str
-    """The PC's rig, which the headset uses."""
+    """The PC's rig, whose views the headset reports as its runtime's."""
     port: int
     """Address of the PC."""
     scene_port: int | None = None
@@ -57,6 +62,9 @@ class HeadsetSettings:
     """Longest time without a connection."""
     duration_s: float | None = None
     """Time after which to end; None to run until stopped."""
+    name: str = "Virtual headset"
+    has_wearer: bool = True
+    """False: a device at rest, without a simulated wearer."""
 
 
 def run_headset(
@@ -80,7 +88,11 @@ def run_headset(
     """
     rig = read_rig(Path(settings.rig_path))
     worn_rig = read_rig(Path(settings.worn_rig_path or settings.rig_path))
-    wearer = Wearer(settings.seed, worn_rig, make_hand(settings.seed), settings.wearer)
+    if settings.has_wearer:
+        hand = make_hand(settings.seed)
+        act = _as_wearer(Wearer(settings.seed, worn_rig, hand, settings.wearer), rig)
+    else:
+        act = _at_keyboard()
     rng = np.random.default_rng(settings.seed)
     clock_ns = _clock(settings)
     start_s = heard_s = next_s = time.monotonic()
@@ -90,6 +102,7 @@ def run_headset(
         HeadsetClient(
             (settings.host, settings.port),
             pairing_key,
+            _identity(settings, pairing_key, rig),
             lambda: clock_ns(time.monotonic_ns()),
             impairment=settings.impairment,
         ) as client,
@@ -97,25 +110,82 @@ def run_headset(
     ):
         while not is_stopped() and not client.dismissed and next_s < end_s:
             t_ns = time.monotonic_ns()
-            view = _view(client.state(), rig, t_ns / 1e9 - start_s)
-            action = wearer.step(view)
+            state = client.state()
+            action = act(state, t_ns / 1e9 - start_s)
             if scene is not None:
                 scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
-            T_W_H = action.T_W_H @ _tracking_error(rng, settings)
-            client.send_pose(T_W_H, clock_ns(t_ns))
+            client.send_pose(action.T_W_H @ _tracking_error(rng, settings), clock_ns(t_ns))
             if action.confirm:
-                T_E_W = {eye: view_of_eye(rig.eyes[eye], T_W_H) for eye in EYES}
-                client.confirm(T_E_W, clock_ns(t_ns), view.cursor_id)
+                client.confirm(clock_ns(t_ns), state)
             now_s = time.monotonic()
             if client.connected:
                 heard_s = now_s
             elif now_s - heard_s > settings.patience_s:
                 raise LinkError(
-                    f"no PC answered at {settings.host}:{settings.port} for "
+                    client.refusal
+                    or f"no PC answered at {settings.host}:{settings.port} for "
                     f"{settings.patience_s:g} s; check that it runs with the same pairing key"
                 )
             next_s = max(next_s + 1.0 / settings.rate_hz, now_s)
             time.sleep(next_s - now_s)
+
+
+def _as_wearer(wearer: Wearer, rig: Rig) -> Callable[[HeadsetState, float], WearerAction]:
+    return lambda state, t_s: wearer.step(_view(state, rig, t_s))
+
+
+def _at_keyboard() -> Callable[[HeadsetState, float], WearerAction]:
+    """Return the actions of a device at rest: it prints what is shown, and confirms on Enter."""
+    presses: list[str] = []
+    threading.Thread(target=lambda: presses.extend(sys.stdin), daemon=True).start()
+    told = ""
+
+    def act(state: HeadsetState, _t_s: float) -> WearerAction:
+        nonlocal told
+        telling = _told(state)
+        if telling != told:
+            told = telling
+            print(told, flush=True)  # noqa: T201 (the display)
+        is_pressed = bool(presses)
+        presses.clear()
+        return WearerAction(np.eye(4), np.eye(4), is_pressed and state.cursor_W_m is not None)
+
+    return act
+
+
+def _told(state: HeadsetState) -> str:
+    """Return in words what is shown."""
+    what = [
+        f"projections of {state.owner.wearer or 'nobody'}: {' and '.join(state.drawn) or 'none'}",
+        "offline calibration" if state.is_offline else "",
+        "" if state.cursor_W_m is None else f"cursor {state.cursor_id}",
+        "" if state.live_W_m is None else f"live {'outline' if state.is_outline else 'hand'}",
+        "" if state.target is None else f"target for the {state.target.eye} eye",
+        "" if state.shape is None else f"shape of {len(state.shape.corners_W_m)} corners",
+        f"open: {' and '.join(state.eyes)}",
+        state.prompt,
+    ]
+    return "; ".join(part for part in what if part)
+
+
+def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> HeadsetIdentity:
+    return HeadsetIdentity(
+        # The same after a restart: the key belongs to this identity.
+        hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
+        name=settings.name,
+        runtime="simulator",
+        app=f"handcal {version('handcal')}",
+        protocol=VERSION,
+        views={eye: _runtime_view(rig.eyes[eye]) for eye in EYES},
+    )
+
+
+def _runtime_view(display: EyeDisplay) -> HeadsetView:
+    """Return the view as a runtime would report it: without the display's homography."""
+    (fx, _, cx), (_, fy, cy) = display.K[:2]
+    width, height = display.width_px, display.height_px
+    tangents = [-cx / fx, (width - cx) / fx, -cy / fy, (height - cy) / fy]
+    return HeadsetView(display.T_V_H, np.array(tangents), width, height)
 
 
 def until_terminated() -> Callable[[], bool]:
@@ -139,18 +209,19 @@ def _clock(settings: HeadsetSettings) -> Callable[[int], int]:
 
 
 def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
-    """Return the displays' content; an eye without a new projection shows the rig's."""
+    """Return the displays' content; nothing is drawn before both projections have arrived."""
+    drawn = state.drawn
+    is_ready = len(drawn) == len(EYES)
 
     def rendered(eye: Eye) -> Float64:
-        projection = state.projections.get(eye)
-        return projection_matrix(rig.eyes[eye]) if projection is None else projection.P
+        return drawn[eye].P if is_ready else projection_matrix(rig.eyes[eye])
 
     return DisplayView(
         t_s=t_s,
-        cursor_W_m=state.cursor_W_m,
+        cursor_W_m=state.cursor_W_m if is_ready else None,
         cursor_id=state.cursor_id,
         P={eye: rendered(eye) for eye in EYES},
-        T_V_H={eye: rig.eyes[eye].T_V_H for eye in EYES},
+        T_V_H={eye: drawn[eye].T_V_H if is_ready else rig.eyes[eye].T_V_H for eye in EYES},
         eyes=state.eyes,
         guard_red=state.is_over_limit,
         prompt=state.prompt,

@@ -15,6 +15,14 @@ from handcal.link.pairing import KEY_VARIABLE
 _END_S = 5.0
 
 
+def program_command() -> list[str]:
+    """Return the command that starts the command line, also in a packaged program."""
+    if getattr(sys, "frozen", False):  # there sys.executable may be the window
+        program = Path(sys.executable)
+        return [str(program.with_name(f"handcal{program.suffix}"))]
+    return [sys.executable, "-m", "handcal"]
+
+
 class VirtualHeadset(Closable):
     """Runs ``handcal headset`` until closed.
 
@@ -53,7 +61,7 @@ class VirtualHeadset(Closable):
             "--loss": loss,
             "--reorder": reorder,
         }
-        command = [sys.executable, "-m", "handcal", "headset"]
+        command = [*program_command(), "headset"]
         command += [str(part) for option in options.items() for part in option]
         self._process = subprocess.Popen(  # noqa: S603 (our own program)
             command, env=os.environ | {KEY_VARIABLE: pairing_key}, stderr=self._errors

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from ipaddress import IPv4Address
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -136,9 +136,9 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
     if len(pairing_key.encode()) < MIN_PAIRING_KEY_BYTES:
         return _broken("the pairing key is too short", "make a new one")
     try:
-        address = IPv4Address(settings.host)
+        address = ip_address(settings.host)
     except ValueError:
-        advice = "give four numbers; 0.0.0.0 listens on all networks"
+        advice = "give it in numbers; 0.0.0.0 or :: listens on all networks"
         return _broken(f"{settings.host!r} is not an address", advice)
     if not 1 <= settings.port <= 65535:
         return _broken(f"{settings.port} is not a valid port", "choose one from 1 to 65535")

@@ -28,10 +28,11 @@ from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
 from handcal.display import as_shifts, projection_matrix, view_of_eye
-from handcal.errors import HandcalError, HandError
-from handcal.geometry import invert, transform
+from handcal.errors import HandcalError, HandError, PoseError, PosePendingError
+from handcal.geometry import transform
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
+from handcal.link.drawn import drawn_digest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
@@ -126,6 +127,8 @@ class Calibration:
     settings : CalibrationSettings
     resume : SessionRecord or None
         The contents of `session`, to resume it.
+    wearer : str
+        Name or code, by which the headset keeps the projections.
 
     Raises
     ------
@@ -152,6 +155,7 @@ class Calibration:
         session: Session | None = None,
         settings: CalibrationSettings | None = None,
         resume: SessionRecord | None = None,
+        wearer: str = "",
     ) -> None:
         self.rig = rig
         self.state = State.SHOW_HAND
@@ -175,6 +179,9 @@ class Calibration:
         self._unstored: deque[Callable[[Session], object]] = deque()
         self._shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
         self._sent: dict[Eye, Outgoing] = {}
+        self._sent_cursor: Outgoing | None = None
+        self._wearer = wearer
+        self._rig_name = _rig_name(rig)
         self._apply_until_s = 0.0
         if resume is not None:
             self._resume(resume)
@@ -262,7 +269,8 @@ class Calibration:
         self.refusal = ""
         self.eyes = tuple(eyes)
         self.state = State.ALIGN
-        self._link.send_cursor(transform(hand.T_W_D, hand.cloud.contour_m), self._cursor_id)
+        outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
+        self._sent_cursor = self._link.send_cursor(outline_W_m, self._cursor_id)
         self._link.send_prompt(_align_prompt(self.eyes), self.eyes)
         made = {"cursor_id": self._cursor_id, "eyes": list(self.eyes)}
         self._store(lambda session: session.record("cursor_made", **made))
@@ -273,16 +281,17 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no cursor, or no hand in view.
+            If there is no cursor, or no hand in view, or the headset does not draw it yet.
         """
         if self.state is not State.ALIGN:
             raise ProcedureError(f"there is no cursor to confirm ({self.state})")
         hand = self._hands.newest(self._settings.match_tolerance_s)
         if hand is None:
             raise ProcedureError("hold the hand under the cursor, in view of the camera")
-        T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
-        T_E_W = {eye: view_of_eye(self.rig.eyes[eye], T_W_H) for eye in EYES}
-        self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, T_E_W, self._cursor_id)
+        cursor = self._sent_cursor
+        if not self.is_applied or cursor is None or cursor.state is not Delivery.ACKED:
+            raise ProcedureError("the headset has not received the cursor and projections; wait")
+        self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, self._cursor_id)
 
     def redo(self) -> None:
         """Discard the present cursor, or else delete the last alignment and the results.
@@ -483,8 +492,16 @@ class Calibration:
     def _send_projections(self, shifts_m: Mapping[Eye, Float64]) -> list[Outgoing]:
         for eye, shift_m in shifts_m.items():
             display = self.rig.eyes[eye]
-            P = projection_matrix(display, shift_m)
-            projection = Projection(eye, P, display.width_px, display.height_px)
+            projection = Projection(
+                eye,
+                projection_matrix(display, shift_m),
+                display.width_px,
+                display.height_px,
+                display.T_V_H,
+                projection_matrix(display),
+                self._wearer,
+                self._rig_name,
+            )
             self._sent[eye] = self._link.send_projection(projection)
         return [self._sent[eye] for eye in shifts_m]
 
@@ -521,10 +538,22 @@ class Calibration:
         """Accept or refuse a confirmation."""
         assert self._cursor is not None
         assert self._guard is not None
+        if confirmation.problem:
+            self._link.send_again()
+            self._refuse(
+                "The headset does not show what it should. Confirm again; if this is repeated, "
+                "restart the headset's app.",
+                "drawn otherwise",
+            )
+            return
         try:
             hand = self._hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
             rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
-        except HandError as error:
+            T_W_H = self._link.pose_at_host_ns(confirmation.t_host_ns)
+        except PosePendingError:
+            self._confirmation = confirmation
+            return
+        except (HandError, PoseError) as error:
             self._refuse(f"{error}. Align and confirm again.", "no hand")
             return
         angle_deg = float(np.degrees(np.linalg.norm(rotation_W)))
@@ -544,7 +573,7 @@ class Calibration:
             hand_m=hand.points_W_m,
             cursor_is_cut=self._cursor.cloud.is_cut,
             hand_is_cut=hand.cloud.is_cut,
-            T_E_W=confirmation.T_E_W,
+            T_E_W={eye: view_of_eye(self.rig.eyes[eye], T_W_H) for eye in EYES},
             eyes=self.eyes,
             rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
             t_a_ns=self._cursor.cloud.t_camera_ns,
@@ -578,6 +607,16 @@ class Calibration:
         if self._session is not None:
             self._unstored.append(write)
             self.store_waiting()
+
+
+def _rig_name(rig: Rig) -> str:
+    """Return the rig's name in one line, with eight digits that change with its displays."""
+    offline = {
+        eye: Projection(eye, projection_matrix(one), one.width_px, one.height_px, one.T_V_H)
+        for eye, one in rig.eyes.items()
+    }
+    name = "".join(character for character in rig.name if character >= " ")
+    return f"{name[:80]} {drawn_digest(offline, None).hex()[:8]}"
 
 
 def _align_prompt(eyes: Sequence[Eye]) -> str:

@@ -21,7 +21,7 @@ from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
 from handcal.io.closable import Closable
 from handcal.io.settings import settings_json
-from handcal.link.pairing import new_pairing_key
+from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
@@ -53,8 +53,8 @@ class Station(Closable):
         Name or code; stored in the session.
     resume : Path, optional
         A session to resume, instead of a new one.
-    pairing_key : str
-        Shared with a network headset; the virtual headset gets a new key.
+    pairings : Pairings or str
+        The network headsets that may connect, or a key alone; the virtual headset gets a new key.
 
     Attributes
     ----------
@@ -74,11 +74,14 @@ class Station(Closable):
         settings: StationSettings,
         wearer: str = "",
         resume: Path | None = None,
-        pairing_key: str = "",
+        pairings: Pairings | str = "",
     ) -> None:
         self.settings = settings
         is_virtual = settings.headset == "virtual"
-        self.pairing_key = new_pairing_key() if is_virtual else pairing_key
+        if is_virtual or isinstance(pairings, str):
+            key = new_pairing_key() if is_virtual else str(pairings)
+            pairings = Pairings((Pairing(key),))
+        self._pairings = pairings
         self.watch_views = False
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
@@ -87,7 +90,7 @@ class Station(Closable):
             self.rig = self._record.rig
             self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
             bind = LOOPBACK if is_virtual else (settings.host, settings.port)
-            self._link = stack.enter_context(HeadsetServer(self.pairing_key.encode(), bind))
+            self._link = stack.enter_context(HeadsetServer(pairings, bind))
             if is_virtual:
                 self._simulation = stack.enter_context(
                     Simulation(settings.seed, self._start_headset)
@@ -101,6 +104,7 @@ class Station(Closable):
                 self.session,
                 settings.calibration,
                 resume=self._record if resume else None,
+                wearer=self._record.wearer,
             )
             self._stack = stack.pop_all()
         self._number = 0
@@ -108,10 +112,16 @@ class Station(Closable):
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
         self._revision = self.session.revision
+        self._is_offline = False
         self._target_E_m: dict[Eye, Float64] = {}  # only for the eye to which it is shown
         self._views: dict[Eye, EyeView] = {}
         self._viewed: Eye = "right"
         self._next_view_s = 0.0
+
+    @property
+    def pairing_key(self) -> str:
+        """The key with which the next new headset connects."""
+        return self._pairings.open_key()
 
     @property
     def address(self) -> tuple[str, int]:
@@ -138,6 +148,7 @@ class Station(Closable):
             self._not_applied = ""
         if self.calibration.state is not State.APPLIED:
             self.hide_target()
+            self.show_offline(False)
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -233,6 +244,22 @@ class Station(Closable):
             self._link.send_target(None)
             self._target_E_m = {}
 
+    def show_offline(self, is_shown: bool) -> None:
+        """Have the headset draw with the offline calibration, or with the applied one again.
+
+        Raises
+        ------
+        ProcedureError
+            Unless the solved φ is applied.
+        LinkError
+            If the link is closed.
+        """
+        if is_shown and self.calibration.state is not State.APPLIED:
+            raise ProcedureError("solve and apply first")
+        if is_shown != self._is_offline:
+            self._link.send_show(is_shown)
+            self._is_offline = is_shown
+
     def require_headset(self) -> None:
         """Raise LinkError if the virtual headset has ended."""
         if self._simulation is not None:
@@ -254,7 +281,7 @@ class Station(Closable):
             self.session.path / "rig.yaml",
             self._link.address[1],
             scene_port,
-            self.pairing_key,
+            self._pairings.all[-1].key,
             seed=self.settings.seed,
             worn_rig_path=self._worn_rig_path,
             loss=self.settings.loss,
@@ -280,7 +307,8 @@ class Station(Closable):
         """Show the live hand in the headset, and render the wearer's views if requested."""
         if self.calibration.state is State.APPLIED:
             # The wearer judges the calibration by this outline on their own hand.
-            self._link.send_live_hand(hand.points_W_m, False)
+            outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
+            self._link.send_live_hand(outline_W_m, False, is_outline=True)
         started_s = time.monotonic()
         if self.watch_views and started_s >= self._next_view_s:
             eye: Eye = "left" if self._viewed == "right" else "right"
@@ -292,7 +320,7 @@ class Station(Closable):
 
     def _see(self, eye: Eye, hand: PlacedHand) -> EyeView:
         calibration, display = self.calibration, self.rig.eyes[eye]
-        drawn_shift_m = calibration.applied_shift_m[eye]
+        drawn_shift_m = np.zeros(3) if self._is_offline else calibration.applied_shift_m[eye]
         cursor = calibration.cursor
         T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
         image = None
@@ -324,6 +352,8 @@ class Station(Closable):
             self.require_headset()
         except LinkError as error:
             return str(error)
+        if notice := self._link.statistics().notice:
+            return notice
         if self._link.connected:
             return ""
         if self._simulation is not None:

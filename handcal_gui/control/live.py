@@ -255,6 +255,7 @@ class CalibrationController(QObject):
         panels = self._window.panels
         self._solve_settings = station.settings.calibration.solve
         host, port = station.address
+        host = f"[{host}]" if ":" in host else host
         panels.camera.begin(station.settings.calibration.segment)
         panels.fine_tune.set_rig(station.rig)
         panels.results.show_results(None, {}, station.rig)

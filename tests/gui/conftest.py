@@ -38,11 +38,22 @@ from handcal.station.procedure import CalibrationSettings, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import EYES, Alignment, CameraIdentity, Eye, Float64, Frame, Rig, UInt8
+from handcal.types import (
+    EYES,
+    Alignment,
+    CameraIdentity,
+    Eye,
+    Float64,
+    Frame,
+    HeadsetIdentity,
+    Rig,
+    UInt8,
+)
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 KEY = "a pairing key of the tests"
+IDENTITY = HeadsetIdentity("00000000000000aa", "Headset of the tests")
 SENSOR = SensorSettings()
 T_W_H = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])
 T_D_CURSOR = rigid([-0.2, 0.0, 0.0], [-0.01, 0.01, 0.50])
@@ -222,8 +233,8 @@ def still_camera() -> type[StillCamera]:
 class Headset(Closable):
     """A headset at rest, controlled by the test."""
 
-    def __init__(self, rig: Rig, address: tuple[str, int], key: str) -> None:
-        self._rig, self._address, self._key = rig, address, key
+    def __init__(self, address: tuple[str, int], key: str) -> None:
+        self._address, self._key = address, key
         self._ended = threading.Event()
         self._open()
 
@@ -232,8 +243,7 @@ class Headset(Closable):
         return self._client.state()
 
     def confirm(self) -> None:
-        T_E_W = {eye: view_of_eye(self._rig.eyes[eye], T_W_H) for eye in EYES}
-        self._client.confirm(T_E_W, time.monotonic_ns(), self.shown.cursor_id)
+        self._client.confirm(time.monotonic_ns(), self.shown)
 
     def fall_silent(self) -> None:
         self._ended.set()
@@ -248,7 +258,7 @@ class Headset(Closable):
         self.fall_silent()
 
     def _open(self) -> None:
-        self._client = HeadsetClient(self._address, self._key.encode())
+        self._client = HeadsetClient(self._address, self._key.encode(), IDENTITY)
         self._thread = threading.Thread(target=self._tell_poses)
         self._thread.start()
 
@@ -293,7 +303,7 @@ def studio(
         # A busy computer gives few frames a second, and a confirmation may lie between two.
         calibration=CalibrationSettings(match_tolerance_s=0.6, apply_timeout_s=1.0),
     )
-    with Headset(rig, address, KEY) as headset:
+    with Headset(address, KEY) as headset:
         yield Studio(settings, camera, headset)
 
 

@@ -150,24 +150,26 @@ def test_wearers_and_sessions_are_remembered_newest_first(tmp_path: Path) -> Non
 
 
 def test_the_pairing_key_is_made_once_and_apart(file: PreferencesFile, tmp_path: Path) -> None:
-    key = file.pairing_key()
-    assert file.pairing_key() == key
+    key = file.pairings().open_key()
+    assert file.pairings().open_key() == key
     path = tmp_path / "config" / "pairing.key"
     if os.name == "posix":
         assert path.stat().st_mode & 0o077 == 0
     file.save(replace(CHANGED, theme="light"))
     assert key not in json.dumps((tmp_path / "config" / "preferences.json").read_text())
-    renewed = file.renew_pairing_key()
+    renewed = file.renew_pairing_key().open_key()
     assert renewed != key
-    assert file.pairing_key() == renewed
+    assert file.pairings().open_key() == renewed
 
 
 @pytest.mark.parametrize("content", [b"", b"short", b"\xff" * 20, b"k" * 5000])
-def test_a_key_that_cannot_be_used_is_replaced(
+def test_a_damaged_key_is_said_and_replaced_only_on_request(
     file: PreferencesFile, tmp_path: Path, content: bytes
 ) -> None:
     path = tmp_path / "config" / "pairing.key"
     path.parent.mkdir()
     path.write_bytes(content)
-    assert len(file.pairing_key()) == 32
-    assert file.pairing_key().encode() != content
+    with pytest.raises(FileError, match=r"pairing\.key"):
+        file.pairings()
+    assert path.read_bytes() == content
+    assert len(file.renew_pairing_key().open_key()) == 32

@@ -109,6 +109,15 @@ def open_program(qtbot: QtBot, file: PreferencesFile) -> Iterator[Callable[[], T
     assert [t.name for t in threading.enumerate() if t.name.startswith("handcal")] == []
 
 
+def test_damaged_pairing_keys_are_said_and_left_alone(
+    open_program: Callable[[], Technician], file: PreferencesFile
+) -> None:
+    path = file.path.with_name("pairing.key")
+    path.write_bytes(b'{"devices": [')
+    assert "pairing.key are damaged" in open_program().banner
+    assert path.read_bytes() == b'{"devices": ['
+
+
 @pytest.fixture
 def technician(open_program: Callable[[], Technician]) -> Technician:
     return open_program()

@@ -1,7 +1,9 @@
 """The headset's end: against the real server over a bad network, and against a hostile one."""
 
+import random
 import threading
 import time
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,17 +13,30 @@ import pytest
 from handcal.display import target_corners_m
 from handcal.errors import LinkError
 from handcal.geometry import rigid
-from handcal.link import handcal_pb2 as pb
-from handcal.link import messages
-from handcal.link.client import HeadsetClient
+from handcal.link import greetings, messages, wire
+from handcal.link.client import MAX_WEARERS, HeadsetClient, HeadsetState
 from handcal.link.impair import Impairment
-from handcal.link.server import HeadsetServer
+from handcal.link.messages import Owner
+from handcal.link.pairing import Pairings
+from handcal.link.reliable import Receipt
+from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.settings import LinkSettings
-from handcal.types import EYES, Float64, Projection, Target
+from handcal.link.wire import Rejection
+from handcal.types import (
+    EYES,
+    Eye,
+    Float64,
+    HeadsetIdentity,
+    HeadsetView,
+    Projection,
+    Shape,
+    Target,
+)
 from tests.helpers import eventually
 
 BAD = Impairment(loss=0.3, reorder=0.2, duplicate=0.2, delay_s=0.003, seed=1)
 OFFSET_NS = 20_000_000
+IDENTITY = HeadsetIdentity("0000000000001234", name="Lab 1", runtime="tests", app="tests 1")
 TARGET = Target("left", target_corners_m(0.5))
 
 
@@ -38,7 +53,7 @@ def projection(eye: Any, value: float) -> Projection:
 
 
 def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, impairment=BAD) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
         sent = [
             server.send_cursor(hand(), 3),
             server.send_prompt("Cover the outline", ["right"]),
@@ -62,7 +77,7 @@ def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_ke
 
 
 def test_the_newest_of_many_stays(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, impairment=BAD) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
         client.wait_connected(5.0)
         seen: list[float] = []
         for i in range(1, 41):
@@ -80,26 +95,62 @@ def test_the_newest_of_many_stays(server: HeadsetServer, pairing_key: bytes) -> 
 def test_a_confirmation_arrives_once_on_the_hosts_clock(
     server: HeadsetServer, pairing_key: bytes
 ) -> None:
-    T_E_W = {eye: rigid([0.0, 0.1, 0.0], [x, 0.0, 0.2]) for eye, x in (("left", -1), ("right", 1))}
     confirmations = []
-    with HeadsetClient(server.address, pairing_key, headset_clock_ns, impairment=BAD) as client:
-        client.wait_connected(5.0)
+    with HeadsetClient(
+        server.address, pairing_key, IDENTITY, headset_clock_ns, impairment=BAD
+    ) as client:
+        server.wait_acked(server.send_cursor(hand(), 5), 5.0)
         t_host_ns = time.monotonic_ns()
-        message = client.confirm(T_E_W, t_host_ns + OFFSET_NS, cursor_id=5)  # type: ignore[arg-type]
-        client.wait_acked(message, 5.0)
+        client.wait_acked(client.confirm(t_host_ns + OFFSET_NS, client.state()), 5.0)
         for _ in range(100):
             confirmations += server.confirmations()
             time.sleep(0.02)
     (confirmation,) = confirmations
     assert confirmation.cursor_id == 5
+    assert confirmation.problem == ""
     assert confirmation.t_headset_ns == t_host_ns + OFFSET_NS
     assert abs(confirmation.t_host_ns - t_host_ns) < 5_000_000
-    for eye in EYES:
-        np.testing.assert_array_equal(confirmation.T_E_W[eye], T_E_W[eye])
+
+
+def confirmed(server: HeadsetServer, client: HeadsetClient, state: HeadsetState) -> str:
+    """Confirm with a state, and return the difference that the PC finds."""
+    client.wait_acked(client.confirm(time.monotonic_ns(), state), 5.0)
+    heard: list[Confirmation] = []
+
+    def hear() -> bool:
+        heard.extend(server.confirmations())
+        return bool(heard)
+
+    eventually(hear)
+    return heard[0].problem
+
+
+def test_a_confirmation_of_stale_drawings_is_found_out(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    P = np.arange(12.0).reshape(3, 4)
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        server.wait_acked(server.send_projection(Projection("left", P, 1268, 720)), 5.0)
+        server.wait_acked(server.send_cursor(hand(), 1), 5.0)
+        first = client.state()
+        assert confirmed(server, client, first) == ""
+        moved = Projection("left", P, 1268, 720, P_offline=P + 1e-9)
+        server.wait_acked(server.send_projection(moved), 5.0)
+        second = client.state()
+        assert confirmed(server, client, second) == ""
+        server.wait_acked(server.send_show(is_offline=True), 5.0)
+        assert "other projections" in confirmed(server, client, second)
+        assert confirmed(server, client, client.state()) == ""
+        server.wait_acked(server.send_show(is_offline=False), 5.0)
+        server.wait_acked(server.send_cursor(hand(1), 1), 5.0)
+        assert "another cursor" in confirmed(server, client, second)
+        assert confirmed(server, client, client.state()) == ""
 
 
 def test_a_lost_datagram_loses_no_pose(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, headset_clock_ns, impairment=BAD) as client:
+    with HeadsetClient(
+        server.address, pairing_key, IDENTITY, headset_clock_ns, impairment=BAD
+    ) as client:
         client.wait_connected(5.0)
         start_ns, period_ns = headset_clock_ns(), 10_000_000
         for i in range(100):
@@ -115,7 +166,7 @@ def test_a_lost_datagram_loses_no_pose(server: HeadsetServer, pairing_key: bytes
 
 def test_loss_only_thins_the_live_hand(server: HeadsetServer, pairing_key: bytes) -> None:
     counts = []
-    with HeadsetClient(server.address, pairing_key, impairment=BAD) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
         server.wait_connected(5.0)
         for i in range(20):
             server.send_live_hand(hand(i), is_over_limit=i % 2 == 0)
@@ -129,7 +180,7 @@ def test_loss_only_thins_the_live_hand(server: HeadsetServer, pairing_key: bytes
 def test_the_live_hand_carries_its_colour_and_its_absence(
     server: HeadsetServer, pairing_key: bytes
 ) -> None:
-    with HeadsetClient(server.address, pairing_key) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
         server.wait_connected(5.0)
         server.send_live_hand(hand(), is_over_limit=True)
         eventually(lambda: client.state().live_W_m is not None and client.state().is_over_limit)
@@ -138,7 +189,7 @@ def test_the_live_hand_carries_its_colour_and_its_absence(
 
 
 def test_a_cursor_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
         server.wait_acked(server.send_cursor(hand(), 1), 5.0)
         assert client.state().cursor_W_m is not None
         server.wait_acked(server.send_cursor(np.empty((0, 3)), 2), 5.0)
@@ -146,7 +197,7 @@ def test_a_cursor_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -
 
 
 def test_a_target_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
         server.wait_acked(server.send_target(TARGET), 5.0)
         assert client.state().target is not None
         server.wait_acked(server.send_target(None), 5.0)
@@ -161,7 +212,7 @@ def test_a_headset_that_starts_again_is_sent_the_state_again(
     server: HeadsetServer, pairing_key: bytes
 ) -> None:
     for _ in range(2):
-        with HeadsetClient(server.address, pairing_key) as client:
+        with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
             if server.statistics().sent == 0:
                 server.wait_acked(server.send_prompt("Raise your hand"), 5.0)
             eventually(partial(has_prompt, client, "Raise your hand"))
@@ -171,7 +222,7 @@ def test_a_headset_that_starts_again_is_sent_the_state_again(
 def test_a_pc_that_starts_again_is_found_again(pairing_key: bytes) -> None:
     with HeadsetServer(pairing_key) as first:
         address = first.address
-        client = HeadsetClient(address, pairing_key)
+        client = HeadsetClient(address, pairing_key, IDENTITY)
         first.wait_acked(first.send_projection(projection("left", 1.0)), 5.0)
         first.wait_acked(first.send_prompt("old"), 5.0)
     with client, HeadsetServer(pairing_key, bind=address) as second:
@@ -184,28 +235,193 @@ def test_a_pc_that_starts_again_is_found_again(pairing_key: bytes) -> None:
 
 def test_silence_is_noticed(pairing_key: bytes, raw_server: Any) -> None:
     settings = LinkSettings(silence_s=0.3)
-    with HeadsetClient(raw_server.address, pairing_key, settings=settings) as client:
+    with HeadsetClient(raw_server.address, pairing_key, IDENTITY, settings=settings) as client:
         hello, address = raw_server.wait_for("hello")
-        welcome = pb.Envelope(welcome=pb.Welcome(nonce=hello.hello.nonce, session=9))
-        raw_server.socket.sendto(raw_server.seal(welcome), address)
+        retry = raw_server.greeting(greetings.retry(hello.hello.nonce, b"cookie"))
+        raw_server.socket.sendto(retry, address)
+        second, _ = raw_server.wait_for("hello")
+        assert second.hello.cookie == b"cookie"
+        assert second.hello.nonce == hello.hello.nonce
+        assert second.hello.time_ns > hello.hello.time_ns
+        welcome = wire.Welcome(9, hello.hello.nonce, bytes(16))
+        greeting = raw_server.greeting(greetings.welcome(welcome))
+        raw_server.socket.sendto(greeting, address)
+        raw_server.use_session(welcome)
         raw_server.wait_for("ack")
-        assert not client.connected
-        raw_server.socket.sendto(raw_server.seal(messages.ack(), 9, 1), address)
-        eventually(lambda: client.connected)
+        assert client.connected
+        eventually(lambda: not client.connected)
         again, _ = raw_server.wait_for("hello")
         assert again.hello.nonce != hello.hello.nonce
-        assert not client.connected
+        assert again.hello.cookie == b""
 
-        raw_server.socket.sendto(raw_server.seal(welcome), address)
+        raw_server.socket.sendto(greeting, address)
         raw_server.socket.sendto(raw_server.seal(messages.prompt("old", EYES), 9, 1), address)
         time.sleep(0.05)
         assert not client.connected
         assert client.state().prompt == ""
 
 
+def test_a_pc_gone_mad_stops_nothing(pairing_key: bytes, raw_server: Any) -> None:
+    chance = random.Random(0)
+    made = [
+        messages.cursor(hand(count=3), 2**32 - 1),
+        *messages.live_hand(hand(count=450), True, 1, is_outline=True),
+        messages.prompt("x" * 500, EYES),
+        messages.projection(replace(projection("left", 1.0), wearer="w", rig="r")),
+        messages.target(TARGET),
+        messages.shape(Shape(np.ones((8, 3)))),
+        messages.ack([Receipt(7, 1, 2**200)]),
+    ]
+    with HeadsetClient(raw_server.address, pairing_key, IDENTITY) as client:
+        hello, address = raw_server.wait_for("hello")
+        welcome = wire.Welcome(9, hello.hello.nonce, bytes(16))
+        raw_server.socket.sendto(raw_server.greeting(greetings.welcome(welcome)), address)
+        raw_server.use_session(welcome)
+        client.wait_connected(3.0)
+        for sequence in range(1, 3000):
+            payload = bytearray(chance.choice(made).SerializeToString())
+            for _ in range(chance.randrange(4)):
+                payload[chance.randrange(1, len(payload))] = chance.randrange(256)
+            with client._changed:
+                client._take(
+                    raw_server.seal_payload(bytes(payload), 9, sequence), raw_server.address
+                )
+            client.state()
+        assert client._rejected[Rejection.CORRUPT] > 300
+        assert client.state().cursor_message is not None
+        assert len(client.kept) <= MAX_WEARERS
+
+
+def test_a_headset_introduces_itself_and_says_what_has_changed(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    view = HeadsetView(rigid(translation_m=[0.03, 0, 0]), np.array([-0.3, 0.3, -0.2, 0.2]), 9, 8)
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        eventually(lambda: server.device)
+        assert server.device is not None
+        assert (server.device.device_id, server.device.name) == (IDENTITY.device_id, "Lab 1")
+        client.set_identity(replace(IDENTITY, views={"left": view}, eye_distance_m=0.064))
+        eventually(lambda: server.device and server.device.eye_distance_m == 0.064)
+        np.testing.assert_array_equal(server.device.views["left"].T_V_H, view.T_V_H)
+        with pytest.raises(ValueError, match="keeps its device_id"):
+            client.set_identity(HeadsetIdentity("0" * 16))
+    eventually(lambda: not server.connected)
+
+
+def test_projections_are_kept_by_wearer_and_dropped_with_the_rig(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    def send(wearer: str, rig: str, eye: Eye = "left") -> None:
+        P = np.full((3, 4), float(len(wearer)))
+        made = Projection(eye, P, 1268, 720, wearer=wearer, rig=rig)
+        server.wait_acked(server.send_projection(made), 5.0)
+
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        send("Anna", "rig A")
+        send("Anna", "rig A", "right")
+        assert set(client.state().projections) == set(EYES)
+        send("Bo", "rig A")
+        assert set(client.state().projections) == {"left"}  # not the right eye's of Anna
+        assert set(client.kept) == {Owner("Anna", "rig A"), Owner("Bo", "rig A")}
+        eventually(lambda: server.shown == Owner("Bo", "rig A"))
+        client.show_kept(Owner("Anna", "rig A"))
+        assert client.state().projections["right"].P[0, 0] == 4.0
+        eventually(lambda: server.shown == Owner("Anna", "rig A"))
+        send("Cleo", "rig B")
+        assert set(client.kept) == {Owner("Cleo", "rig B")}
+        eventually(lambda: server.shown == Owner("Cleo", "rig B"))
+
+
+def test_shapes_and_the_offline_calibration_are_shown_and_taken_away(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    cube = Shape(np.arange(24.0).reshape(8, 3), ("right",))
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        server.wait_acked(server.send_shape(cube), 5.0)
+        shape = client.state().shape
+        assert shape is not None
+        assert shape.eyes == ("right",)
+        np.testing.assert_array_equal(shape.corners_W_m, cube.corners_W_m)
+        server.wait_acked(server.send_shape(None), 5.0)
+        assert client.state().shape is None
+        made = Projection("left", np.ones((3, 4)), 9, 8, P_offline=np.zeros((3, 4)))
+        server.wait_acked(server.send_projection(made), 5.0)
+        server.wait_acked(server.send_show(is_offline=True), 5.0)
+        assert client.state().drawn["left"].P[0, 0] == 0.0
+        assert client.state().projections["left"].P[0, 0] == 1.0
+
+
+def test_an_outline_arrives_in_order_for_its_eyes(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    outline = np.column_stack([np.linspace(0, 1, 650), np.zeros(650), np.zeros(650)])
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        server.wait_connected(5.0)
+        server.send_live_hand(outline, is_over_limit=False, eyes=("left",), is_outline=True)
+
+        def is_whole() -> bool:
+            live_W_m = client.state().live_W_m
+            return live_W_m is not None and len(live_W_m) == len(outline)
+
+        eventually(is_whole)
+        state = client.state()
+    assert state.live_W_m is not None
+    assert state.is_outline
+    assert state.live_eyes == ("left",)
+    np.testing.assert_allclose(state.live_W_m, outline, atol=1e-4)
+
+
+def test_two_headsets_do_not_take_turns(server: HeadsetServer, pairings: Pairings) -> None:
+    first, second = (
+        HeadsetIdentity(one.device_id, one.name) for one in pairings.all if one.device_id
+    )
+    keys = [one.key.encode() for one in pairings.all if one.device_id]
+    with HeadsetClient(server.address, keys[0], first) as incumbent:
+        server.wait_connected(5.0)
+        with HeadsetClient(server.address, keys[1], second) as newcomer:
+            eventually(lambda: newcomer.refusal)
+            assert newcomer.refusal == "Headset 1 is connected to the PC; disconnect it first"
+            notice = server.statistics().notice
+            assert notice == "headset Headset 2 asks to connect; Headset 1 is connected"
+            with pytest.raises(LinkError, match="Headset 1 is connected"):
+                newcomer.wait_connected(0.1)
+            assert incumbent.connected
+            assert not newcomer.connected
+            incumbent.close()
+            newcomer.wait_connected(5.0)
+            assert newcomer.refusal == ""
+
+
+def test_a_key_serves_one_device(server: HeadsetServer, pairing_key: bytes) -> None:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as owner:
+        owner.wait_connected(5.0)
+    copy = HeadsetIdentity("00000000000000aa", name="Copy")
+    with HeadsetClient(server.address, pairing_key, copy) as client:
+        eventually(lambda: client.refusal)
+        assert "belongs to Lab 1" in client.refusal
+        assert "pairing key of Lab 1" in server.statistics().notice
+
+
+@pytest.mark.parametrize("bind", ["::1", "::"])
+def test_ipv6_and_both(pairing_key: bytes, bind: str) -> None:
+    try:
+        server = HeadsetServer(pairing_key, (bind, 0))
+    except LinkError:
+        pytest.skip("this system has no IPv6")
+    port = server.address[1]
+    hosts = ("::1", "127.0.0.1") if bind == "::" else ("::1",)
+    with server:
+        for host in hosts:
+            with HeadsetClient((host, port), pairing_key, IDENTITY) as client:
+                client.wait_connected(5.0)
+                server.wait_acked(server.send_prompt(host), 5.0)
+                assert client.state().prompt == host
+            eventually(lambda: not server.connected)
+
+
 def test_a_wrong_key_connects_nobody(server: HeadsetServer) -> None:
     with (
-        HeadsetClient(server.address, b"another pairing key") as client,
+        HeadsetClient(server.address, b"another pairing key", IDENTITY) as client,
         pytest.raises(LinkError, match="key"),
     ):
         client.wait_connected(0.3)
@@ -215,7 +431,7 @@ def test_a_wrong_key_connects_nobody(server: HeadsetServer) -> None:
 def test_the_pc_says_good_bye(pairing_key: bytes) -> None:
     before = threading.active_count()
     server = HeadsetServer(pairing_key)
-    with HeadsetClient(server.address, pairing_key) as client:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
         client.wait_connected(5.0)
         server.close()
         eventually(lambda: client.dismissed)
@@ -226,4 +442,4 @@ def test_the_pc_says_good_bye(pairing_key: bytes) -> None:
 @pytest.mark.parametrize("host", ["no-such-host.invalid", "no..name", "n" * 80])
 def test_an_unknown_host_is_a_clear_error(pairing_key: bytes, host: str) -> None:
     with pytest.raises(LinkError, match="unknown host"):
-        HeadsetClient((host, 1), pairing_key)
+        HeadsetClient((host, 1), pairing_key, IDENTITY)

@@ -8,12 +8,20 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from handcal.geometry import rigid
+from handcal.link import greetings, messages
 from handcal.link import handcal_pb2 as pb
-from handcal.link import messages
 from handcal.link.messages import MalformedError
 from handcal.link.reliable import Receipt
 from handcal.link.wire import MAX_PAYLOAD_BYTES
-from handcal.types import EYES, Float64, Projection, Target
+from handcal.types import (
+    EYES,
+    Float64,
+    HeadsetIdentity,
+    HeadsetView,
+    Projection,
+    Shape,
+    Target,
+)
 
 CLOUDS = arrays(np.float64, st.tuples(st.integers(0, 700), st.just(3)), elements=st.floats(-3, 3))
 
@@ -68,14 +76,12 @@ def test_projection_prompt_poses_and_confirmation_survive_exactly() -> None:
     prompt = sent(messages.prompt("Close the right eye", ["left"])).prompt
     assert messages.read_prompt(prompt) == ("Close the right eye", ("left",))
 
-    T = {eye: rigid([0.1, -0.2, 0.3], [x, 0.0, 1.0]) for eye, x in zip(EYES, (-1, 1), strict=True)}
+    T = {"left": rigid([0.1, -0.2, 0.3], [-1, 0.0, 1.0])}
     ((t_ns, T_W_H),) = messages.read_poses(sent(messages.poses([(-5, T["left"])])).poses)
     assert t_ns == -5
     np.testing.assert_array_equal(T_W_H, T["left"])
-    confirm = sent(messages.confirm(T, 9, 4)).confirm
-    assert (confirm.t_headset_ns, confirm.cursor_id) == (9, 4)
-    for eye, T_E_W in messages.read_confirm(confirm).items():
-        np.testing.assert_array_equal(T_E_W, T[eye])
+    confirm = messages.read_confirm(sent(messages.confirm(9, 4, bytes(16))).confirm)
+    assert (confirm.t_headset_ns, confirm.cursor_id, confirm.drawn) == (9, 4, bytes(16))
 
 
 def test_a_target_survives_exactly_and_can_be_taken_away() -> None:
@@ -97,6 +103,11 @@ def test_receipts_survive(receipts: list[Receipt]) -> None:
 
 
 def test_what_cannot_be_sent_is_refused() -> None:
+    for name in ("x" * 41, "two\nlines"):
+        with pytest.raises(ValueError, match="40 characters in one line"):
+            messages.device(HeadsetIdentity("0" * 16, name), messages.Owner())
+    with pytest.raises(ValueError, match="200 characters"):
+        messages.projection(Projection("left", np.eye(3, 4), 9, 8, wearer="x" * 201))
     with pytest.raises(ValueError, match="500 characters"):
         messages.prompt("x" * 501, EYES)
     with pytest.raises(ValueError, match="finite"):
@@ -110,13 +121,20 @@ def rotated(scale: float) -> list[float]:
     return numbers
 
 
+def read_device(message: pb.Device) -> object:
+    return messages.read_device(message, "0" * 16)
+
+
 @pytest.mark.parametrize(
     ("read", "message"),
     [
         (messages.read_points, pb.Points(origin_m=[0, 0], offsets=bytes(6))),
         (messages.read_points, pb.Points(origin_m=[0, 0, 0], offsets=bytes(7))),
         (messages.read_points, pb.Points(origin_m=[0, 0, np.nan], offsets=bytes(6))),
-        (messages.read_projection, pb.Projection(eye=pb.EYE_UNSPECIFIED, P=[0.0] * 12)),
+        (
+            messages.read_projection,
+            pb.Projection(width_px=1, height_px=1, T_V_H=rotated(1.0), P=[0.0] * 12),
+        ),
         (messages.read_projection, pb.Projection(eye=pb.EYE_LEFT, P=[0.0] * 11)),
         (messages.read_prompt, pb.Prompt(text="x" * 501)),
         (messages.read_prompt, pb.Prompt(eyes=[pb.EYE_LEFT] * 3)),
@@ -124,12 +142,61 @@ def rotated(scale: float) -> list[float]:
         (messages.read_target, pb.Target(corners_V_m=[0.0] * 12)),
         (lambda m: list(messages.read_poses(m)), pb.Poses(poses=[pb.Pose(T_W_H=rotated(1.01))])),
         (lambda m: list(messages.read_poses(m)), pb.Poses(poses=[pb.Pose(T_W_H=rotated(-1.0))])),
-        (messages.read_confirm, pb.Confirm(T_E_W_left=rotated(1.0))),
+        (messages.read_confirm, pb.Confirm(drawn=bytes(15))),
+        (messages.read_shape, pb.Shape(corners_W_m=[0.0] * 15)),
+        (messages.read_shape, pb.Shape(corners_W_m=[np.inf] * 12)),
+        (read_device, pb.Device(name="x" * 41)),
+        (read_device, pb.Device(name="two\nlines")),
+        (read_device, pb.Device(eye_distance_m=np.nan)),
+        (read_device, pb.Device(views=[pb.View()] * 3)),
+        (read_device, pb.Device(views=[pb.View(eye=pb.EYE_LEFT, T_V_H=rotated(1.0))])),
+        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
+        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
+        (greetings.read_hello, pb.Envelope(bye=pb.Bye())),
+        (greetings.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
     ],
 )
 def test_nonsense_is_malformed(read: Callable[[Any], object], message: object) -> None:
     with pytest.raises(MalformedError):
         read(message)
+
+
+def test_a_projection_brings_its_view_its_offline_form_and_its_owner() -> None:
+    rng = np.random.default_rng(0)
+    P, P_offline = rng.normal(size=(2, 3, 4))
+    T_V_H = rigid([0.1, 0.0, 0.2], [0.03, 0.0, 0.0])
+    made = Projection("left", P, 1268, 720, T_V_H, P_offline, "P 7 ö", "rig A")
+    read = messages.read_projection(sent(messages.projection(made)).projection)
+    assert read.P_offline is not None
+    for a, b in ((read.P, P), (read.P_offline, P_offline), (read.T_V_H, T_V_H)):
+        np.testing.assert_array_equal(a, b)
+    assert (read.wearer, read.rig) == ("P 7 ö", "rig A")
+
+
+def test_a_headset_introduces_itself() -> None:
+    view = HeadsetView(rigid([0.0, 0.1, 0.0]), np.array([-0.3, 0.3, -0.2, 0.2]), 1268, 720)
+    made = HeadsetIdentity(
+        "00000000000000ff", "Lab 2", "OpenXR", "app 1", 2, {"right": view}, 0.063
+    )
+    owner = messages.Owner("P 7", "rig A")
+    read, shown = messages.read_device(sent(messages.device(made, owner)).device, made.device_id)
+    assert shown == owner
+    assert (read.name, read.runtime, read.app, read.protocol) == ("Lab 2", "OpenXR", "app 1", 2)
+    assert read.eye_distance_m == 0.063
+    np.testing.assert_array_equal(read.views["right"].T_V_H, view.T_V_H)
+    np.testing.assert_array_equal(read.views["right"].tangents, view.tangents)
+    unknown = messages.device(HeadsetIdentity(made.device_id), messages.Owner())
+    assert messages.read_device(unknown.device, made.device_id)[0].eye_distance_m is None
+
+
+@pytest.mark.parametrize("count", [4, 8])
+def test_shapes_survive_exactly(count: int) -> None:
+    corners = np.random.default_rng(0).normal(size=(count, 3))
+    read = messages.read_shape(sent(messages.shape(Shape(corners, ("left",)))).shape)
+    assert read is not None
+    assert read.eyes == ("left",)
+    np.testing.assert_array_equal(read.corners_W_m, corners)
+    assert messages.read_shape(sent(messages.shape(None)).shape) is None
 
 
 @given(st.binary(max_size=300))

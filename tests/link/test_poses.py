@@ -30,7 +30,7 @@ def test_refusals_say_why() -> None:
     with pytest.raises(PosePendingError, match="not arrived"):
         poses.at(0)
     for t_ms in (100, 110, 200):
-        poses.add(t_ms * MS, pose(0))
+        poses.add(t_ms * MS, pose(t_ms))
     with pytest.raises(PoseError, match="100 ms before"):
         poses.at(0)
     with pytest.raises(PoseError, match="gap of 90 ms"):
@@ -38,6 +38,30 @@ def test_refusals_say_why() -> None:
     with pytest.raises(PosePendingError, match="not arrived"):
         poses.at(201 * MS)
     assert poses.at(105 * MS).shape == (4, 4)
+
+
+@pytest.mark.parametrize(
+    ("gap_ms", "moved_m", "turned_rad", "is_known"),
+    [
+        (50, 0.1, 0.5, True),
+        (60, 0.1, 0.0, False),
+        (60, 0.0, 0.1, False),
+        (60, 0.004, 0.008, True),
+        (250, 0.004, 0.008, True),
+        (260, 0.0, 0.0, False),
+    ],
+)
+def test_longer_gaps_are_interpolated_where_the_head_is_slow(
+    gap_ms: int, moved_m: float, turned_rad: float, is_known: bool
+) -> None:
+    poses = PoseBuffer()
+    poses.add(0, rigid())
+    poses.add(gap_ms * MS, rigid([0.0, turned_rad, 0.0], [moved_m, 0.0, 0.0]))
+    if is_known:
+        assert poses.at(gap_ms * MS // 2)[0, 3] == pytest.approx(moved_m / 2)
+    else:
+        with pytest.raises(PoseError, match=f"gap of {gap_ms} ms"):
+            poses.at(gap_ms * MS // 2)
 
 
 def test_only_the_newest_are_kept() -> None:

@@ -1,5 +1,6 @@
 """The PC's end against hand-made headsets, honest and hostile."""
 
+import hashlib
 import random
 import threading
 import time
@@ -14,11 +15,12 @@ import pytest
 from handcal.errors import LinkError, PosePendingError
 from handcal.geometry import rigid
 from handcal.link import handcal_pb2 as pb
-from handcal.link import messages
+from handcal.link import messages, wire
+from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
-from handcal.types import Projection
+from handcal.types import HeadsetIdentity, Projection
 from tests.helpers import eventually
 
 NewHeadset = Callable[..., Any]
@@ -35,17 +37,14 @@ def test_it_listens_on_loopback_unless_told_otherwise(server: HeadsetServer) -> 
 
 
 def test_a_hello_alone_connects_nobody(server: HeadsetServer, new_headset: NewHeadset) -> None:
-    new_headset().join()
-    time.sleep(0.05)
+    assert new_headset().cookie()
     assert not server.connected
 
 
-def test_a_signed_datagram_of_the_offered_session_connects(
-    server: HeadsetServer, new_headset: NewHeadset
-) -> None:
+def test_a_hello_with_its_cookie_connects(server: HeadsetServer, new_headset: NewHeadset) -> None:
     headset = new_headset()
-    headset.send(headset.seal(KEEP_ALIVE, headset.join(), 1))
-    server.wait_connected(3.0)
+    headset.join()
+    assert server.connected
     envelope, packet, _ = headset.receive()
     assert envelope.WhichOneof("body") == "ping"
     assert packet.sequence == 1
@@ -68,7 +67,7 @@ def test_spoilt_datagrams_are_counted_and_dropped(
     reason: str,
 ) -> None:
     headset = new_headset()
-    headset.send(spoil(headset.seal(pb.Envelope(hello=pb.Hello(nonce=1)))))
+    headset.send(spoil(headset.hello()))
     eventually(lambda: server.statistics().rejected[reason] == 1)
     assert headset.join() != 0
 
@@ -77,29 +76,28 @@ def test_a_wrong_key_is_counted_and_never_answered(
     server: HeadsetServer, new_headset: NewHeadset
 ) -> None:
     stranger = new_headset(b"another pairing key")
-    stranger.send(stranger.seal(pb.Envelope(hello=pb.Hello(nonce=1))))
+    stranger.send(stranger.hello())
     eventually(lambda: server.statistics().rejected["unpaired"] == 1)
     assert server.statistics().sent == 0
 
 
 def test_a_replayed_capture_does_nothing(server: HeadsetServer, new_headset: NewHeadset) -> None:
     headset, thief = new_headset(), new_headset()
-    hello = headset.seal(pb.Envelope(hello=pb.Hello(nonce=1)))
+    hellos = [headset.hello(), headset.hello(headset.cookie())]
     session = headset.join()
-    capture = [hello, *(headset.seal(pose(i), session, i) for i in range(1, 9))]
+    capture = [headset.seal(pose(i), session, i) for i in range(1, 9)]
     for datagram in capture:
         headset.send(datagram)
     eventually(lambda: server.statistics().received == 8)
 
-    for datagram in capture[1:]:
+    for datagram in capture + hellos:
         headset.send(datagram)
-    eventually(lambda: server.statistics().rejected["replayed"] == 8)
-    for datagram in capture:
+    eventually(lambda: server.statistics().rejected["replayed"] == 10)
+    for datagram in capture + hellos:
         thief.send(datagram)
     eventually(lambda: server.statistics().rejected["wrong_session"] == 8)
+    eventually(lambda: server.statistics().rejected["replayed"] == 12)
 
-    stranger_session = thief.receive()[0].welcome.session
-    assert stranger_session != session
     headset.send(headset.seal(pose(9), session, 9))
     eventually(lambda: server.statistics().received == 9)
     thief.socket.settimeout(0.3)
@@ -107,15 +105,83 @@ def test_a_replayed_capture_does_nothing(server: HeadsetServer, new_headset: New
         thief.receive()
 
 
-def test_an_older_session_stays_closed(server: HeadsetServer, new_headset: NewHeadset) -> None:
-    first, second = new_headset(), new_headset()
+def test_an_incumbent_stays_until_it_is_silent(pairings: Pairings, raw_headset: Any) -> None:
+    with HeadsetServer(pairings, settings=LinkSettings(silence_s=0.6)) as server:
+        keys = [one.key.encode() for one in pairings.all if one.device_id]
+        first, second = (raw_headset(server.address, keys[i], i + 1) for i in (0, 1))
+        with first.socket, second.socket:
+            session = first.join()
+            refusal = second.refusal()
+            assert refusal.other == "Headset 1"
+            assert not refusal.is_key_taken
+            notice = "headset Headset 2 asks to connect; Headset 1 is connected"
+            assert server.statistics().notice == notice
+            first.send(first.seal(KEEP_ALIVE, session, 1))
+            eventually(lambda: not server.connected)
+            second.join()
+            assert server.connected
+            first.send(first.seal(KEEP_ALIVE, session, 2))
+            eventually(lambda: server.statistics().rejected["wrong_session"] == 1)
+
+
+def test_a_device_that_restarts_takes_over_its_own_session(
+    server: HeadsetServer, new_headset: NewHeadset
+) -> None:
+    first, restarted = new_headset(), new_headset()
     old = first.join()
-    first.send(first.seal(KEEP_ALIVE, old, 1))
-    eventually(lambda: server.statistics().received == 1)
-    second.send(second.seal(KEEP_ALIVE, second.join(), 1))
-    eventually(lambda: server.statistics().received == 2)
-    first.send(first.seal(KEEP_ALIVE, old, 2))
-    eventually(lambda: server.statistics().rejected["wrong_session"] == 1)
+    restarted.time_ns = 1000
+    assert not restarted.refusal().is_key_taken  # the old session was heard just now
+    assert "asks to connect" in server.statistics().notice
+    time.sleep(0.6)
+    assert server.connected
+    assert restarted.join(nonce=b"n" * 16) != old
+    assert server.connected
+
+
+def test_a_lost_welcome_is_sent_again(server: HeadsetServer, new_headset: NewHeadset) -> None:
+    headset = new_headset()
+    cookie = headset.cookie()
+    welcomes = []
+    for _ in range(2):
+        headset.send(headset.hello(cookie))
+        welcomes.append(headset.receive_greeting().welcome.session)
+    assert welcomes[0] == welcomes[1] != 0
+
+
+def test_a_headset_of_version_1_and_the_pc_are_told(
+    server: HeadsetServer, new_headset: NewHeadset, pairing_key: bytes
+) -> None:
+    old = new_headset()
+    root = hashlib.blake2b(pairing_key, person=b"handcal pairing").digest()
+    to_pc, to_headset = (
+        hashlib.blake2b(label, key=root).digest() for label in (b"to pc", b"to headset")
+    )
+
+    def sign(key: bytes, body: bytes) -> bytes:
+        return body + hashlib.blake2b(body, key=key, digest_size=16).digest()
+
+    header = wire.HEADER.pack(b"hC", 1, 0, 0, 0, 0, 0, 1)
+    hello = sign(to_pc, header + b"\x0a\x09\x09" + b"12345678")
+    old.send(hello)
+    answers = [old.socket.recv(2048) for _ in range(2)]
+    assert sum(map(len, answers)) <= 3 * len(hello)
+    for answer in answers:
+        assert answer == sign(to_headset, answer[:-16])
+        assert answer[2] == 1
+    welcome, prompt = (pb.Envelope.FromString(answer[28:-16]) for answer in answers)
+    assert welcome.WhichOneof("body") == "welcome"
+    assert b"12345678" in answers[0]
+    assert prompt.prompt.text == "Update this app: protocol 2"
+    assert server.statistics().notice == "this headset speaks protocol 1, update its app"
+
+    for _ in range(50):
+        old.send(hello)
+    old.send(sign(bytes(64), header + b"\x0a\x09\x09" + b"12345678"))
+    eventually(lambda: server.statistics().rejected["wrong_version"] == 52)
+    old.socket.settimeout(0.1)
+    with pytest.raises(TimeoutError):
+        old.socket.recv(2048)
+    assert not server.connected
 
 
 def test_nonsense_from_a_paired_headset_is_corrupt(
@@ -126,7 +192,7 @@ def test_nonsense_from_a_paired_headset_is_corrupt(
     skewed = pb.Envelope(poses=pb.Poses(poses=[pb.Pose(t_headset_ns=1, T_W_H=[0.0] * 12)]))
     for sequence, envelope in enumerate((skewed, pb.Envelope(), pb.Envelope(ping=pb.Ping())), 1):
         headset.send(headset.seal(envelope, session, sequence))
-    headset.send(headset.seal(KEEP_ALIVE))  # outside any session
+    headset.send(headset.greeting(KEEP_ALIVE))  # outside any session
     eventually(lambda: server.statistics().rejected["corrupt"] == 4)
     assert server.statistics().pose_rate_hz == 0.0
 
@@ -145,17 +211,23 @@ def test_a_paired_headset_gone_mad_stops_nothing(
                 pb.Envelope(pong=pb.Pong(t_sent_host_ns=now_ns, t_received_headset_ns=b)),
                 pose(a),
                 messages.ack([Receipt(1, 1, 2**200)]),
-                messages.confirm({"left": np.eye(4), "right": np.eye(4)}, a, 1),
+                messages.confirm(a, 1, bytes(16)),
+                messages.device(HeadsetIdentity("0" * 16), messages.Owner()),
             ]
         )
         payload = bytearray(envelope.SerializeToString())
         if chance.random() < 0.5:
             payload[chance.randrange(len(payload))] ^= 1 << chance.randrange(8)
         headset.send(headset.seal_payload(bytes(payload), session, sequence))
-    eventually(lambda: server.statistics().received == 399)
+
+    def taken() -> int:
+        statistics = server.statistics()
+        return statistics.received + statistics.rejected["wrong_session"]  # after a good-bye
+
+    eventually(lambda: taken() == 399)
     server.confirmations()
     assert server.statistics().rejected["corrupt"] > 0
-    assert headset.join() != 0
+    assert server.statistics().received > 100
 
 
 def test_poses_are_told_at_the_hosts_time(server: HeadsetServer, new_headset: NewHeadset) -> None:
@@ -235,13 +307,15 @@ def test_a_hello_amid_the_good_bye_is_not_welcomed(
     server: HeadsetServer, new_headset: NewHeadset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     headset = new_headset()
-    hello = headset.seal(pb.Envelope(hello=pb.Hello(nonce=2)))
+    cookie = headset.cookie()
+    session = headset.join()
+    hello = headset.hello(cookie, b"n" * 16)
 
     def receive(_timeout_s: float) -> list[tuple[bytes, Any]]:
         assert server._closing.wait(5.0)
         return [(hello, headset.address)]
 
-    headset.send(headset.seal(KEEP_ALIVE, headset.join(), 1))
+    headset.send(headset.seal(KEEP_ALIVE, session, 1))
     server.wait_connected(3.0)
     monkeypatch.setattr(server._transport, "receive", receive)
     server.close()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from handcal.link import wire
 from handcal.link.wire import Packet, Rejection, ReplayWindow, Slot
 
-KEYS = wire.derive_keys(b"0123456789abcdef")
+KEYS = wire.handshake_keys(b"0123456789abcdef", 7)
 PACKETS = st.builds(
     Packet,
     payload=st.binary(max_size=wire.MAX_PAYLOAD_BYTES),
@@ -23,21 +23,27 @@ PACKETS = st.builds(
 )
 
 
+def unseal(key: bytes, datagram: bytes) -> Packet | Rejection:
+    packet = wire.read(datagram)
+    is_good = isinstance(packet, Rejection) or wire.is_authentic(key, datagram)
+    return packet if is_good else Rejection.UNPAIRED
+
+
 @given(PACKETS)
 def test_a_packet_survives_the_way(packet: Packet) -> None:
     datagram = wire.seal(KEYS.to_pc, packet)
     assert len(datagram) <= wire.MAX_DATAGRAM_BYTES
-    assert wire.unseal(KEYS.to_pc, datagram) == packet
+    assert unseal(KEYS.to_pc, datagram) == packet
 
 
 @given(st.binary(max_size=2000))
 def test_random_bytes_are_rejected(data: bytes) -> None:
-    assert isinstance(wire.unseal(KEYS.to_pc, data), Rejection)
+    assert isinstance(unseal(KEYS.to_pc, data), Rejection)
 
 
 @given(st.binary(max_size=200))
 def test_random_bytes_behind_a_good_start_are_rejected(data: bytes) -> None:
-    assert isinstance(wire.unseal(KEYS.to_pc, wire.MAGIC + bytes([wire.VERSION]) + data), Rejection)
+    assert isinstance(unseal(KEYS.to_pc, wire.MAGIC + bytes([wire.VERSION]) + data), Rejection)
 
 
 @given(PACKETS, st.data())
@@ -45,31 +51,80 @@ def test_a_flipped_bit_is_rejected(packet: Packet, data: st.DataObject) -> None:
     datagram = bytearray(wire.seal(KEYS.to_pc, packet))
     bit = data.draw(st.integers(0, 8 * len(datagram) - 1))
     datagram[bit // 8] ^= 1 << bit % 8
-    assert isinstance(wire.unseal(KEYS.to_pc, bytes(datagram)), Rejection)
+    assert isinstance(unseal(KEYS.to_pc, bytes(datagram)), Rejection)
 
 
 @given(PACKETS, st.data())
 def test_a_truncated_datagram_is_rejected(packet: Packet, data: st.DataObject) -> None:
     datagram = wire.seal(KEYS.to_pc, packet)
     kept = datagram[: data.draw(st.integers(0, len(datagram) - 1))]
-    assert wire.unseal(KEYS.to_pc, kept) in (Rejection.UNPAIRED, Rejection.CORRUPT)
+    assert unseal(KEYS.to_pc, kept) in (Rejection.UNPAIRED, Rejection.CORRUPT)
 
 
 def test_a_datagram_thrown_back_is_rejected() -> None:
-    assert wire.unseal(KEYS.to_headset, wire.seal(KEYS.to_pc, Packet(b"pose"))) == "unpaired"
+    assert unseal(KEYS.to_headset, wire.seal(KEYS.to_pc, Packet(b"pose"))) == "unpaired"
 
 
-def test_another_pairing_key_is_rejected() -> None:
-    other = wire.derive_keys(b"fedcba9876543210")
-    assert wire.unseal(other.to_pc, wire.seal(KEYS.to_pc, Packet(b"pose"))) == "unpaired"
+def test_another_pairing_key_or_device_is_rejected() -> None:
+    datagram = wire.seal(KEYS.to_pc, Packet(b"pose"))
+    for key, device in ((b"fedcba9876543210", 7), (b"0123456789abcdef", 8)):
+        assert unseal(wire.handshake_keys(key, device).to_pc, datagram) == "unpaired"
+
+
+@pytest.mark.parametrize(
+    ("key", "salt", "info", "size", "derived"),
+    [
+        (
+            "0b" * 22,
+            "000102030405060708090a0b0c",
+            "f0f1f2f3f4f5f6f7f8f9",
+            42,
+            "3cb25f25faacd57a90434f64d0362f2a2d2d0a90cf1a5a4c5db02d56ecc4c5bf34007208d5b887185865",
+        ),
+        (
+            bytes(range(0x50)).hex(),
+            bytes(range(0x60, 0xB0)).hex(),
+            bytes(range(0xB0, 0x100)).hex(),
+            82,
+            "b11e398dc80327a1c8e7f78c596a49344f012eda2d4efad8a050cc4c19afa97c"
+            "59045a99cac7827271cb41c65e590e09da3275600c2f09b8367793a9aca3db71"
+            "cc30c58179ec3e87c14c01d5c1f3434f1d87",
+        ),
+        (
+            "0b" * 22,
+            "",
+            "",
+            42,
+            "8da4e775a563c18f715f802a063c5a31b8a11f5c5ee1879ec3454e5f3c738d2d9d201395faa4b61a96c8",
+        ),
+    ],
+)
+def test_keys_are_derived_as_rfc_5869_says(
+    key: str, salt: str, info: str, size: int, derived: str
+) -> None:
+    made = wire.hkdf(bytes.fromhex(key), bytes.fromhex(salt), bytes.fromhex(info), size)
+    assert made.hex() == derived
+
+
+def test_every_session_has_keys_of_its_own() -> None:
+    welcomes = [
+        wire.Welcome(session, headset * 16, pc * 16)
+        for session in (1, 2)
+        for headset in (b"a", b"b")
+        for pc in (b"c", b"d")
+    ]
+    keys = [
+        wire.session_keys(b"0123456789abcdef", device, w) for w in welcomes for device in (7, 8)
+    ]
+    assert len({key for one in keys for key in (one.to_pc, one.to_headset)}) == 2 * len(keys)
 
 
 def test_reasons_are_told_apart() -> None:
     datagram = wire.seal(KEYS.to_pc, Packet(b"pose"))
     newer = datagram[:2] + bytes([wire.VERSION + 1]) + datagram[3:]
-    assert wire.unseal(KEYS.to_pc, newer) == "wrong_version"
-    assert wire.unseal(KEYS.to_pc, bytes(wire.MAX_DATAGRAM_BYTES + 1)) == "oversized"
-    assert wire.unseal(KEYS.to_pc, b"hello") == "corrupt"
+    assert unseal(KEYS.to_pc, newer) == "wrong_version"
+    assert unseal(KEYS.to_pc, bytes(wire.MAX_DATAGRAM_BYTES + 1)) == "oversized"
+    assert unseal(KEYS.to_pc, b"hello") == "corrupt"
 
 
 @pytest.mark.parametrize(
@@ -84,12 +139,10 @@ def test_reasons_are_told_apart() -> None:
 )
 def test_nonsense_from_a_paired_peer_is_rejected(change: dict[str, Any], reason: str) -> None:
     packet = dataclasses.replace(Packet(b"x", slot=Slot.CURSOR), **change)
-    assert wire.unseal(KEYS.to_pc, wire.seal(KEYS.to_pc, packet)) == reason
+    assert unseal(KEYS.to_pc, wire.seal(KEYS.to_pc, packet)) == reason
 
 
 def test_limits_are_refused_when_sending() -> None:
-    with pytest.raises(ValueError, match="16 needed"):
-        wire.derive_keys(b"short")
     with pytest.raises(ValueError, match="does not fit"):
         wire.seal(KEYS.to_pc, Packet(bytes(wire.MAX_PAYLOAD_BYTES + 1)))
     with pytest.raises(ValueError, match="exceeds"):

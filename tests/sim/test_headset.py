@@ -1,6 +1,7 @@
 """The virtual headset over real datagrams: in a process of its own, and its endings."""
 
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -12,17 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.display import view_of_eye
+from handcal.display import projection_matrix
 from handcal.errors import LinkError
-from handcal.geometry import transform
+from handcal.geometry import invert, transform
 from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE
+from handcal.link.reliable import Delivery
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.headset import HeadsetSettings, run_headset
+from handcal.sim.process import program_command
 from handcal.sim.scene import SceneReceiver, SceneState
-from handcal.types import EYES
+from handcal.types import EYES, Projection
 
 KEY = "a pairing key of the tests"
 RIG_PATH = resource_path("example_rig.yaml")
@@ -79,19 +82,26 @@ def test_a_wearer_in_another_process_aligns_and_confirms(
     time.sleep(1.5)
     state: SceneState = wait_for(light.latest)
     assert state.T_W_hand is not None
+    rig = read_rig(RIG_PATH)
+    for eye, display in rig.eyes.items():
+        P, size = projection_matrix(display), (display.width_px, display.height_px)
+        server.send_projection(Projection(eye, P, *size, display.T_V_H))
     hand_W_m = transform(state.T_W_hand, make_hand(1).vertices_m)
     server.wait_acked(server.send_cursor(hand_W_m[::10], cursor_id=1), 5.0)
     confirmation: Confirmation = wait_for(lambda: next(iter(server.confirmations()), None))
     assert confirmation.cursor_id == 1
     assert abs(time.monotonic_ns() - confirmation.t_host_ns) < 1e9
 
-    rig = read_rig(RIG_PATH)
-    time.sleep(0.05)
-    T_W_H = server.pose_at_host_ns(confirmation.t_host_ns)
+    assert confirmation.problem == ""
+    device = wait_for(lambda: server.device)
+    assert device.name == "Virtual headset"
     for eye in EYES:
-        np.testing.assert_allclose(
-            confirmation.T_E_W[eye], view_of_eye(rig.eyes[eye], T_W_H), atol=2e-3
-        )
+        np.testing.assert_array_equal(device.views[eye].T_V_H, rig.eyes[eye].T_V_H)
+        assert device.views[eye].width_px == rig.eyes[eye].width_px
+    time.sleep(0.05)
+    T_W_H = wait_for(light.latest).T_W_D @ invert(rig.T_H_D)  # the head hardly moves
+    pose = server.pose_at_host_ns(confirmation.t_host_ns)
+    np.testing.assert_allclose(pose, T_W_H, atol=0.03)
     statistics = server.statistics()
     assert statistics.pose_rate_hz > 60.0
     assert statistics.clock_offset_ms == pytest.approx(12345.0, abs=2.0)
@@ -107,10 +117,40 @@ def settings(server: HeadsetServer, light: SceneReceiver) -> HeadsetSettings:
     return HeadsetSettings(str(RIG_PATH), server.address[1], light.port, patience_s=0.3)
 
 
+def test_a_packaged_program_starts_its_own_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert program_command() == [sys.executable, "-m", "handcal"]
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    monkeypatch.setattr(sys, "executable", "/opt/handcal/handcal-gui.exe")
+    assert program_command() == ["/opt/handcal/handcal.exe"]
+
+
 def test_it_ends_when_the_time_is_over(settings: HeadsetSettings) -> None:
     start_s = time.monotonic()
     run_headset(replace(settings, duration_s=0.2), KEY.encode(), lambda: False)
     assert time.monotonic() - start_s > 0.2
+
+
+def test_a_device_without_a_wearer_shows_and_confirms_on_enter(
+    server: HeadsetServer, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    presses: queue.SimpleQueue[str] = queue.SimpleQueue()
+    monkeypatch.setattr("sys.stdin", iter(presses.get, ""))
+    settings = HeadsetSettings(str(RIG_PATH), server.address[1], has_wearer=False)
+    heard: list[Confirmation] = []
+    for eye in EYES:
+        server.send_projection(Projection(eye, np.eye(3, 4), 9, 8))
+    cursor = server.send_cursor(np.zeros((1, 3)), 3)
+
+    def is_stopped() -> bool:
+        if cursor.state is Delivery.ACKED:
+            presses.put("\n")
+            heard.extend(server.confirmations())
+        return bool(heard)
+
+    run_headset(replace(settings, duration_s=10.0), KEY.encode(), is_stopped)
+    presses.put("")
+    assert (heard[0].cursor_id, heard[0].problem) == (3, "")
+    assert "left and right; cursor 3; open: left and right" in capsys.readouterr().out
 
 
 def test_it_ends_when_the_pc_says_good_bye(

@@ -36,10 +36,21 @@ from handcal.station.procedure import (
     ProcedureError,
     State,
 )
-from handcal.types import EYES, Alignment, Eye, Float64, Frame, Intrinsics, Projection, UInt16
+from handcal.types import (
+    EYES,
+    Alignment,
+    Eye,
+    Float64,
+    Frame,
+    HeadsetIdentity,
+    Intrinsics,
+    Projection,
+    UInt16,
+)
 from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"
+IDENTITY = HeadsetIdentity("00000000000000aa", "Headset of the tests")
 RIG = example_rig()
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 SENSOR = SensorSettings()
@@ -119,12 +130,17 @@ class Stage:
         """Hold the hand still for a while."""
         return [self.see(T_D_hand) for _ in range(frames)][-1]
 
-    def press(self, t_ns: int | None = None, cursor_id: int | None = None) -> None:
+    def press(
+        self,
+        t_ns: int | None = None,
+        cursor_id: int | None = None,
+        shown: HeadsetState | None = None,
+    ) -> None:
         """Press the headset's button, at a time and for a cursor, as of now by default."""
-        cursor_id = self.shown().cursor_id if cursor_id is None else cursor_id
-        T_E_W = {eye: view_of_eye(RIG.eyes[eye], T_W_H) for eye in EYES}
+        shown = shown or self.shown()
+        shown = shown if cursor_id is None else replace(shown, cursor_id=cursor_id)
         t_headset_ns = (t_ns or self.t_ns) + HEADSET_AHEAD_NS
-        self.client.wait_acked(self.client.confirm(T_E_W, t_headset_ns, cursor_id), 5.0)
+        self.client.wait_acked(self.client.confirm(t_headset_ns, shown), 5.0)
 
     def make_cursor(self, T_D_hand: Float64 = T_D_HAND, eyes: Sequence[Eye] = EYES) -> None:
         """Hold the hand, make the cursor of it, and wait until the headset shows it."""
@@ -179,7 +195,7 @@ def server() -> Iterator[HeadsetServer]:
 
 def connect(server: HeadsetServer) -> HeadsetClient:
     client = HeadsetClient(
-        server.address, KEY, lambda: time.monotonic_ns() + HEADSET_AHEAD_NS, LINK
+        server.address, KEY, IDENTITY, lambda: time.monotonic_ns() + HEADSET_AHEAD_NS, LINK
     )
     client.wait_connected(5.0)
     return client
@@ -453,6 +469,32 @@ def test_the_pc_may_confirm_but_only_with_a_hand_in_view(stage: Stage) -> None:
         np.testing.assert_allclose(
             alignment.T_E_W[eye], view_of_eye(RIG.eyes[eye], T_W_H), atol=1e-9
         )
+
+
+def test_a_headset_that_keeps_stale_projections_is_refused(stage: Stage, session: Session) -> None:
+    stale = {eye: replace(one, P=one.P + 1e-3) for eye, one in stage.shown().projections.items()}
+    stage.make_cursor()
+    stage.see(T_D_NEAR)
+    stage.press(shown=replace(stage.shown(), projections=stale))
+    assert stage.see(T_D_NEAR).state is State.ALIGN
+    assert stage.calibration.refusal.startswith("The headset does not show what it should.")
+    assert events(session)[-1][1]["reason"] == "drawn otherwise"
+    eventually(lambda: stage.shown().prompt == stage.calibration.refusal)
+    stage.see(T_D_NEAR)
+    stage.press()
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+
+
+def test_the_pc_confirms_nothing_that_the_headset_has_not_received(
+    stage: Stage, client: HeadsetClient
+) -> None:
+    stage.make_cursor()
+    stage.see(T_D_NEAR)
+    eventually(lambda: stage.calibration.is_applied)
+    client.close()
+    stage.calibration._send_projections(stage.calibration.applied_shift_m)
+    with pytest.raises(ProcedureError, match="has not received the cursor and projections"):
+        stage.calibration.confirm()
 
 
 def test_a_moving_or_absent_hand_is_not_steady(stage: Stage) -> None:

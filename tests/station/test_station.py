@@ -86,6 +86,8 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
             station.save_trial("left", 0.5)
         with pytest.raises(ProcedureError, match="solve and apply"):
             station.show_target("left", 0.5)
+        with pytest.raises(ProcedureError, match="solve and apply"):
+            station.show_offline(True)
         calibration.make_cursor(EYES)
         refused = step_until(station, "a refusal", lambda s: s.procedure.refused > 0, PATIENCE_S)
         assert "turned" in refused.procedure.refusal
@@ -116,6 +118,8 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         assert missed_px.min() > 0.0
         assert len(targeted.views["right"].target_px) == 0
 
+        station.show_offline(True)
+        station.show_offline(False)  # nothing else may change
         solved_m = applied_m["left"]
         adjusted_m = solved_m + np.array([0.001, 0.0, 0.0])
         calibration.set_shift({"left": adjusted_m})

@@ -11,9 +11,10 @@ from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured
 from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
-from handcal.link.pairing import new_pairing_key
+from handcal.link.pairing import new_device_id, new_pairing_key
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
+from handcal.types import HeadsetIdentity
 
 _LOSSES = 0.0, 0.3
 _PATIENCE_S = 5.0
@@ -36,10 +37,12 @@ def _cursor_durations_ms(loss: float, settings: BenchSettings) -> list[float]:
     """Time successive cursors, with datagrams lost and reordered with probability `loss`."""
     rng = np.random.default_rng(0)
     key = new_pairing_key().encode()
+    identity = HeadsetIdentity(new_device_id())
+    impairment = Impairment(loss, reorder=loss)
     durations_ms = []
     with (
         HeadsetServer(key) as server,
-        HeadsetClient(server.address, key, impairment=Impairment(loss, reorder=loss)),
+        HeadsetClient(server.address, key, identity, impairment=impairment),
     ):
         server.wait_connected(_PATIENCE_S)
         for number in range(1, settings.repeats + 1):

@@ -1,0 +1,130 @@
+"""Writes docs/protocol_vectors.json: a whole conversation, to test clients in any language.
+
+From the repository's root: ``python -m tests.link.vectors``.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from handcal.geometry import rigid
+from handcal.link import greetings, messages, wire
+from handcal.link import handcal_pb2 as pb
+from handcal.link.drawn import drawn_digest, drawn_projections
+from handcal.link.greetings import Refusal
+from handcal.link.messages import Owner
+from handcal.link.reliable import Receipt
+from handcal.link.wire import Keys, Packet, Slot, Welcome
+from handcal.types import Eye, HeadsetIdentity, HeadsetView, Projection, Shape, Target
+from tests.helpers import ROOT
+
+PATH = ROOT / "docs/protocol_vectors.json"
+KEY = b"a pairing key of the vectors"
+DEVICE_ID = "0123456789abcdef"
+DEVICE = int(DEVICE_ID, 16)
+NONCE, PC_NONCE, COOKIE = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
+WELCOME = Welcome(0x1122334455667788, NONCE, PC_NONCE)
+T_NS = 1_000_000_000_123
+T_V_H = rigid([0.01, 0.02, 0.03], [0.032, 0.0, 0.015])
+P = np.array([[1500.0, 0.5, 634.0, -3.0], [0.0, 1490.0, 360.0, 2.0], [0.0, 0.0, 1.0, 0.001]])
+
+
+def build() -> dict[str, Any]:
+    """Return the vectors."""
+    greeting = wire.handshake_keys(KEY, DEVICE)
+    session = wire.session_keys(KEY, DEVICE, WELCOME)
+    view = HeadsetView(T_V_H, np.array([-0.3, 0.31, -0.17, 0.18]), 1268, 720)
+    identity = HeadsetIdentity(DEVICE_ID, "Lab 2", "runtime 1", "app 3", 2, {"left": view}, 0.063)
+    points = np.array([[0.0, 0.1, 0.5], [0.01, 0.12, 0.51], [-0.02, 0.08, 0.49]])
+    cursor = messages.cursor(points, 7)
+    shifts: dict[Eye, float] = {"left": 0.25, "right": -0.5}
+    projections = {
+        eye: Projection(eye, P + shift, 1268, 720, T_V_H, P, "P 7", "rig A")
+        for eye, shift in shifts.items()
+    }
+    drawn = drawn_digest(drawn_projections(projections, is_offline=False), cursor.cursor)
+    target = Target("right", np.arange(12.0).reshape(4, 3) / 10)
+    shape = Shape(np.arange(24.0).reshape(8, 3) / 10, ("left",))
+    to_headset = [
+        (Slot.UNRELIABLE, pb.Envelope(ping=pb.Ping(t_sent_host_ns=T_NS))),
+        (Slot.CURSOR, cursor),
+        (Slot.UNRELIABLE, messages.live_hand(points, True, 5, ["left"], is_outline=True)[0]),
+        (Slot.PROMPT, messages.prompt("Close your left eye.", ["right"])),
+        (Slot.PROJECTION_LEFT, messages.projection(projections["left"])),
+        (Slot.PROJECTION_RIGHT, messages.projection(projections["right"])),
+        (Slot.TARGET, messages.target(target)),
+        (Slot.SHAPE, messages.shape(shape)),
+        (Slot.SHOW, pb.Envelope(show=pb.Show(offline=True))),
+    ]
+    pong = pb.Pong(
+        t_sent_host_ns=T_NS,
+        t_received_headset_ns=T_NS + 7,
+        t_sent_headset_ns=T_NS + 9,
+        highest_sequence=4,
+        accepted=3,
+    )
+    to_pc = [
+        (Slot.DEVICE, messages.device(identity, Owner("P 7", "rig A"))),
+        (Slot.UNRELIABLE, messages.poses([(T_NS, T_V_H)])),
+        (Slot.UNRELIABLE, pb.Envelope(pong=pong)),
+        (Slot.CONFIRM, messages.confirm(T_NS, 7, drawn)),
+        (Slot.UNRELIABLE, messages.ack([Receipt(Slot.CURSOR, 2, 1)])),
+        (Slot.UNRELIABLE, pb.Envelope(bye=pb.Bye())),
+    ]
+    busy = greetings.refused(NONCE, Refusal(is_key_taken=False, other="Lab 1"))
+    offline = drawn_digest(drawn_projections(projections, is_offline=True), cursor.cursor)
+    return {
+        "protocol": wire.VERSION,
+        "pairing_key": KEY.decode(),
+        "device_id": DEVICE_ID,
+        "headset_nonce": NONCE.hex(),
+        "pc_nonce": PC_NONCE.hex(),
+        "session": f"{WELCOME.session:016x}",
+        "keys": {"handshake": _hex(greeting), "session": _hex(session)},
+        "handshake": [
+            _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS, b"", "Lab 2")),
+            _greeting(greeting.to_headset, greetings.retry(NONCE, COOKIE)),
+            _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS + 1, COOKIE, "Lab 2")),
+            _greeting(greeting.to_headset, greetings.welcome(WELCOME)),
+        ],
+        "refused": _greeting(greeting.to_headset, busy),
+        "to_headset": _messages(session.to_headset, to_headset),
+        "to_pc": _messages(session.to_pc, to_pc),
+        "digest": {
+            "nothing": drawn_digest({}, None).hex(),
+            "left_eye_only": drawn_digest({"left": projections["left"]}, None).hex(),
+            "both_and_cursor": drawn.hex(),
+            "both_and_cursor_offline": offline.hex(),
+        },
+    }
+
+
+def _hex(keys: Keys) -> dict[str, str]:
+    return {"to_pc": keys.to_pc.hex(), "to_headset": keys.to_headset.hex()}
+
+
+def _greeting(key: bytes, envelope: pb.Envelope) -> dict[str, str]:
+    body = str(envelope.WhichOneof("body"))
+    return {"message": body, "datagram": greetings.seal(key, DEVICE, envelope).hex()}
+
+
+def _messages(key: bytes, envelopes: list[tuple[Slot, pb.Envelope]]) -> list[dict[str, str]]:
+    sealed = []
+    for sequence, (slot, envelope) in enumerate(envelopes, 1):
+        packet = Packet(
+            envelope.SerializeToString(),
+            WELCOME.session,
+            sequence,
+            slot,
+            message_id=sequence if slot else 0,
+        )
+        body = str(envelope.WhichOneof("body"))
+        sealed.append({"message": body, "datagram": wire.seal(key, packet).hex()})
+    return sealed
+
+
+if __name__ == "__main__":
+    PATH.write_text(json.dumps(build(), indent=2) + "\n")
