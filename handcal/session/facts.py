@@ -27,7 +27,8 @@ class CameraUsed:
 
     def __post_init__(self) -> None:
         one = self.depth_intrinsics
-        if min(one.width, one.height, one.fx, one.fy, self.depth_scale_m) <= 0:
+        sizes = one.width, one.height, one.fx, one.fy, self.depth_scale_m
+        if not all(0 < size < np.inf for size in sizes):
             raise ValueError("the camera's size, focal lengths and depth scale must be positive")
 
 
