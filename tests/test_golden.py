@@ -220,7 +220,10 @@ def test_the_journal_of_a_session(tmp_path: Path, golden: dict[str, Any]) -> Non
         session.save_notes("Golden.")
         session.finish()
     lines = [json.loads(line) for line in (session.path / "journal.jsonl").read_text().splitlines()]
-    assert lines[0]["data"].pop("rig") == (session.path / "rig.yaml").read_text()  # checked below
+    stored = json.loads((session.path / "settings.json").read_text())
+    rig_text = (session.path / "rig.yaml").read_text()
+    # Checked below.
+    assert (lines[0]["data"].pop("rig"), lines[0]["data"].pop("settings")) == (rig_text, stored)
     for line in lines:
         line.pop("time")
         line.pop("sha256")  # of the time too
