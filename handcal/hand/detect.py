@@ -28,7 +28,6 @@ _GRAY = 127  # value of the network's zero padding
 # Share of the largest scale. For 16:9 it saves an eighth of the canvas, much of it gray.
 _LARGE_ENOUGH = 0.95
 _NEAR = 0.1  # least overlap of what a second look may add to the hand that it is about
-_SAME = 0.6  # overlap of two boxes of which the less sure adds nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +132,9 @@ class HandDetector:
             x0, y0, x1, y1 = part
             again = self._look(color[y0:y1, x0:x1], self._settings.second_pixels)
             boxes = again.boxes_px + np.array([x0, y0, x0, y0])
-            found = _with_second(found, Detections(boxes, again.scores), self._settings.overlap_max)
+            found = _with_second(
+                found, Detections(boxes, again.scores), self._settings.agreement_min
+            )
         return _at_least(self._settings.score_min, found)
 
     def _look(self, color: UInt8, pixels: int) -> Detections:
@@ -280,20 +281,22 @@ def _unsure_part(
     return x0, y0, x1, y1
 
 
-def _with_second(first: Detections, second: Detections, overlap_max: float) -> Detections:
+def _with_second(first: Detections, second: Detections, agreement_min: float) -> Detections:
     """Add what a second look saw of the surest hand.
 
-    A surer box replaces those it overlaps. A less sure one is added unless it is nearly the same:
-    a box around the palm alone is often surer than the one around the palm and folded fingers.
+    Boxes that agree are averaged, weighted by score. Both are kept of two that do not: one around
+    the palm alone is often surer than the one around palm and folded fingers.
     """
-    about = overlaps(second.boxes_px, first.boxes_px[:1])[:, 0] >= _NEAR
-    boxes, scores = second.boxes_px[about], second.scores[about]
-    shared = overlaps(boxes, first.boxes_px)
-    surer = scores[:, None] > first.scores[None]
-    new = ~((shared > _SAME) & ~surer).any(axis=1)
-    kept = ~((shared > overlap_max) & surer & new[:, None]).any(axis=0)
-    boxes = np.concatenate([first.boxes_px[kept], boxes[new]])
-    scores = np.concatenate([first.scores[kept], scores[new]])
+    boxes, scores = first.boxes_px.copy(), first.scores.copy()
+    about = overlaps(second.boxes_px, boxes[:1])[:, 0] >= _NEAR
+    for box, score in zip(second.boxes_px[about], second.scores[about], strict=True):
+        shared = overlaps(box[None], boxes)[0]
+        best = int(shared.argmax())
+        if shared[best] < agreement_min:
+            boxes, scores = np.vstack([boxes, box]), np.append(scores, score)
+            continue
+        boxes[best] = (scores[best] * boxes[best] + score * box) / (scores[best] + score)
+        scores[best] = max(scores[best], score)
     order = np.argsort(-scores, kind="stable")
     return Detections(boxes[order], scores[order])
 

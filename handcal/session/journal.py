@@ -71,6 +71,10 @@ class JournalContent:
     """Number of the next event; greater than that of any damaged or missing line."""
     sha256: str = ""
     """Checksum of the complete lines of a journal of an older version; else empty."""
+    ended: int = 0
+    """Number of the last event when the journal was closed; 0 if it never was."""
+    notes_sha256: str | None = None
+    """Checksum of the notes then; empty without notes, None if unknown."""
     damaged: tuple[Damage, ...] = ()
 
 
@@ -133,7 +137,7 @@ def read_journal(path: Path) -> JournalContent:
     if not events:
         why = damaged[0].what.removesuffix("; left out") if damaged else "is missing"
         raise FileError(f"{path} does not begin as the journal of a session: line 1 {why}")
-    ended = _read_end(path.with_name(JOURNAL_END), damaged)
+    ended, notes_sha256 = _read_end(path.with_name(JOURNAL_END), damaged)
     if ended >= expected:
         damaged.append(_missing(path, len(lines), expected, ended))
     return JournalContent(
@@ -143,6 +147,8 @@ def read_journal(path: Path) -> JournalContent:
         version=version,
         next_number=max(expected, ended + 1),
         sha256=_sha256(content[:done_bytes]) if version < JOURNAL_VERSION else "",
+        ended=ended,
+        notes_sha256=notes_sha256,
         damaged=tuple(damaged),
     )
 
@@ -200,9 +206,14 @@ class JournalWriter:
         self.next_number += 1
         return event
 
-    def write_end(self) -> None:
+    def write_end(self, notes_sha256: str | None) -> None:
         """Store the number of the last event, so that a journal cut short later is noticed."""
-        content = json.dumps({"version": JOURNAL_VERSION, "number": self.next_number - 1}).encode()
+        fields = {
+            "version": JOURNAL_VERSION,
+            "number": self.next_number - 1,
+            "notes_sha256": notes_sha256,
+        }
+        content = json.dumps(fields).encode()
         write_atomic(self._path.with_name(JOURNAL_END), content[:-1] + _ending(content))
 
     def require_unchanged(self) -> None:
@@ -274,21 +285,22 @@ def _parse_line(line: bytes) -> tuple[int, Event]:
     return fields["version"], event
 
 
-def _read_end(path: Path, damaged: list[Damage]) -> int:
-    """Return the number of the last event when the journal was closed; 0 if unknown."""
+def _read_end(path: Path, damaged: list[Damage]) -> tuple[int, str | None]:
+    """Return `ended` and `notes_sha256` of `JournalContent`."""
     if not path.exists():
-        return 0
+        return 0, None
     try:
         line = read_limited(path, _MAX_END_BYTES)
         if not line.endswith(b"\n"):
             raise ValueError("is cut short")
-        number = _parse_sound(line[:-1])["number"]
-        if type(number) is not int:
-            raise ValueError("holds no number")
+        fields = _parse_sound(line[:-1])
+        number, notes_sha256 = fields["number"], fields["notes_sha256"]
+        if type(number) is not int or not isinstance(notes_sha256, str | None):
+            raise ValueError("holds no number or no checksum")
     except (FileError, ValueError, KeyError) as error:
         damaged.append(Damage(path.name, None, f"{error}; not used"))
-        return 0
-    return number
+        return 0, None
+    return number, notes_sha256
 
 
 def _is_time(text: str) -> bool:

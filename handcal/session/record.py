@@ -152,7 +152,7 @@ def read_session(
         rig=rig,
         settings=_read_settings(path / "settings.json", state, damaged),
         wearer=state.wearer,
-        notes=_read_notes(path / "notes.txt", state, damaged),
+        notes=_read_notes(path / "notes.txt", _notes_checksums(replayed), damaged),
         events=journal.events,
         alignments=alignments,
         deleted_alignments=deleted_alignments,
@@ -240,13 +240,22 @@ def _read_results(
     return results if is_old else state.results
 
 
-def _read_notes(file: Path, state: SessionState, damaged: list[Damage]) -> str:
+def _notes_checksums(replayed: Replayed) -> tuple[str | None, ...]:
+    """Return the checksums that the notes may have; empty if unknown."""
+    journal = replayed.journal
+    saved = [event.number for event in journal.events if event.name == SessionEvent.NOTES_SAVED]
+    if journal.notes_sha256 is not None and max(saved, default=0) <= journal.ended:
+        return (journal.notes_sha256,)
+    return replayed.state.notes_sha256
+
+
+def _read_notes(file: Path, checksums: tuple[str | None, ...], damaged: list[Damage]) -> str:
     data = b""
     try:
         if file.exists():
             data = read_limited(file, 4 * MAX_NOTES_CHARACTERS)
         found = sha256(data) if file.exists() else ""
-        if state.notes_sha256 and found not in state.notes_sha256:
+        if checksums and found not in checksums:
             raise FileError("its checksum is not the journal's")
     except FileError as error:
         damaged.append(Damage(file.name, None, f"{error}; it was read as it is"))

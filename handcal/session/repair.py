@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -13,7 +14,7 @@ from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
 from handcal.rig.rig_file import write_rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line
 from handcal.session.record import SessionRecord, alignment_path, read_session, sha256
-from handcal.session.state import SessionEvent
+from handcal.session.state import SessionEvent, SessionState
 from handcal.types import Rig
 
 SessionHealth: TypeAlias = Literal["sound", "damaged", "none"]
@@ -99,14 +100,17 @@ def _events(record: SessionRecord, folder: Path) -> Iterator[Event]:
     yield Event(1, record.events[0].time, SessionEvent.CREATED, created)
     damaged = {"damaged": [asdict(damage) for damage in record.damaged]}
     yield happens_now(2, SessionEvent.REPAIRED, damaged)
-    unsound = {damage.line for damage in record.damaged if damage.file == JOURNAL}
+    state = SessionState()
+    state.alignments.has_gaps = state.trials.has_gaps = True
     for event in record.events:
-        is_kept = event.name not in _REPLACED and event.number not in unsound
-        if event.name.startswith("alignment_"):
-            is_kept &= event.data.get("number") in alignments
-        if event.name.startswith("trial_"):
-            is_kept &= event.data.get("number") in trials
-        if is_kept:
+        number = event.data.get("number")
+        if event.name in _REPLACED or (
+            (event.name.startswith("alignment_") and number not in alignments)
+            or (event.name.startswith("trial_") and number not in trials)
+        ):
+            continue
+        with suppress(ValueError):  # it cannot follow those before it, and was left out
+            state.apply(event)
             yield event
     notes = sha256(record.notes.encode()) if record.notes else ""
     rest = {"results": record.results, "notes_sha256": notes}

@@ -303,7 +303,7 @@ class Session(Closable):
         if self._journal is not None and self.revision:
             with suppress(FileError):  # the folder was removed, or the disk is full
                 self._require_own()
-                self._journal.write_end()
+                self._journal.write_end(self._notes_sha256)
         self._journal = None
         self._lock.release()
 

@@ -126,7 +126,7 @@ class SessionState:
     settings : dict or None
         None before version 3.
     wearer : str
-    notes_sha256 : tuple of str
+    notes_sha256 : tuple of str or None
         Checksums of the notes that may be stored: the newest, and those before; an empty text if
         there are none. Empty before version 3.
     results : dict or None
@@ -147,7 +147,7 @@ class SessionState:
     def __init__(self) -> None:
         self.rig = self.rig_sha256 = self.wearer = ""
         self.settings: dict[str, Any] | None = None
-        self.notes_sha256: tuple[str, ...] = ()
+        self.notes_sha256: tuple[str | None, ...] = ()
         self.results: dict[str, Any] | None = None
         self.older_results: list[dict[str, Any]] = []
         self.facts = SessionFacts()
