@@ -55,7 +55,7 @@ class DetectSettings:
     """Largest gain; more would show noise rather than hands."""
     unsure: tuple[float, float] = (0.2, 0.7)
     """A second look is taken if the surest hand's score is in this range."""
-    second_size_min: float = 0.15
+    second_size_min: float = 0.1
     """Least size of that hand, as the square root of its share of the image."""
     second_margin: float = 0.8
     """Margin of the second look around that hand, as a multiple of its longer side."""
@@ -131,10 +131,8 @@ class HandDetector:
         if part is not None:
             x0, y0, x1, y1 = part
             again = self._look(color[y0:y1, x0:x1], self._settings.second_pixels)
-            boxes = again.boxes_px + np.array([x0, y0, x0, y0])
-            found = _with_second(
-                found, Detections(boxes, again.scores), self._settings.agreement_min
-            )
+            again = Detections(again.boxes_px + np.array([x0, y0, x0, y0]), again.scores)
+            found = _with_second(found, again, self._settings.agreement_min)
         return _at_least(self._settings.score_min, found)
 
     def _look(self, color: UInt8, pixels: int) -> Detections:
