@@ -57,9 +57,9 @@ class DetectSettings:
     """A second look is taken if the surest hand's score is in this range."""
     second_size_min: float = 0.1
     """Least size of that hand, as the square root of its share of the image."""
-    second_margin: float = 0.8
+    second_margin: float = 0.5
     """Margin of the second look around that hand, as a multiple of its longer side."""
-    second_pixels: int = 25_600
+    second_pixels: int = 18_432
     """Pixels of the second look: few, because the network sees all fingers of a large hand only on
     a small image."""
 
