@@ -185,6 +185,59 @@ def test_a_removed_folder_is_reported(session: Session, alignment: Alignment) ->
         session.save_results({})
 
 
+def test_a_second_writer_is_found_before_anything_is_written(
+    tmp_path: Path, session: Session, alignment: Alignment
+) -> None:
+    (session.path / "lock").unlink()
+    with Session(session.path) as second:
+        second.save_alignment(alignment)
+        before = (session.path / "journal.jsonl").read_bytes()
+        for write in (
+            lambda: session.record("event"),
+            lambda: session.save_alignment(replace(alignment, t_b_ns=2)),
+            lambda: session.save_notes("mine"),
+        ):
+            with pytest.raises(FileError, match=r"its lock was deleted, so another program"):
+                write()
+        session.close()
+        assert (session.path / "journal.jsonl").read_bytes() == before
+        second.save_alignment(alignment)
+    record = Session.open(session.path)
+    assert (len(record.alignments), record.notes, record.damaged) == (2, "", ())
+
+
+def test_a_folder_that_was_restored_under_the_program_is_found(
+    tmp_path: Path, session: Session
+) -> None:
+    copy = shutil.copytree(session.path, tmp_path / "copy")
+    session.record("event")
+    journal = session.path / "journal.jsonl"
+    journal.write_bytes((copy / "journal.jsonl").read_bytes())
+    with pytest.raises(FileError, match="changed or replaced by another program"):
+        session.record("event")
+    session.close()
+    with Session(session.path) as again:
+        again.path.rename(tmp_path / "aside")
+        shutil.copytree(copy, again.path)
+        with pytest.raises(FileError, match="replaced or restored"):
+            again.record("event")
+
+
+def test_leftovers_of_killed_writers_are_removed(session: Session) -> None:
+    session.close()
+    for name in (".notes.txt.0123456789abcdef", "alignments/.1.npz.0123456789abcdef"):
+        (session.path / name).touch()
+    Session(session.path).close()
+    assert not list(session.path.rglob(".*"))
+
+
+def test_a_closed_session_writes_no_more(session: Session) -> None:
+    session.close()
+    session.close()
+    with pytest.raises(FileError, match="is closed; open the session again"):
+        session.record("event")
+
+
 @contextlib.contextmanager
 def disk_ends_at(size: int) -> Iterator[None]:
     """Let no file grow beyond `size` bytes: a write up to there is done, the rest fails."""
