@@ -1,4 +1,4 @@
-"""What a session knows about itself besides alignments and trials: devices, plan, verification."""
+"""Facts about a session besides alignments and trials: devices, plan, verification."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class EyeDistance:
     sigma_m: float
     """One standard deviation."""
     source: str
-    """Who or what measured it, such as ``ruler`` or ``headset``."""
+    """Origin of the value, such as ``ruler`` or ``headset``."""
 
     def __post_init__(self) -> None:
         if self.distance_m <= 0.0 or self.sigma_m <= 0.0:
@@ -61,7 +61,7 @@ class Verification:
 
 @dataclass(frozen=True, slots=True)
 class AlignmentFacts:
-    """How one alignment was made; None where unknown. ValueError if a value is negative."""
+    """Circumstances of one alignment; None where unknown. ValueError if a value is negative."""
 
     match_age_s: float | None = None
     """Time between the confirmation and the depth frame taken for it."""

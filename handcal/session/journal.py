@@ -48,7 +48,7 @@ class Damage:
     line: int | None
     """Number of the journal's line, from 1; None for another file."""
     what: str
-    """What is damaged, and what was done instead."""
+    """The damage, and what was done instead."""
 
     def __str__(self) -> str:
         where = self.file if self.line is None else f"{self.file}, line {self.line}"

@@ -76,7 +76,7 @@ class SessionRecord:
 
     @property
     def left_out(self) -> str:
-        """What is damaged, in one line; empty if the session is sound."""
+        """The damage in one line; empty if the session is sound."""
         if not self.damaged:
             return ""
         more = f" (and {len(self.damaged) - 1} more)" if len(self.damaged) > 1 else ""
@@ -121,6 +121,7 @@ def replay(path: Path) -> Replayed:
         except ValueError as error:
             what = f"event {event.number} cannot follow those before it: {error}; left out"
             damaged.append(Damage(JOURNAL, event.number, what))
+            state.alignments.has_gaps = state.trials.has_gaps = True
     if damaged:  # a number may be that of an alignment whose event is lost
         stored = (one.stem for one in path.glob("alignments/*.npz"))
         taken = (int(name) for name in stored if name.isdecimal() and len(name) < 4)

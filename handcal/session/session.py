@@ -357,13 +357,13 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     Returns
     -------
     SessionRecord
-        Rig, settings, alignments, trials of the user test, notes and events.
+        Rig, settings, alignments, trials of the user test, notes and events, without what is
+        damaged; `damaged` names that.
 
     Raises
     ------
     FileError
-        If the folder is not a session, is of an unknown version, or a file in it is missing,
-        damaged or too large.
+        If the folder is not a session, is of an unknown version, or nothing in it can be read.
 
     Examples
     --------

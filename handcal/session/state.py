@@ -32,7 +32,7 @@ class SessionEvent(StrEnum):
 
     CREATED = "created"
     UPGRADED = journal.UPGRADED
-    """What is bound by checksums from here on, in a session begun by version 1 or 2."""
+    """Copies and checksums from here on, in a session begun by version 1 or 2."""
     REPAIRED = "repaired"
     """In a copy of a damaged session: its numbers have gaps."""
     NOTES_SAVED = "notes_saved"
@@ -229,10 +229,11 @@ class SessionState:
     def _bind(self, data: Mapping[str, Any]) -> None:
         """Take the rig and the settings from an event."""
         if "rig" in data:
-            self.rig, self.settings = data["rig"], data["settings"]
-            if not isinstance(self.settings, dict):
+            rig, settings = data["rig"], data["settings"]
+            if not isinstance(settings, dict):
                 raise TypeError("the settings are no object")
-            self.rig_sha256 = hashlib.sha256(self.rig.encode()).hexdigest()
+            self.rig_sha256 = hashlib.sha256(rig.encode()).hexdigest()
+            self.rig, self.settings = rig, settings
             self.notes_sha256 = ("",)
         else:
             self.rig_sha256 = data["rig_sha256"]

@@ -1,7 +1,8 @@
-"""What a session knows besides alignments and trials."""
+"""Facts of a session: they come back, replace each other, and are refused if invalid."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,11 +70,7 @@ def test_a_fact_replaces_an_earlier_one_and_each_eye_its_own(tmp_path: Path) -> 
         {"eye_distance": 0.063},
         {"evidence": (1,)},
         {"verified": {"middle": FACTS["verified"]["left"]}},
-        {
-            "headset": HeadsetIdentity(
-                "a", views={"left": HeadsetView(np.eye(4), [np.nan] * 4, 1, 1)}
-            )
-        },  # type: ignore[arg-type]
+        {"headset": replace(HEADSET, views={"left": replace(VIEW, tangents=np.full(4, np.nan))})},
         {"camera": object()},
     ],
 )
