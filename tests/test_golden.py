@@ -220,8 +220,13 @@ def test_the_journal_of_a_session(tmp_path: Path, golden: dict[str, Any]) -> Non
         session.save_notes("Golden.")
         session.finish()
     lines = [json.loads(line) for line in (session.path / "journal.jsonl").read_text().splitlines()]
+    stored = json.loads((session.path / "settings.json").read_text())
+    rig_text = (session.path / "rig.yaml").read_text()
+    # Checked below.
+    assert (lines[0]["data"].pop("rig"), lines[0]["data"].pop("settings")) == (rig_text, stored)
     for line in lines:
         line.pop("time")
+        line.pop("sha256")  # of the time too
     check("journal", lines, golden)
     files = [path for path in session.path.rglob("*") if path.is_file()]
     check("session-files", sorted(str(path.relative_to(session.path)) for path in files), golden)

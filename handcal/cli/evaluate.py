@@ -9,18 +9,41 @@ from pathlib import Path
 from rich.markup import escape
 
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command
+from handcal.cli.terminal import arg, command, number
+from handcal.errors import HandcalError
 from handcal.io.files import make_folder, require_suffix
 
 
 @command(
-    arg("--images", type=Path, metavar="FOLDER", required=True, help="folder of photographs"),
+    arg(
+        "folder",
+        type=Path,
+        nargs="?",
+        help="folder of photographs with annotations.json; otherwise --images and --annotations",
+    ),
+    arg("--images", type=Path, metavar="FOLDER", help="folder of photographs"),
     arg(
         "--annotations",
         type=Path,
         metavar="FILE",
-        required=True,
-        help="JSON with the hands in the photographs",
+        help="JSON with the hands in the photographs (default: annotations.json in the folder)",
+    ),
+    arg(
+        "--brightness",
+        type=number(float, 0.01, 10.0),
+        default=1.0,
+        help="factor on the pixels' values",
+    ),
+    arg(
+        "--hand-height",
+        type=number(float, 0.05, 1.0),
+        metavar="SHARE",
+        help="show each photograph in a gray 640x480 image, with its first hand of this height",
+    ),
+    arg(
+        "--glove",
+        choices=("blue", "black"),
+        help="recolour the hands of photographs on a white background",
     ),
     arg("--sheet", type=Path, metavar="FILE", help="PNG with the worst failures"),
     arg("--model", type=Path, metavar="FILE", help="ONNX model (default: the shipped one)"),
@@ -31,17 +54,22 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.hand.detect import HandDetector
     from handcal.hand.shipped import load_detector
     from handcal.lab.evaluate.annotations import read_annotations
+    from handcal.lab.evaluate.conditions import Conditions
     from handcal.lab.evaluate.contact_sheet import write_contact_sheet
     from handcal.lab.evaluate.detector import EVALUATED, detect_all, evaluation
 
+    images = arguments.images or arguments.folder
+    if images is None or (arguments.images and arguments.folder):
+        raise HandcalError("no photographs to measure: give one folder, or --images")
+    conditions = Conditions(arguments.brightness, arguments.hand_height, arguments.glove)
     if arguments.sheet is not None:  # before the long work, whose result would be lost
         require_suffix(arguments.sheet, ".png")
         make_folder(arguments.sheet.parent)
     model = arguments.model
     finder = load_detector(EVALUATED) if model is None else HandDetector(model, EVALUATED)
-    photos = read_annotations(arguments.images, arguments.annotations)
+    photos = read_annotations(images, arguments.annotations or images / "annotations.json")
     with show_progress() as progress:
-        results = detect_all(photos, finder, progress)
+        results = detect_all(photos, finder, progress, conditions)
     result = evaluation(photos, results)
     shown_table = table("hands", "AP at IoU 0.5")
     for key, name in (
@@ -52,6 +80,16 @@ def detector(arguments: argparse.Namespace) -> None:
     ):
         shown_table.add_row(name, "–" if result[key] is None else f"{result[key]:.4g}")
     console.print(shown_table)
+    shares = table("skin", "side", "hands", "found, score at least 0.3", "95 % interval")
+    for share in result["found"]:
+        shares.add_row(
+            escape(share["skin"] or "all"),
+            escape(share["aspect"]),
+            str(share["hands"]),
+            f"{100 * share['share']:.1f} %",
+            f"{100 * share['low']:.1f} to {100 * share['high']:.1f} %",
+        )
+    console.print(shares)
     console.print(f"{result['hands']} hands in {result['images']} photographs")
     save(arguments.json, result)
     if arguments.sheet is not None:

@@ -96,6 +96,14 @@ _RIG: Mapping[str, Entry] = {
     ),
 }
 
+_SESSION: Mapping[str, Entry] = {
+    "check": Entry(
+        "Check every part of a session; exit code 1 if any is damaged, 2 if it is no session.",
+        "sessions",
+    ),
+    "repair": Entry("Copy what is sound of a damaged session into a new one.", "sessions"),
+}
+
 COMMANDS: Mapping[str, Entry] = {
     "demo": Entry(
         "Calibrate a simulated wearer from start to end, and compare with the truth.", "simulate"
@@ -113,6 +121,7 @@ COMMANDS: Mapping[str, Entry] = {
         "Export a session: report, tables, calibration, clouds, and the session as one file.",
         "sessions",
     ),
+    "session": Entry("Check and repair stored sessions.", _SESSION),
     "rig": Entry("Calibrate the rig offline: boards, cameras, displays, and the rig file.", _RIG),
     "evaluate": Entry("Evaluate handcal on given images and sessions.", _EVALUATE),
     "study": Entry("Run a study on simulated wearers, in many processes, with a report.", _STUDY),

@@ -1,13 +1,16 @@
-"""``handcal solve, export``: stored sessions."""
+"""``handcal solve, export, session``: stored sessions."""
 
 from __future__ import annotations
 
 import argparse
+import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, fail, number
 from handcal.export.formats import FORMATS
+from handcal.session.record import SessionRecord
 from handcal.types import METHODS
 
 _METRES = number(float, 1e-3, 1e6)
@@ -27,8 +30,7 @@ def solve(arguments: argparse.Namespace) -> None:
     from handcal.station import solve_again
 
     record = Session.open(arguments.session)
-    if record.torn_bytes:
-        console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
+    _say_what_is_left_out(record)
     results = solve_again.solve(record, method=arguments.method)
     save(arguments.json, results_json(results))
     shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
@@ -89,8 +91,49 @@ def export(arguments: argparse.Namespace) -> None:
     except ValueError as error:
         fail(str(error), 2)
     record = Session.open(arguments.session)
+    _say_what_is_left_out(record)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
     with show_progress() as progress:
         files = export_session(record, folder, settings, progress)
     for file in files:
         console.print(str(file))
+
+
+@command(arg("session", type=Path, help="session folder"), json=True)
+def check(arguments: argparse.Namespace) -> None:
+    """Check every part of a session; exit code 1 if any is damaged, 2 if it is no session."""
+    from handcal.session.repair import check_session
+
+    found = check_session(arguments.session)
+    save(arguments.json, asdict(found))
+    for damage in found.damaged:
+        console.print(str(damage), markup=False)
+    if found.state == "sound":
+        console.print("The session is sound.")
+    elif found.state == "damaged":
+        console.print("All else can be read; handcal session repair copies it.")
+    sys.exit({"sound": 0, "damaged": 1, "none": 2}[found.state])
+
+
+@command(
+    arg("session", type=Path, help="session folder; it is not changed"),
+    arg("--output", type=Path, metavar="FOLDER", required=True, help="new folder for the copy"),
+    arg("--rig", type=Path, metavar="FILE", help="rig file, if the session's own is damaged"),
+)
+def repair(arguments: argparse.Namespace) -> None:
+    """Copy what is sound of a damaged session into a new one."""
+    from handcal.rig.rig_file import read_rig
+    from handcal.session.repair import repair_session
+
+    rig = read_rig(arguments.rig) if arguments.rig else None
+    made = repair_session(arguments.session, arguments.output, rig)
+    console.print(
+        f"{made.path}: {len(made.alignments)} alignments, {len(made.trials)} trials", markup=False
+    )
+
+
+def _say_what_is_left_out(record: SessionRecord) -> None:
+    if record.torn_bytes:
+        console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
+    if record.left_out:
+        console.print(f"Left out: {record.left_out}.", markup=False)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.progress import Progress
+from handcal.session.journal import JOURNAL_END
 from handcal.session.session import SessionRecord
 
 MAX_ARCHIVE_BYTES = 4 * 2**30
@@ -21,7 +22,8 @@ def write_archive(
     """Write a session's folder as a zip file, under its own name.
 
     Equal sessions give equal bytes: files are sorted and have no timestamps. Left out are locks,
-    hidden and temporary files, links, and events recorded after the record was read.
+    hidden and temporary files, links, and events recorded after the record was read, with the
+    file that names the last one.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def _contents(folder: Path, excluded: Path) -> Iterator[Path]:
         if path.is_dir():
             yield path
             yield from _contents(path, excluded)
-        elif path.is_file() and path.name != "lock":
+        elif path.is_file() and path.name not in ("lock", JOURNAL_END):
             yield path
 
 

@@ -17,7 +17,7 @@ from handcal.export.figure_rows import (
     running_mean_rows,
 )
 from handcal.export.figures import ResidualCells
-from handcal.export.outcome import SessionOutcome, ShiftOrigin
+from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
 from handcal.export.tables import corner_rows, parameter_rows
 from handcal.register.results import Results
 from handcal.register.verdict import expected_error_arcmin
@@ -106,6 +106,7 @@ def _summary(outcome: SessionOutcome) -> Section:
                         sum(event.name == "refused" for event in record.events)
                     ),
                     "Trials of the user test": str(len(record.trials)),
+                    **({"Damaged": printable(record.left_out)} if record.left_out else {}),
                     **made_with(),
                 }
             )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.closable import Closable
-from handcal.io.files import make_folder
+from handcal.io.files import make_folder, sync_folder
 from handcal.io.lock import FileLock
 
 
@@ -75,7 +75,10 @@ class Staging(Closable):
                 self._merge(names, replaced)
             else:
                 make_folder(self._folder.parent)
+                for folder in {(self.path / name).parent for name in names}:
+                    sync_folder(folder)
                 self.path.rename(self._folder)
+                sync_folder(self._folder.parent)
         except OSError as error:
             raise FileError(
                 f"cannot write to {self._folder}: {error.strerror or error} "
@@ -106,6 +109,8 @@ class Staging(Closable):
                 (self.path / name).replace(self._folder / name)
             for name in stale:
                 (self._folder / name).unlink()
+            for folder in {(self._folder / name).parent for name in affected}:
+                sync_folder(folder)
         except (OSError, FileError):
             for name in affected:
                 # A file that cannot be put back, such as one open elsewhere, was not moved.

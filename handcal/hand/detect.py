@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,14 @@ STRIDES = (8, 16, 32)
 CANDIDATE_SCORE_MIN = 0.02
 """Candidates with a lower score are ignored."""
 
+DIM_PERCENTILE = 99
+"""Percentile of an image's values by which it is dim; the pixels above may show a lamp."""
+
 _ENDS = [("image", "tensor(uint8)"), ("raw", "tensor(float)")]
 _GRAY = 127  # value of the network's zero padding
 # Share of the largest scale. For 16:9 it saves an eighth of the canvas, much of it gray.
 _LARGE_ENOUGH = 0.95
+_NEAR = 0.1  # least overlap of what a second look may add to the hand that it is about
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,21 @@ class DetectSettings:
     2015)."""
     hands: int = 100
     """Largest number of hands returned, as in COCO's average precision."""
+    dim_below: int = 160
+    """An image is dim if its `DIM_PERCENTILE` of the pixels' brightest channel is below this."""
+    bright: int = 240
+    """The value to which the gain on a dim image raises that percentile."""
+    gain_max: float = 4.0
+    """Largest gain; more would show noise rather than hands."""
+    unsure: tuple[float, float] = (0.2, 0.7)
+    """A second look is taken if the surest hand's score is in this range."""
+    second_size_min: float = 0.1
+    """Least size of that hand, as the square root of its share of the image."""
+    second_margin: float = 0.5
+    """Margin of the second look around that hand, as a multiple of its longer side."""
+    second_pixels: int = 18_432
+    """Pixels of the second look: few, because the network sees all fingers of a large hand only on
+    a small image."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,11 +122,28 @@ class HandDetector:
         color : (H, W, 3) uint8
             RGB.
         pixels : int, optional
-            Overrides the settings' `pixels`; at least 1024.
+            Overrides the settings' `pixels`; at least 1024. The network then looks once only.
         """
-        canvas, scale = letterbox(color, pixels or self._settings.pixels)
+        if pixels is not None:
+            return _at_least(self._settings.score_min, self._look(color, pixels))
+        found = self._look(color, self._settings.pixels)
+        part = _unsure_part(found, color.shape[:2], self._settings)
+        if part is not None:
+            x0, y0, x1, y1 = part
+            again = self._look(color[y0:y1, x0:x1], self._settings.second_pixels)
+            again = Detections(again.boxes_px + np.array([x0, y0, x0, y0]), again.scores)
+            found = _with_second(found, again, self._settings.agreement_min)
+        return _at_least(self._settings.score_min, found)
+
+    def _look(self, color: UInt8, pixels: int) -> Detections:
+        """Run the network once; the scores are at least the lowest that a second look needs."""
+        settings = self._settings
+        canvas, scale = letterbox(color, pixels)
+        _, (width, height), _ = _fit(*color.shape[:2], pixels)
+        canvas[:height, :width] = brightened(canvas[:height, :width], settings)
         [raw] = self._session.run(["raw"], {"image": canvas[None]})
-        boxes, scores = decode(raw, canvas.shape[:2], self._settings)
+        lowest = replace(settings, score_min=min(settings.score_min, settings.unsure[0]))
+        boxes, scores = decode(raw, canvas.shape[:2], lowest)
         return Detections(boxes / scale, scores)
 
 
@@ -144,6 +180,20 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
         color = _halved(color)
     cv2.resize(color, size, dst=canvas[: size[1], : size[0]])
     return canvas, scale
+
+
+def brightened(color: UInt8, settings: DetectSettings) -> UInt8:
+    """Return an image multiplied by a gain if it is dim; a bright one is returned as it is.
+
+    The network has seen few dim images. Of the pixels' brightest channel, `DIM_PERCENTILE` decides.
+    """
+    rare = color[::2, ::2]
+    brightest = np.maximum(np.maximum(rare[..., 0], rare[..., 1]), rare[..., 2])
+    value = float(np.percentile(brightest, DIM_PERCENTILE))
+    if value >= settings.dim_below:
+        return color
+    gain = min(settings.gain_max, settings.bright / max(value, 1.0))
+    return np.asarray(cv2.convertScaleAbs(color, alpha=gain), np.uint8)
 
 
 @lru_cache
@@ -208,6 +258,50 @@ def decode(
     chosen = _suppress(sure, settings.overlap_max, settings.hands)
     votes = (overlaps(boxes[chosen], boxes) >= settings.agreement_min) * scores
     return votes @ boxes / votes.sum(axis=1, keepdims=True), scores[chosen]
+
+
+def _unsure_part(
+    found: Detections, shape: tuple[int, ...], settings: DetectSettings
+) -> tuple[int, int, int, int] | None:
+    """Return the surroundings of the surest hand as x0, y0, x1, y1; None if it is sure or small."""
+    least, sure = settings.unsure
+    if not len(found.scores) or not least <= found.scores[0] < sure:
+        return None
+    height, width = shape[:2]
+    box = found.boxes_px[0]
+    sides = box[2:] - box[:2]
+    if np.prod(sides) < settings.second_size_min**2 * height * width:
+        return None
+    margin = settings.second_margin * sides.max()
+    low = np.floor(box[:2] - margin).clip(0, [width - 1, height - 1])
+    high = np.ceil(box[2:] + margin).clip(low + 1, [width, height])
+    x0, y0, x1, y1 = np.concatenate([low, high]).astype(int).tolist()
+    return x0, y0, x1, y1
+
+
+def _with_second(first: Detections, second: Detections, agreement_min: float) -> Detections:
+    """Add what a second look saw of the surest hand.
+
+    Boxes that agree are averaged, weighted by score. Both are kept of two that do not: one around
+    the palm alone is often surer than the one around palm and folded fingers.
+    """
+    boxes, scores = first.boxes_px.copy(), first.scores.copy()
+    about = overlaps(second.boxes_px, boxes[:1])[:, 0] >= _NEAR
+    for box, score in zip(second.boxes_px[about], second.scores[about], strict=True):
+        shared = overlaps(box[None], boxes)[0]
+        best = int(shared.argmax())
+        if shared[best] < agreement_min:
+            boxes, scores = np.vstack([boxes, box]), np.append(scores, score)
+            continue
+        boxes[best] = (scores[best] * boxes[best] + score * box) / (scores[best] + score)
+        scores[best] = max(scores[best], score)
+    order = np.argsort(-scores, kind="stable")
+    return Detections(boxes[order], scores[order])
+
+
+def _at_least(score_min: float, found: Detections) -> Detections:
+    kept = found.scores >= score_min
+    return Detections(found.boxes_px[kept], found.scores[kept])
 
 
 def overlaps(boxes: Float64, others: Float64) -> Float64:

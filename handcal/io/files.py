@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import re
 import secrets
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,11 +20,14 @@ from handcal.types import UInt8
 
 MAX_JSON_BYTES = 16 * 2**20
 _MOST_DIGITS = 20  # 64 bits and a sign: neither NumPy nor a float overflows
+_TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}", re.DOTALL)
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
 
 def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write `data` so that `path` always holds either the old content or all of the new.
+
+    When it returns, the new content survives a power cut: file and folder are synced.
 
     Parameters
     ----------
@@ -33,10 +39,12 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
     Raises
     ------
     FileError
-        If the folder is missing, not writable or full.
+        If the folder is missing, not writable or full, or `path` is a device, a pipe or a folder.
     """
     temporary = path.parent / f".{path.name}.{secrets.token_hex(8)}"
     try:
+        if path.exists() and not path.is_file():
+            raise FileError(f"cannot write {path}: it is a folder, a device or a pipe")
         try:
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
             with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
@@ -47,8 +55,43 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+        sync_folder(path.parent)
     except OSError as error:
         raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def sync_folder(path: Path) -> None:
+    """Write the entries of a folder to the disk; OSError if that fails.
+
+    Without it, a power cut can undo that a file was created or replaced. Windows offers nothing of
+    the kind, and some network file systems refuse.
+    """
+    if os.name == "nt":
+        return
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
+    finally:
+        os.close(folder)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files that `write_atomic` left in a folder when it was killed.
+
+    Raises
+    ------
+    FileError
+        If one cannot be removed.
+    """
+    try:
+        for path in folder.iterdir():
+            if _TEMPORARY.fullmatch(path.name) and path.is_file():
+                path.unlink()
+    except OSError as error:
+        raise FileError(f"cannot clean up {folder}: {error.strerror or error}") from error
 
 
 def require_suffix(path: Path, suffix: str) -> None:
@@ -63,10 +106,12 @@ def read_limited(path: Path, max_bytes: int) -> bytes:
     Raises
     ------
     FileError
-        If it cannot be read or holds more than `max_bytes`.
+        If it cannot be read, is a device or a pipe, or holds more than `max_bytes`.
     """
     try:
-        with path.open("rb") as file:
+        with open(path, "rb", opener=_open_at_once) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise FileError(f"cannot read {path}: it is a device or a pipe")
             data = file.read(max_bytes + 1)
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
@@ -75,8 +120,13 @@ def read_limited(path: Path, max_bytes: int) -> bytes:
     return data
 
 
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file; a pipe without waiting for its writer."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
 def make_folder(path: Path) -> Path:
-    """Create `path` with its parents if needed and return it.
+    """Create `path` with its parents if needed, on the disk, and return it.
 
     Raises
     ------
@@ -84,7 +134,10 @@ def make_folder(path: Path) -> Path:
         If it cannot be created.
     """
     try:
+        created = [folder for folder in (path, *path.parents) if not folder.exists()]
         path.mkdir(parents=True, exist_ok=True)
+        for folder in reversed(created):
+            sync_folder(folder.parent)
     except OSError as error:
         raise FileError(f"cannot create the folder {path}: {error.strerror or error}") from error
     return path

@@ -57,6 +57,21 @@ class FileLock:
         file.write(str(os.getpid()).encode())
         file.flush()
         self._file = file
+        self._path = path
+
+    def require_held(self) -> None:
+        """Raise FileError if the lock's file was removed or replaced, so that others can lock."""
+        try:
+            is_same = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
+        except FileNotFoundError:
+            is_same = False
+        except OSError as error:
+            raise FileError(f"cannot read {self._path}: {error.strerror or error}") from error
+        if not is_same:
+            raise FileError(
+                f"cannot write to {self._path.parent}: it was removed, replaced or restored, or "
+                "its lock was deleted, so another program may be writing to it; open it again"
+            )
 
     def release(self) -> None:
         """Release the lock; safe to call twice."""

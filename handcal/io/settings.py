@@ -8,6 +8,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
+from numpy.typing import NDArray
+
 from handcal.errors import FileError
 
 Settings = TypeVar("Settings")
@@ -24,7 +27,8 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
     Parameters
     ----------
     kind : type
-        A dataclass whose fields are numbers, texts, booleans, tuples of them, or such dataclasses.
+        A dataclass whose fields are numbers, texts, booleans, tuples, mappings or arrays of them,
+        or such dataclasses.
     data : object
         As `json.loads` gives it.
     where : str
@@ -39,9 +43,10 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
         raise FileError(f"{where} must be an object")
     hints = get_type_hints(kind)
     names = {field.name for field in fields(kind)}  # type: ignore[arg-type]
-    unknown = ", ".join(sorted(str(name) for name in set(data) - names))
+    unknown = sorted(str(name) for name in set(data) - names)
     if unknown:
-        raise FileError(f"{where} has no {unknown}; it has {', '.join(sorted(names))}")
+        shown = ", ".join(name or "field without a name" for name in unknown)
+        raise FileError(f"{where} has no {shown}; it has {', '.join(sorted(names))}")
     values = {name: _convert(hints[name], value, f"{where}.{name}") for name, value in data.items()}
     try:
         return kind(**values)
@@ -66,6 +71,13 @@ def _convert(kind: Any, value: object, where: str) -> Any:
         return tuple(_convert(choices[0], part, where) for part in value)
     if origin is tuple and isinstance(value, list) and len(value) == len(choices):
         return tuple(_convert(kind, part, where) for kind, part in zip(choices, value, strict=True))
+    if origin is Mapping and isinstance(value, Mapping):
+        return {
+            _convert(choices[0], name, where): _convert(choices[1], part, f"{where}.{name}")
+            for name, part in value.items()
+        }
+    if origin is np.ndarray and isinstance(value, list):
+        return _array(value, where)
     if is_dataclass(kind) and isinstance(kind, type):
         return read_settings(kind, value, where)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -74,6 +86,16 @@ def _convert(kind: Any, value: object, where: str) -> Any:
     if kind in (int, str, bool) and type(value) is kind:
         return value
     raise FileError(f"{where} must be {_name(kind, choices)}, not {str(value)[:40]!r}")
+
+
+def _array(value: list[Any], where: str) -> NDArray[np.float64]:
+    try:
+        array = np.array(value, np.float64)
+    except (ValueError, TypeError, OverflowError):
+        array = np.array(np.nan)
+    if not np.isfinite(array).all():
+        raise FileError(f"{where} must be an array of finite numbers")
+    return array
 
 
 def _name(kind: Any, choices: tuple[Any, ...]) -> str:

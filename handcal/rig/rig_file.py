@@ -120,9 +120,14 @@ def read_rig(path: str | PathLike[str]) -> Rig:
     path = Path(path)
     data = read_limited(path, MAX_RIG_BYTES)
     try:
-        return parse_storage(data, _parse)
+        return parse_rig(data)
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
+
+
+def parse_rig(data: bytes) -> Rig:
+    """Return the rig in the content of a rig file; ValueError as `read_rig`."""
+    return parse_storage(data, _parse)
 
 
 def quoted(text: str) -> str:

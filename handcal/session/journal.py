@@ -1,7 +1,11 @@
-"""The journal of a session: an append-only file, one JSON object per line, safe after a crash."""
+"""The journal of a session: an append-only file, one JSON object per line, safe after a crash.
+
+Every line ends with a checksum of its own. A damaged line is left out and named; all others count.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from dataclasses import dataclass
@@ -10,12 +14,17 @@ from pathlib import Path
 from typing import Any
 
 from handcal.errors import FileError
-from handcal.io.files import read_limited
+from handcal.io.files import read_limited, write_atomic
 
-JOURNAL_VERSION = 2
-"""Version 2 added deletion and restoring, trials and fine-tuning; version 1 can be read too."""
+JOURNAL_VERSION = 3
+"""Version 3 added checksums and facts; 2 deletion, trials and fine-tuning; all can be read."""
 
 MAX_JOURNAL_BYTES = 64 * 2**20
+JOURNAL, JOURNAL_END = "journal.jsonl", "journal.end"
+UPGRADED = "upgraded"
+"""The event between the lines of an older version and those of this one."""
+_MAX_END_BYTES = 1024
+_CHECKSUM_DIGITS = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +40,42 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Damage:
+    """One damaged part of a session."""
+
+    file: str
+    """Path in the session's folder, such as ``alignments/1.npz``."""
+    line: int | None
+    """Number of the journal's line, from 1; None for another file."""
+    what: str
+    """The damage, and what was done instead."""
+
+    def __str__(self) -> str:
+        where = self.file if self.line is None else f"{self.file}, line {self.line}"
+        return f"{where}: {self.what}"
+
+
+@dataclass(frozen=True, slots=True)
 class JournalContent:
     """The contents of a journal."""
 
     events: tuple[Event, ...]
+    """Those whose lines are sound."""
     complete_bytes: int
     """Length of the complete lines."""
     torn_bytes: int
     """Length of an incomplete last line, which is ignored; 0 if there is none."""
+    version: int = JOURNAL_VERSION
+    """Version of the last sound line."""
+    next_number: int = 1
+    """Number of the next event; greater than that of any damaged or missing line."""
+    sha256: str = ""
+    """Checksum of the complete lines of a journal of an older version; else empty."""
+    ended: int = 0
+    """Number of the last event when the journal was closed; 0 if it never was."""
+    notes_sha256: str | None = None
+    """Checksum of the notes then; empty without notes, None if unknown."""
+    damaged: tuple[Damage, ...] = ()
 
 
 def happens_now(number: int, name: str, data: dict[str, Any]) -> Event:
@@ -47,7 +84,11 @@ def happens_now(number: int, name: str, data: dict[str, Any]) -> Event:
 
 
 def journal_line(event: Event) -> bytes:
-    """Return an event as a line; ValueError if its data contain NaN."""
+    """Return an event as a line; ValueError if its data contain NaN.
+
+    Its last member, `sha256`, is the first 32 digits of the SHA-256 of the line without it:
+    ``{…}`` becomes ``{…, "sha256": "…"}``.
+    """
     fields = {
         "version": JOURNAL_VERSION,
         "number": event.number,
@@ -55,24 +96,61 @@ def journal_line(event: Event) -> bytes:
         "event": event.name,
         "data": event.data,
     }
-    return json.dumps(fields, allow_nan=False).encode() + b"\n"
+    content = json.dumps(fields, allow_nan=False).encode()
+    return content[:-1] + _ending(content)
 
 
 def read_journal(path: Path) -> JournalContent:
-    """Read a journal.
+    """Read a journal; damaged lines are left out and named.
 
     Raises
     ------
     FileError
-        If it cannot be read, is too large or of an unknown version, or a complete line is damaged.
+        If it cannot be read, is too large, of an unknown version, or without any sound line.
     """
     content = read_limited(path, MAX_JOURNAL_BYTES)
     *lines, torn = content.split(b"\n")
-    try:
-        events = tuple(_parse_line(number, line) for number, line in enumerate(lines, 1))
-    except ValueError as error:
-        raise FileError(f"{path}: {error}") from error
-    return JournalContent(events, len(content) - len(torn), len(torn))
+    events: list[Event] = []
+    damaged: list[Damage] = []
+    version, expected, done_bytes = 0, 1, 0
+    for place, line in enumerate(lines, 1):
+        try:
+            found, event = _parse_line(line)
+            last = events[-1].number if events else 0
+            # Lines of versions 1 and 2 have no checksum: a number far off is a changed digit.
+            is_far = found < JOURNAL_VERSION and abs(event.number - expected) > 1
+            if found < version or event.number <= last or is_far:
+                raise ValueError("is not the event expected there")
+        except ValueError as error:
+            damaged.append(Damage(path.name, place, f"{error}; left out"))
+            expected += 1
+        else:
+            if event.number > expected:
+                damaged.append(_missing(path, place, expected, event.number - 1))
+            before = event.data.get("journal_sha256") if event.name == UPGRADED else None
+            if before is not None and before != _sha256(content[:done_bytes]):
+                changed = "the lines before it, of an older version, have changed since"
+                damaged.append(Damage(path.name, place, changed))
+            events.append(event)
+            version, expected = found, event.number + 1
+        done_bytes += len(line) + 1
+    if not events:
+        why = damaged[0].what.removesuffix("; left out") if damaged else "is missing"
+        raise FileError(f"{path} does not begin as the journal of a session: line 1 {why}")
+    ended, notes_sha256 = _read_end(path.with_name(JOURNAL_END), damaged)
+    if ended >= expected:
+        damaged.append(_missing(path, len(lines), expected, ended))
+    return JournalContent(
+        events=tuple(events),
+        complete_bytes=done_bytes,
+        torn_bytes=len(torn),
+        version=version,
+        next_number=max(expected, ended + 1),
+        sha256=_sha256(content[:done_bytes]) if version < JOURNAL_VERSION else "",
+        ended=ended,
+        notes_sha256=notes_sha256,
+        damaged=tuple(damaged),
+    )
 
 
 class JournalWriter:
@@ -83,12 +161,20 @@ class JournalWriter:
     path : Path
     content : JournalContent
         Its present contents; an incomplete last line is removed by the next write.
+
+    Attributes
+    ----------
+    next_number : int
+        Number of the next event.
     """
 
     def __init__(self, path: Path, content: JournalContent) -> None:
         self._path = path
-        self._events = len(content.events)
+        self.next_number = content.next_number
         self._bytes = content.complete_bytes
+        self._torn_bytes = content.torn_bytes
+        found = path.stat()
+        self._file = found.st_dev, found.st_ino
 
     def append(self, name: str, data: dict[str, Any]) -> Event:
         """Append an event with the current time, sync it to disk, and return it.
@@ -100,13 +186,14 @@ class JournalWriter:
         ValueError
             If the data contain NaN.
         """
-        event = happens_now(self._events + 1, name, data)
+        event = happens_now(self.next_number, name, data)
         line = journal_line(event)
         if self._bytes + len(line) > MAX_JOURNAL_BYTES:
             raise FileError(f"the journal of {self._path.parent} is full; start another session")
         try:
             # Reopened each time, so that a folder that was moved or removed is noticed.
             with self._path.open("r+b") as file:
+                self._torn_bytes = max(self._torn_bytes, len(line))
                 file.seek(self._bytes)
                 file.truncate()  # a failed or killed write may have left part of a line
                 file.write(line)
@@ -115,24 +202,105 @@ class JournalWriter:
         except OSError as error:
             raise FileError(f"cannot write {self._path}: {error.strerror or error}") from error
         self._bytes += len(line)
-        self._events += 1
+        self._torn_bytes = 0
+        self.next_number += 1
         return event
 
+    def write_end(self, notes_sha256: str | None) -> None:
+        """Store the number of the last event, so that a journal cut short later is noticed."""
+        fields = {
+            "version": JOURNAL_VERSION,
+            "number": self.next_number - 1,
+            "notes_sha256": notes_sha256,
+        }
+        content = json.dumps(fields).encode()
+        write_atomic(self._path.with_name(JOURNAL_END), content[:-1] + _ending(content))
 
-def _parse_line(number: int, line: bytes) -> Event:
+    def require_unchanged(self) -> None:
+        """Raise FileError unless the file is the one that was read, with what was added since."""
+        try:
+            found = self._path.stat()
+        except OSError as error:
+            raise FileError(f"cannot write {self._path}: {error.strerror or error}") from error
+        is_known = self._bytes <= found.st_size <= self._bytes + self._torn_bytes
+        if (found.st_dev, found.st_ino) != self._file or not is_known:
+            raise FileError(
+                f"cannot write {self._path}: it was changed or replaced by another program; "
+                "open the session again"
+            )
+
+
+def _ending(content: bytes) -> bytes:
+    return b', "sha256": "%s"}\n' % _checksum(content).encode()
+
+
+def _checksum(content: bytes) -> str:
+    return _sha256(content)[:_CHECKSUM_DIGITS]
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _missing(path: Path, place: int, first: int, last: int) -> Damage:
+    what = f"event {first} is" if first == last else f"events {first} to {last} are"
+    return Damage(path.name, place, f"{what} missing here")
+
+
+def _parse_sound(line: bytes) -> dict[str, Any]:
+    """Return the object in a line with its checksum, which versions 1 and 2 do not have.
+
+    Raises
+    ------
+    FileError
+        If the line is sound, but of an unknown version.
+    ValueError
+        If it is damaged.
+    """
     try:
-        fields = json.loads(line)
-        version, event = fields["version"], fields["event"]
-        time, data = fields["time"], fields["data"]
-        found = fields["number"]
+        fields: dict[str, Any] = json.loads(line)
+        version, has_checksum = fields["version"], "sha256" in fields
     except (ValueError, RecursionError, KeyError, TypeError) as error:
-        raise ValueError(f"line {number} is not an event of a session") from error
-    if version not in (1, JOURNAL_VERSION):
-        raise ValueError(f"session version {version} is not {JOURNAL_VERSION} or 1, those known")
-    kinds = isinstance(event, str), isinstance(time, str), isinstance(data, dict)
-    if found != number or not all(kinds) or not _is_time(time):
-        raise ValueError(f"line {number} is not the event expected there")
-    return Event(number, time, event, data)
+        raise ValueError("is not an event of a session") from error
+    content = line[: 1 - len(_ending(b""))] + b"}"
+    is_sound = line + b"\n" == content[:-1] + _ending(content)
+    if type(version) is not int or not 1 <= version <= JOURNAL_VERSION:
+        problem = f"has version {version!r}, not one of 1 to {JOURNAL_VERSION}"
+        raise (FileError(f"the session's journal {problem}") if is_sound else ValueError(problem))
+    if not is_sound and (version == JOURNAL_VERSION or has_checksum):
+        raise ValueError("does not have its checksum")
+    return fields
+
+
+def _parse_line(line: bytes) -> tuple[int, Event]:
+    """Return the version and the event of a line; ValueError if it is damaged."""
+    fields = _parse_sound(line)
+    try:
+        event = Event(fields["number"], fields["time"], fields["event"], fields["data"])
+    except KeyError as error:
+        raise ValueError("is not an event of a session") from error
+    kinds = isinstance(event.name, str), isinstance(event.time, str), isinstance(event.data, dict)
+    if type(event.number) is not int or not all(kinds) or not _is_time(event.time):
+        raise ValueError("is not the event expected there")
+    return fields["version"], event
+
+
+def _read_end(path: Path, damaged: list[Damage]) -> tuple[int, str | None]:
+    """Return `ended` and `notes_sha256` of `JournalContent`."""
+    if not path.exists():
+        return 0, None
+    try:
+        line = read_limited(path, _MAX_END_BYTES)
+        if not line.endswith(b"\n"):
+            raise ValueError("is cut short")
+        fields = _parse_sound(line[:-1])
+        number, notes_sha256 = fields["number"], fields["notes_sha256"]
+        if type(number) is not int or not isinstance(notes_sha256, str | None):
+            raise ValueError("holds no number or no checksum")
+    except (FileError, ValueError, KeyError) as error:
+        damaged.append(Damage(path.name, None, f"{error}; not used"))
+        return 0, None
+    return number, notes_sha256
 
 
 def _is_time(text: str) -> bool:

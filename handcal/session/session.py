@@ -3,6 +3,7 @@
 ::
 
     NAME/journal.jsonl     the events, one JSON object per line; the only file appended to
+         journal.end       the number of the last event, written when the session is closed
          rig.yaml          the rig at the time
          settings.json     the settings at the time
          alignments/1.npz  clouds and poses of each alignment; its number never changes
@@ -11,18 +12,17 @@
 
 The journal decides what exists: an alignment exists once the journal contains it with its checksum,
 until the journal records its deletion. The folder is therefore consistent at every moment, and a
-killed program loses at most the line it was writing.
+killed program loses at most the line it was writing. The journal also holds the rig, the settings
+and the results, and the checksum of the notes: it decides what is right where a file differs.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal, Self
 
 from numpy.typing import ArrayLike
@@ -30,64 +30,32 @@ from numpy.typing import ArrayLike
 from handcal.display import as_shifts
 from handcal.errors import FileError
 from handcal.io.closable import Closable
-from handcal.io.files import make_folder, read_json, read_limited, write_atomic, write_json
+from handcal.io.files import (
+    make_folder,
+    read_limited,
+    remove_leftovers,
+    sync_folder,
+    write_atomic,
+    write_json,
+)
 from handcal.io.lock import FileLock
-from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
-from handcal.session.alignment_file import decode_alignment, encode_alignment
+from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
+from handcal.session.alignment_file import encode_alignment
+from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
 from handcal.session.journal import (
-    Event,
-    JournalContent,
+    JOURNAL,
+    JOURNAL_VERSION,
     JournalWriter,
     happens_now,
     journal_line,
-    read_journal,
 )
-from handcal.session.state import Kind, SessionEvent, SessionState, clean_wearer
+from handcal.session.record import MAX_ALIGNMENT_BYTES as MAX_ALIGNMENT_BYTES
+from handcal.session.record import MAX_NOTES_CHARACTERS as MAX_NOTES_CHARACTERS
+from handcal.session.record import SessionRecord as SessionRecord
+from handcal.session.record import alignment_path, read_session, replay, sha256
+from handcal.session.state import Kind, SessionEvent, clean_wearer
 from handcal.session.trial import Trial, trial_json
-from handcal.types import Alignment, Eye, Float64, Rig
-
-MAX_ALIGNMENT_BYTES = 16 * 2**20
-MAX_NOTES_CHARACTERS = 20_000
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SessionRecord:
-    """The contents of a session folder."""
-
-    path: Path
-    rig: Rig
-    settings: dict[str, Any]
-    wearer: str
-    """Name or code; empty if none was given."""
-    notes: str
-    events: tuple[Event, ...]
-    alignments: Mapping[int, Alignment]
-    """The alignments that are not deleted, by number, in the order in which they were saved."""
-    deleted_alignments: Mapping[int, Alignment]
-    trials: Mapping[int, Trial]
-    deleted_trials: Mapping[int, Trial]
-    """Trials of the user test, likewise."""
-    results: dict[str, Any] | None
-    """The newest results; None if none were saved since an alignment was deleted or restored."""
-    is_solved: bool
-    """True if the results are those of all `alignments`."""
-    is_applied: bool
-    """True if the headset has acknowledged the projections of these results."""
-    applied_shift_m: Mapping[Eye, Float64]
-    """each (3,); the φ that the headset rendered with last, solved or set by hand; a missing eye
-    was rendered with the offline calibration."""
-    fine_tuned: Mapping[Eye, Float64] | None
-    """each (3,); the φ last set by hand; None if none was set since the last results."""
-    is_finished: bool
-    """True if the session was finished, and nothing was recorded since."""
-    journal_bytes: int
-    """Length of the journal's complete lines."""
-    torn_bytes: int
-    """Length of an incomplete last line, which is ignored; 0 if there is none."""
-
-    def __repr__(self) -> str:
-        counts = f"{len(self.alignments)} alignments, {len(self.trials)} trials"
-        return f"<SessionRecord {self.path}: {counts}>"
+from handcal.types import Alignment, Eye, Rig
 
 
 class Session(Closable):
@@ -115,17 +83,23 @@ class Session(Closable):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.revision = 0
+        self._journal: JournalWriter | None = None
         self._lock = FileLock(path / "lock")
         try:
             record = self.open(path)
+            replayed = replay(path)
+            self._state = replayed.state
+            for folder in (path, path / "alignments"):
+                if folder.is_dir():
+                    remove_leftovers(folder)
+            self._journal = JournalWriter(path / JOURNAL, replayed.journal)
+            self._notes_sha256 = _notes_sha256(record)
+            if replayed.journal.version < JOURNAL_VERSION:
+                self._upgrade(record, replayed.journal.sha256)
         except BaseException:
+            self._journal = None
             self.close()
             raise
-        self._state = _replay(path, record.events)
-        self._journal = JournalWriter(
-            path / "journal.jsonl",
-            JournalContent(record.events, record.journal_bytes, record.torn_bytes),
-        )
 
     @classmethod
     def create(
@@ -162,18 +136,21 @@ class Session(Closable):
         try:
             path.mkdir()
             (path / "alignments").mkdir()
+            sync_folder(path.parent)
         except OSError as error:
             raise FileError(f"cannot create {path}: {error.strerror or error}") from error
         write_rig(path / "rig.yaml", rig)
         write_json(path / "settings.json", dict(settings))
         # The journal is written last: without it, the folder is not a session.
-        created = {"rig_sha256": _sha256(_rig_bytes(path)), "wearer": wearer}
+        created = {"rig": _rig_text(path), "settings": dict(settings), "wearer": wearer}
         first = journal_line(happens_now(1, SessionEvent.CREATED, created))
-        write_atomic(path / "journal.jsonl", first)
+        write_atomic(path / JOURNAL, first)
         return cls(path)
 
     @staticmethod
-    def open(path: Path, before: SessionRecord | None = None) -> SessionRecord:
+    def open(
+        path: Path, before: SessionRecord | None = None, rig: Rig | None = None
+    ) -> SessionRecord:
         """Read a session, which may be in use or left behind by a crash.
 
         Parameters
@@ -181,43 +158,21 @@ class Session(Closable):
         path : Path
         before : SessionRecord, optional
             An earlier record of it; its alignments, which never change, are not read again.
+        rig : Rig, optional
+            Taken in place of the stored one.
+
+        Returns
+        -------
+        SessionRecord
+            Without what is damaged, which is named in `damaged`.
 
         Raises
         ------
         FileError
-            If the folder is not a session, is of an unknown version, or a file in it is missing,
-            damaged or too large.
+            If the folder is not a session, is of an unknown version, no line of its journal is
+            sound, or the rig is lost: in version 3 its file and the journal's first line.
         """
-        if not (path / "journal.jsonl").is_file():
-            raise FileError(
-                f"{path} is not a session; choose the folder that contains journal.jsonl"
-            )
-        journal = read_journal(path / "journal.jsonl")
-        state = _replay(path, journal.events)
-        if state.rig_sha256 != _sha256(_rig_bytes(path)):
-            raise FileError(f"{path / 'rig.yaml'} is damaged: its checksum is not the journal's")
-        known = {**before.alignments, **before.deleted_alignments} if before else {}
-        results, notes = path / "results.json", path / "notes.txt"
-        return SessionRecord(
-            path=path,
-            rig=read_rig(path / "rig.yaml"),
-            settings=read_json(path / "settings.json"),
-            wearer=state.wearer,
-            notes=_read_notes(notes) if notes.exists() else "",
-            events=journal.events,
-            alignments=_read_alignments(path, state.alignments.active, known),
-            deleted_alignments=_read_alignments(path, state.alignments.deleted, known),
-            trials=MappingProxyType(state.trials.active),
-            deleted_trials=MappingProxyType(state.trials.deleted),
-            results=read_json(results) if results.exists() else None,
-            is_solved=state.is_solved and results.exists(),
-            is_applied=state.is_applied and results.exists(),
-            applied_shift_m=MappingProxyType(state.applied_shift_m),
-            fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
-            is_finished=state.is_finished,
-            journal_bytes=journal.complete_bytes,
-            torn_bytes=journal.torn_bytes,
-        )
+        return read_session(path, before, rig)
 
     def record(self, event: str, **data: Any) -> None:
         """Append an event with JSON-able data to the journal.
@@ -233,8 +188,8 @@ class Session(Closable):
             raise ValueError(f"the event {event} is written by the session itself")
         self._append(event, data)
 
-    def save_alignment(self, alignment: Alignment) -> int:
-        """Save an alignment and return its number, from 1.
+    def save_alignment(self, alignment: Alignment, facts: AlignmentFacts | None = None) -> int:
+        """Save an alignment with what is known of its making; return its number, from 1.
 
         Raises
         ------
@@ -245,8 +200,11 @@ class Session(Closable):
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
-        write_atomic(_alignment_path(self.path, number), data)
-        self._append(SessionEvent.ALIGNMENT_SAVED, {"number": number, "sha256": _sha256(data)})
+        self._require_own()
+        write_atomic(alignment_path(self.path, number), data)
+        known = {} if facts is None else {"facts": facts_json(facts)}
+        saved = {"number": number, "sha256": sha256(data), **known}
+        self._append(SessionEvent.ALIGNMENT_SAVED, saved)
         return number
 
     def save_trial(self, trial: Trial) -> int:
@@ -281,8 +239,8 @@ class Session(Closable):
 
     def save_results(self, results: Mapping[str, Any]) -> None:
         """Replace the results of all alignments; FileError if they cannot be written."""
-        write_json(self.path / "results.json", dict(results))
         self._append(SessionEvent.SOLVED, dict(results))
+        write_json(self.path / "results.json", dict(results))
 
     def save_applied(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
         """Record that the headset renders with the solved φ.
@@ -312,8 +270,26 @@ class Session(Closable):
         """
         if len(text) > MAX_NOTES_CHARACTERS:
             raise ValueError(f"notes may have at most {MAX_NOTES_CHARACTERS:,} characters")
-        write_atomic(self.path / "notes.txt", text.encode(errors="replace"))
-        self.revision += 1
+        data = text.encode(errors="replace")
+        before = self._notes_sha256
+        # Announced first: a crash leaves notes with the one or the other checksum.
+        self._append(SessionEvent.NOTES_SAVED, {"sha256": sha256(data), "before_sha256": before})
+        write_atomic(self.path / "notes.txt", data)
+        self._notes_sha256 = sha256(data)
+
+    def save_facts(self, **facts: Any) -> None:
+        """Record facts by their names in `SessionFacts`; each replaces an earlier one.
+
+        Raises
+        ------
+        FileError
+            If the journal cannot be written.
+        ValueError
+            If a name is unknown or a value invalid.
+        """
+        data = facts_json(facts)
+        with_facts(SessionFacts(), data)
+        self._append(SessionEvent.FACTS_SAVED, data)
 
     def finish(self) -> None:
         """Record the end of the session; FileError if the journal cannot be written.
@@ -324,6 +300,11 @@ class Session(Closable):
 
     def close(self) -> None:
         """Release the session for other programs; safe to call twice."""
+        if self._journal is not None and self.revision:
+            with suppress(FileError):  # the folder was removed, or the disk is full
+                self._require_own()
+                self._journal.write_end(self._notes_sha256)
+        self._journal = None
         self._lock.release()
 
     def _next_number(self, kind: Kind) -> int:
@@ -333,17 +314,35 @@ class Session(Closable):
             raise FileError(f"{self.path} is full: {error}; start another session") from error
 
     def _change(self, kind: Kind, what: Literal["deleted", "restored"], number: int) -> None:
-        if kind == "alignment":  # the results are those of other alignments
-            results = self.path / "results.json"
-            try:
-                results.unlink(missing_ok=True)
-            except OSError as error:
-                raise FileError(f"cannot remove {results}: {error.strerror or error}") from error
         self._append(SessionEvent(f"{kind}_{what}"), {"number": number})
+        if kind == "alignment":  # the results are those of other alignments
+            with suppress(OSError):  # the journal says so already
+                (self.path / "results.json").unlink(missing_ok=True)
+
+    def _upgrade(self, record: SessionRecord, journal_sha256: str) -> None:
+        """Bind what versions 1 and 2 stored without checksums."""
+        self._append(
+            SessionEvent.UPGRADED,
+            {
+                "journal_sha256": journal_sha256,
+                "rig": _rig_text(self.path),
+                "settings": record.settings,
+                "results": record.results,
+                "notes_sha256": self._notes_sha256,
+            },
+        )
 
     def _append(self, event: str, data: dict[str, Any]) -> None:
-        self._state.apply(self._journal.append(event, data))
+        self._state.apply(self._require_own().append(event, data))
         self.revision += 1
+
+    def _require_own(self) -> JournalWriter:
+        """Return the journal; FileError if another program may be writing to it."""
+        if self._journal is None:
+            raise FileError(f"{self.path} is closed; open the session again")
+        self._lock.require_held()
+        self._journal.require_unchanged()
+        return self._journal
 
 
 def open_session(path: str | PathLike[str]) -> SessionRecord:
@@ -358,13 +357,13 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     Returns
     -------
     SessionRecord
-        Rig, settings, alignments, trials of the user test, notes and events.
+        Rig, settings, alignments, trials of the user test, notes and events, without what is
+        damaged; `damaged` names that.
 
     Raises
     ------
     FileError
-        If the folder is not a session, is of an unknown version, or a file in it is missing,
-        damaged or too large.
+        If the folder is not a session, is of an unknown version, or nothing in it can be read.
 
     Examples
     --------
@@ -376,56 +375,17 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     return Session.open(Path(path))
 
 
-def _replay(path: Path, events: Sequence[Event]) -> SessionState:
-    """Return the state after all events; FileError if they are inconsistent."""
-    journal = path / "journal.jsonl"
-    if not events or events[0].name != SessionEvent.CREATED:
-        raise FileError(f"{journal} does not begin as the journal of a session")
-    state = SessionState()
-    for event in events:
-        try:
-            state.apply(event)
-        except ValueError as error:
-            raise FileError(f"{journal}: line {event.number}: {error}") from error
-    return state
+def _rig_text(path: Path) -> str:
+    return read_limited(path / "rig.yaml", MAX_RIG_BYTES).decode()
 
 
-def _read_alignments(
-    path: Path, checksums: Mapping[int, str], known: Mapping[int, Alignment]
-) -> Mapping[int, Alignment]:
-    return MappingProxyType(
-        {
-            number: known.get(number) or _read_alignment(_alignment_path(path, number), sha256)
-            for number, sha256 in checksums.items()
-        }
-    )
-
-
-def _read_alignment(path: Path, sha256: str) -> Alignment:
-    data = read_limited(path, MAX_ALIGNMENT_BYTES)
-    if _sha256(data) != sha256:
-        raise FileError(f"{path} is damaged: its checksum is not the journal's")
-    try:
-        return decode_alignment(data)
-    except ValueError as error:
-        raise FileError(f"{path}: {error}") from error
-
-
-def _read_notes(path: Path) -> str:
-    return read_limited(path, 4 * MAX_NOTES_CHARACTERS).decode(errors="replace")
+def _notes_sha256(record: SessionRecord) -> str | None:
+    """Return the checksum of the stored notes: empty without notes, None if they are damaged."""
+    if any(damage.file == "notes.txt" for damage in record.damaged):
+        return None
+    notes = record.path / "notes.txt"
+    return sha256(read_limited(notes, 4 * MAX_NOTES_CHARACTERS)) if notes.exists() else ""
 
 
 def _lists(shifts_m: Mapping[Eye, ArrayLike]) -> dict[Eye, list[float]]:
     return {eye: shift_m.tolist() for eye, shift_m in as_shifts(shifts_m).items()}
-
-
-def _alignment_path(path: Path, number: int) -> Path:
-    return path / "alignments" / f"{number}.npz"
-
-
-def _rig_bytes(path: Path) -> bytes:
-    return read_limited(path / "rig.yaml", MAX_RIG_BYTES)
-
-
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 import unicodedata
 from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from handcal.display import as_shifts
+from handcal.session import journal
+from handcal.session.facts import AlignmentFacts, SessionFacts, read_facts, with_facts
 from handcal.session.journal import Event
 from handcal.session.trial import Trial, read_trial
 from handcal.types import Eye, Float64
 
 MAX_ALIGNMENTS = 100
 MAX_TRIALS = 1000
+_DELETED_LIMIT = 10
+"""Items saved in all, deleted ones too, over those that are not deleted."""
 MAX_WEARER_CHARACTERS = 100
 
 Kind: TypeAlias = Literal["alignment", "trial"]
@@ -26,6 +31,12 @@ class SessionEvent(StrEnum):
     """The events that a session writes itself and that make up its state."""
 
     CREATED = "created"
+    UPGRADED = journal.UPGRADED
+    """Copies and checksums from here on, in a session begun by version 1 or 2."""
+    REPAIRED = "repaired"
+    """In a copy of a damaged session: its numbers have gaps."""
+    NOTES_SAVED = "notes_saved"
+    FACTS_SAVED = "facts_saved"
     ALIGNMENT_SAVED = "alignment_saved"
     ALIGNMENT_DROPPED = "alignment_dropped"
     """Version 1 only: deleted for good; the next alignment took its number."""
@@ -40,30 +51,43 @@ class SessionEvent(StrEnum):
     FINISHED = "finished"
 
 
+ASIDE = (SessionEvent.NOTES_SAVED, SessionEvent.UPGRADED)
+"""Events after which a finished session stays finished."""
+
+
 class NumberedItems(Generic[Item]):
     """Items numbered from 1 that can be deleted and restored; a number is never given twice.
+
+    At most `limit` are active.
 
     Attributes
     ----------
     active, deleted : dict of int to item
+    taken : int
+        Numbers up to this one are not given again, even if their items are unknown.
+    has_gaps : bool
+        True if numbers may be missing, because the session is or was damaged.
     """
 
     def __init__(self, kind: Kind, limit: int) -> None:
         self.active: dict[int, Item] = {}
         self.deleted: dict[int, Item] = {}
+        self.taken = 0
+        self.has_gaps = False
         self._kind = kind
         self._limit = limit
 
     def next_number(self) -> int:
         """Return the number of the next item; ValueError if there are too many."""
-        number = 1 + max((*self.active, *self.deleted), default=0)
-        if number > self._limit:
+        number = 1 + max(self.taken, max((*self.active, *self.deleted), default=0))
+        if len(self.active) >= self._limit or number > _DELETED_LIMIT * self._limit:
             raise ValueError(f"no room for more than {self._limit} {self._kind}s")
         return number
 
     def save(self, number: int, item: Item) -> None:
-        """Add an item; ValueError unless its number is the next one."""
-        if number != self.next_number():
+        """Add an item; ValueError unless its number is the next one, or later with gaps."""
+        first, last = self.next_number(), _DELETED_LIMIT * self._limit
+        if not first <= number <= (last if self.has_gaps else first):
             raise ValueError(f"{self._kind} {number} is not the next")
         self.active[number] = item
 
@@ -76,6 +100,8 @@ class NumberedItems(Generic[Item]):
         """Raise ValueError unless there is a deleted item of this number."""
         if number not in self.deleted:
             raise ValueError(f"there is no deleted {self._kind} {number}")
+        if len(self.active) >= self._limit:
+            raise ValueError(f"no room for more than {self._limit} {self._kind}s")
 
     def delete(self, number: int) -> None:
         """Delete an active item; ValueError if there is none."""
@@ -83,7 +109,7 @@ class NumberedItems(Generic[Item]):
         self.deleted[number] = self.active.pop(number)
 
     def restore(self, number: int) -> None:
-        """Restore a deleted item to its place; ValueError if there is none."""
+        """Restore a deleted item to its place; ValueError if there is none, or no room."""
         self.require_deleted(number)
         self.active = dict(sorted({**self.active, number: self.deleted.pop(number)}.items()))
 
@@ -93,8 +119,22 @@ class SessionState:
 
     Attributes
     ----------
+    rig : str
+        Content of the rig file; empty before version 3.
     rig_sha256 : str
+        Its checksum.
+    settings : dict or None
+        None before version 3.
     wearer : str
+    notes_sha256 : tuple of str or None
+        Checksums of the notes that may be stored: the newest, and those before; an empty text if
+        there are none. Empty before version 3.
+    results : dict or None
+        The newest results of version 3, or of an older one with the event `solved`.
+    older_results : list of dict
+        Those before.
+    facts : SessionFacts
+    alignment_facts : dict of int to AlignmentFacts
     alignments : NumberedItems of str
         Checksums.
     trials : NumberedItems of Trial
@@ -105,8 +145,13 @@ class SessionState:
     """
 
     def __init__(self) -> None:
-        self.rig_sha256 = ""
-        self.wearer = ""
+        self.rig = self.rig_sha256 = self.wearer = ""
+        self.settings: dict[str, Any] | None = None
+        self.notes_sha256: tuple[str | None, ...] = ()
+        self.results: dict[str, Any] | None = None
+        self.older_results: list[dict[str, Any]] = []
+        self.facts = SessionFacts()
+        self.alignment_facts: dict[int, AlignmentFacts] = {}
         self.alignments = NumberedItems[str]("alignment", MAX_ALIGNMENTS)
         self.trials = NumberedItems[Trial]("trial", MAX_TRIALS)
         self.is_solved = False
@@ -133,15 +178,28 @@ class SessionState:
             raise ValueError(f"{event.name} lacks {error}") from error
         except (TypeError, AttributeError, OverflowError) as error:
             raise ValueError(f"{event.name} contains invalid data: {error}") from error
-        self.is_finished = event.name == SessionEvent.FINISHED
+        if event.name not in ASIDE:
+            self.is_finished = event.name == SessionEvent.FINISHED
 
     def _apply(self, name: str, data: dict[str, Any], time: str) -> None:
         match name:
             case SessionEvent.CREATED:
-                self.rig_sha256 = data["rig_sha256"]
+                self._bind(data)
                 self.wearer = clean_wearer(data.get("wearer", ""))
+            case SessionEvent.UPGRADED:
+                self._bind(data)
+                self.notes_sha256 = (data["notes_sha256"],)
+                self._set_results(data["results"])
+            case SessionEvent.REPAIRED:
+                self.alignments.has_gaps = self.trials.has_gaps = True
+            case SessionEvent.NOTES_SAVED:
+                self.notes_sha256 = data["sha256"], data["before_sha256"]
+            case SessionEvent.FACTS_SAVED:
+                self.facts = with_facts(self.facts, data)
             case SessionEvent.ALIGNMENT_SAVED:
+                facts = read_facts(AlignmentFacts, data.get("facts", {}))
                 self.alignments.save(_number(data), data["sha256"])
+                self.alignment_facts[_number(data)] = facts
             case SessionEvent.ALIGNMENT_DROPPED:
                 self.alignments.active.pop(_number(data))
             case SessionEvent.ALIGNMENT_DELETED:
@@ -155,6 +213,7 @@ class SessionState:
             case SessionEvent.TRIAL_RESTORED:
                 self.trials.restore(_number(data))
             case SessionEvent.SOLVED:
+                self._set_results(data)
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
             case SessionEvent.APPLIED if "shift_m" in data:  # not in version 1
                 self.applied_shift_m |= as_shifts(data["shift_m"])
@@ -164,6 +223,25 @@ class SessionState:
                 self.applied_shift_m |= self.fine_tuned
         if name.startswith("alignment_"):
             self.is_solved = self.is_applied = False
+        if name in (SessionEvent.ALIGNMENT_DELETED, SessionEvent.ALIGNMENT_RESTORED):
+            self._set_results(None)
+
+    def _bind(self, data: Mapping[str, Any]) -> None:
+        """Take the rig and the settings from an event."""
+        if "rig" in data:
+            rig, settings = data["rig"], data["settings"]
+            if not isinstance(settings, dict):
+                raise TypeError("the settings are no object")
+            self.rig_sha256 = hashlib.sha256(rig.encode()).hexdigest()
+            self.rig, self.settings = rig, settings
+            self.notes_sha256 = ("",)
+        else:
+            self.rig_sha256 = data["rig_sha256"]
+
+    def _set_results(self, results: dict[str, Any] | None) -> None:
+        if self.results is not None:
+            self.older_results.append(self.results)
+        self.results = results
 
 
 def _number(data: Mapping[str, Any]) -> int:

@@ -9,7 +9,7 @@ from handcal.errors import FileError
 from handcal.io.lock import FileLock
 from handcal.session.journal import read_journal
 from handcal.session.session import Session
-from handcal.session.state import SessionEvent
+from handcal.session.state import ASIDE, SessionEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +23,10 @@ class UnfinishedSession:
     alignments: int = 0
     trials: int = 0
     """Numbers of those that are not deleted."""
+    damaged: int = 0
+    """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
-    """Reason why it cannot be resumed, such as damage; empty if it can."""
+    """Reason why it cannot be resumed, such as another program; empty if it can."""
 
 
 def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
@@ -44,12 +46,18 @@ def _inspect(path: Path) -> UnfinishedSession | None:
         events = read_journal(path / "journal.jsonl").events
         if events:
             started = events[0].time
-            if events[-1].name == SessionEvent.FINISHED:
+            last = [event.name for event in events if event.name not in ASIDE][-1:]
+            if last == [SessionEvent.FINISHED]:
                 return None
         FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
         record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))
     return UnfinishedSession(
-        path, started, record.wearer, len(record.alignments), len(record.trials)
+        path,
+        started,
+        record.wearer,
+        len(record.alignments),
+        len(record.trials),
+        len(record.damaged),
     )

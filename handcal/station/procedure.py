@@ -37,12 +37,14 @@ from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
+from handcal.session.facts import AlignmentFacts, CameraUsed
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.types import (
     EYES,
     Alignment,
+    CameraIdentity,
     Eye,
     Float64,
     Frame,
@@ -182,6 +184,8 @@ class Calibration:
         self._sent_cursor: Outgoing | None = None
         self._wearer = wearer
         self._rig_name = _rig_name(rig)
+        self._frame: Frame | None = None
+        self._camera_stored = resume.facts.camera if resume is not None else None
         self._apply_until_s = 0.0
         if resume is not None:
             self._resume(resume)
@@ -219,6 +223,7 @@ class Calibration:
         """
         started_s = time.perf_counter()
         t_host_ns = self._clock.exposure_ns(frame)
+        self._frame = frame
         problem = ""
         cloud: HandCloud | None = None
         try:
@@ -272,6 +277,7 @@ class Calibration:
         outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
         self._sent_cursor = self._link.send_cursor(outline_W_m, self._cursor_id)
         self._link.send_prompt(_align_prompt(self.eyes), self.eyes)
+        self._store_camera()
         made = {"cursor_id": self._cursor_id, "eyes": list(self.eyes)}
         self._store(lambda session: session.record("cursor_made", **made))
 
@@ -580,10 +586,12 @@ class Calibration:
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._shift_m),
         )
+        age_s = 1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns)
+        facts = AlignmentFacts(match_age_s=age_s)
         self._items.save(self._items.next_number(), alignment)
         self.state = State.ALIGNED
         self.refusal = ""
-        self._store(lambda session: session.save_alignment(alignment))
+        self._store(lambda session: session.save_alignment(alignment, facts))
 
     def _refuse(self, prompt: str, reason: str, angle_deg: float | None = None) -> None:
         self.refusal = prompt
@@ -601,6 +609,16 @@ class Calibration:
         self._hands.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
+
+    def _store_camera(self) -> None:
+        """Record the camera if it is not the one recorded."""
+        assert self._frame is not None
+        camera = CameraUsed(
+            CameraIdentity(), self._frame.depth_intrinsics, self._frame.depth_scale_m
+        )
+        if camera != self._camera_stored:
+            self._camera_stored = camera
+            self._store(lambda session: session.save_facts(camera=camera))
 
     def _store(self, write: Callable[[Session], object]) -> None:
         """Write to the session, after data that could not be written before."""

@@ -89,5 +89,7 @@ def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterato
         yield EYE_NAMES[eye], f"{VERDICT_WORDS[verdict.name]}: {verdict.reason}"
     if note:
         yield "Note", note
+    if record.left_out:
+        yield "Damaged", f"{record.left_out[0].upper()}{record.left_out[1:]}."
     if record.torn_bytes:
         yield "Journal", "The last line is incomplete, as after a crash."

@@ -334,6 +334,39 @@ def test_a_session_that_cannot_be_solved_says_why(
     assert "calibration.solve.method must be one of paper, linear" in fails("solve", odd)[1]
 
 
+def test_a_session_is_checked_and_repaired(
+    handcal: Callable[..., None],
+    fails: Callable[..., tuple[int, str]],
+    tmp_path: Path,
+    simulated: Callable[..., Alignment],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def check(path: Path) -> tuple[int, dict[str, Any]]:
+        with pytest.raises(SystemExit) as ended:
+            handcal("session", "check", path, "--json", tmp_path / "check.json")
+        return int(str(ended.value)), json.loads((tmp_path / "check.json").read_text())
+
+    with Session.create(tmp_path, example_rig(), {}, name="one") as session:
+        session.save_alignment(simulated(1))
+        session.save_alignment(simulated(2))
+    assert check(session.path) == (0, {"state": "sound", "damaged": []})
+    (session.path / "alignments/1.npz").write_bytes(b"nothing")
+    what = "its checksum is not the journal's; alignment 1 was left out"
+    damaged = {"file": "alignments/1.npz", "line": None, "what": what}
+    assert check(session.path) == (1, {"state": "damaged", "damaged": [damaged]})
+    assert f"alignments/1.npz: {what}" in capsys.readouterr().out
+    code, found = check(tmp_path)
+    assert (code, found["state"]) == (2, "none")
+    assert "is not a session" in found["damaged"][0]["what"]
+
+    handcal("session", "repair", session.path, "--output", tmp_path / "two")
+    assert f"{tmp_path / 'two'}: 1 alignments, 0 trials" in capsys.readouterr().out
+    assert check(tmp_path / "two") == (0, {"state": "sound", "damaged": []})
+    assert fails("session", "repair", session.path, "--output", tmp_path / "two")[0] == 1
+    handcal("export", session.path, "--format", "zip", "--output", tmp_path / "out")
+    assert "Left out: the session is damaged: alignments/1.npz" in capsys.readouterr().out
+
+
 def test_a_session_is_exported_in_the_formats_asked_for(
     handcal: Callable[..., None], fails: Callable[..., tuple[int, str]], tmp_path: Path
 ) -> None:
@@ -441,7 +474,7 @@ def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: 
     assert not Path("/proc", children[0]).exists()
     (path,) = tmp_path.iterdir()
     record = Session.open(path)
-    assert [event.name for event in record.events] == ["created", "cursor_made"]
+    assert [event.name for event in record.events] == ["created", "facts_saved", "cursor_made"]
     assert record.torn_bytes == 0
     with Session(path) as session:
         session.record("opened_again")

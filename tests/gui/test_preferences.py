@@ -110,6 +110,7 @@ def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:
         b'{"export": {"formats": []}}',
         b'{"station": {"port": 1.5}}',
         b'{"later_version": 1}',
+        b'{"": 1}',
         b" " * (16 * 2**20 + 1),
     ],
 )

@@ -1,20 +1,26 @@
+import json
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from handcal.errors import FileError
 from handcal.hand.detect import (
     STRIDES,
+    Detections,
     DetectSettings,
     HandDetector,
+    brightened,
     decode,
     letterbox,
     overlaps,
     points,
 )
-from handcal.types import Float32, Float64
+from handcal.io.images import read_image
+from handcal.io.resources import resource_path
+from handcal.types import Float32, Float64, UInt8
 
 SHAPE = (64, 96)
 
@@ -139,3 +145,106 @@ def test_refuses_another_network(tmp_path: Path) -> None:
     path.write_bytes(model.SerializeToString())
     with pytest.raises(FileError, match=r"not \[\(.image"):
         HandDetector(path)
+
+
+def picture(brightest: int) -> UInt8:
+    """Return values from 0 to a maximum, evenly spread."""
+    values = np.linspace(0, brightest, 64 * 96).reshape(64, 96, 1).round()
+    return np.repeat(values, 3, axis=2).astype(np.uint8)
+
+
+def test_a_bright_image_is_not_changed() -> None:
+    color = picture(255)
+    assert brightened(color, DetectSettings()) is color
+
+
+def test_a_dim_image_is_multiplied_until_it_is_bright() -> None:
+    color = picture(100)
+    bright = brightened(color, DetectSettings())
+    assert np.percentile(bright, 99) == pytest.approx(240, abs=2)
+    middle = (color > 20) & (color < 80)
+    assert bright[middle] / color[middle] == pytest.approx(240 / 99, abs=0.05)
+
+
+def test_the_gain_has_a_limit_and_black_remains_black() -> None:
+    assert brightened(picture(8), DetectSettings(gain_max=4.0)).max() == 32
+    assert not brightened(np.zeros((64, 96, 3), np.uint8), DetectSettings()).any()
+
+
+def test_a_small_lamp_does_not_make_an_image_bright() -> None:
+    color = picture(100)
+    color[:6, :8] = 255  # under 1 %
+    assert brightened(color, DetectSettings())[40, 50, 0] > 2 * color[40, 50, 0]
+
+
+class Twice(HandDetector):
+    """A detector that sees given hands at its first look, and others at its second."""
+
+    def __init__(self, *looks: tuple[list[list[float]], list[float]]) -> None:
+        self._settings = DetectSettings()
+        self._looks = [Detections(np.array(boxes), np.array(scores)) for boxes, scores in looks]
+        self.shapes: list[tuple[int, ...]] = []
+
+    def _look(self, color: UInt8, pixels: int) -> Detections:
+        self.shapes.append(color.shape)
+        return self._looks[len(self.shapes) - 1]
+
+
+IMAGE: UInt8 = np.zeros((480, 640, 3), np.uint8)
+PALM = [300.0, 200.0, 400.0, 300.0]
+
+
+@pytest.mark.parametrize(
+    ("box", "score"), [(PALM, 0.8), (PALM, 0.1), ([300.0, 200.0, 330.0, 230.0], 0.5)]
+)
+def test_a_sure_hand_a_doubtful_one_and_a_small_one_need_no_second_look(
+    box: list[float], score: float
+) -> None:
+    eyes = Twice(([box], [score]))
+    eyes.detect(IMAGE)
+    assert eyes.shapes == [IMAGE.shape]
+
+
+def test_a_look_at_given_pixels_is_the_only_one() -> None:
+    eyes = Twice(([PALM], [0.5]))
+    assert eyes.detect(IMAGE, 25_600).scores == pytest.approx([0.5])
+    assert len(eyes.shapes) == 1
+
+
+def test_the_second_look_adds_the_whole_hand_to_its_palm() -> None:
+    margin = 50  # half of the palm's side
+    whole = [20.0, 10.0, 180.0, 190.0]
+    eyes = Twice(([PALM], [0.5]), ([whole], [0.6]))
+    found = eyes.detect(IMAGE)
+    assert eyes.shapes == [IMAGE.shape, (100 + 2 * margin, 100 + 2 * margin, 3)]
+    assert found.boxes_px == pytest.approx(np.array([[270, 160, 430, 340], PALM]))
+    assert found.scores == pytest.approx([0.6, 0.5])
+
+
+def test_boxes_of_both_looks_that_agree_are_averaged() -> None:
+    eyes = Twice(([PALM], [0.5]), ([[50.0, 50.0, 150.0, 160.0]], [0.25]))
+    found = eyes.detect(IMAGE)
+    assert found.boxes_px == pytest.approx(np.array([[300, 200, 400, 300 + 10 / 3]]))
+    assert found.scores == pytest.approx([0.5])
+
+
+def test_the_second_look_adds_no_other_hand_and_nothing_doubtful() -> None:
+    other, doubtful = [0.0, 0.0, 40.0, 40.0], [50.0, 50.0, 100.0, 150.0]
+    eyes = Twice(([PALM], [0.5]), ([other, doubtful], [0.9, 0.25]))
+    assert eyes.detect(IMAGE).boxes_px.tolist() == [PALM]
+
+
+@pytest.mark.parametrize("model", ["hand_detector.onnx", "hand_detector_int8.onnx"])
+@pytest.mark.parametrize("skin", ["dark", "medium", "fair"])
+def test_real_hands_are_found_in_dim_light(shared_data: Path, model: str, skin: str) -> None:
+    folder = shared_data / "hand_photos" / "k11"
+    entries = json.loads((folder / "annotations.json").read_text())
+    chosen = [name for name in sorted(entries) if entries[name]["skin"] == skin][::6]
+    hands = HandDetector(resource_path(model))
+    hits = 0
+    for name in chosen:
+        color = read_image(folder / name, cv2.IMREAD_COLOR_RGB)
+        boxes = hands.detect((0.3 * color).astype(np.uint8)).boxes_px
+        [hand] = entries[name]["hands"]
+        hits += overlaps(boxes, np.array([hand["box"]])).max(initial=0.0) >= 0.5
+    assert hits >= 0.85 * len(chosen)

@@ -1,4 +1,6 @@
 import json
+import os
+import sys
 from pathlib import Path
 
 import cv2
@@ -10,6 +12,7 @@ from handcal.io.files import (
     make_folder,
     read_json,
     read_limited,
+    remove_leftovers,
     write_atomic,
     write_json,
     write_ply,
@@ -44,6 +47,51 @@ def test_a_failed_write_keeps_the_old_content(
         write_atomic(path, b"new")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not sync folders")
+def test_file_then_folder_are_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced = []
+    real = os.fsync
+
+    def fsync(file: int) -> None:
+        synced.append(
+            (str(Path(f"/proc/self/fd/{file}").readlink()), (tmp_path / "a/b/c.bin").exists())
+        )
+        real(file)
+
+    monkeypatch.setattr("os.fsync", fsync)
+    folder = make_folder(tmp_path / "a" / "b")
+    assert [path for path, _ in synced] == [str(tmp_path), str(tmp_path / "a")]
+    synced.clear()
+    write_atomic(folder / "c.bin", b"c")
+    (temporary, was_there), (of_folder, is_there) = synced
+    assert temporary.startswith(f"{folder}/.c.bin.")
+    assert (was_there, of_folder, is_there) == (False, str(folder), True)
+
+
+def test_only_leftovers_are_removed(tmp_path: Path) -> None:
+    kept = {".hidden", "a.bin", ".a.bin.0123", ".a.bin.0123456789abcdex"}
+    for name in (*kept, ".a.bin.0123456789abcdef"):
+        (tmp_path / name).touch()
+    (tmp_path / ".b.0123456789abcdef").mkdir()
+    remove_leftovers(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == kept | {".b.0123456789abcdef"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="makes a pipe in a folder")
+def test_a_pipe_is_neither_waited_for_nor_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(FileError, match=r"cannot read .*pipe: it is a device or a pipe"):
+        read_limited(pipe, 10)
+    with pytest.raises(FileError, match="cannot read /dev/zero: it is a device or a pipe"):
+        read_limited(Path("/dev/zero"), 10)
+    for path in (pipe, Path("/dev/null")):
+        with pytest.raises(FileError, match=r"cannot write .*: it is a folder, a device or a pipe"):
+            write_atomic(path, b"data")
+    assert pipe.is_fifo()
+    assert Path("/dev/null").is_char_device()
 
 
 def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:

@@ -47,3 +47,18 @@ def test_a_killed_holder_leaves_it_free(tmp_path: Path) -> None:
 def test_a_missing_folder_says_so(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"cannot lock .*: No such file"):
         FileLock(tmp_path / "gone" / "lock")
+
+
+def test_a_lock_that_was_deleted_or_replaced_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    lock = FileLock(path)
+    lock.require_held()
+    path.unlink()
+    with pytest.raises(FileError, match="its lock was deleted"):
+        lock.require_held()
+    other = FileLock(path)
+    other.require_held()
+    with pytest.raises(FileError, match="its lock was deleted"):
+        lock.require_held()
+    for one in (lock, other):
+        one.release()

@@ -148,3 +148,8 @@ def test_the_stages_own_complaint_carries_its_place() -> None:
 def test_shipped_settings_are_plain_values(settings: Any) -> None:
     stored = json.loads(json.dumps(settings_json(settings)))
     assert read_settings(type(settings), stored) == settings
+
+
+def test_a_field_without_a_name_is_refused() -> None:
+    with pytest.raises(FileError, match="settings has no field without a name; it has count"):
+        read_settings(Outer, {"": 1})

@@ -48,10 +48,10 @@ def test_a_full_journal_refuses_and_stays_readable(
         read_journal(path)
 
 
-@pytest.mark.parametrize("version", [0, 3, "2", None])
+@pytest.mark.parametrize("version", [0, 4, "2", None])
 def test_an_unknown_version_is_refused(tmp_path: Path, version: object) -> None:
     path = tmp_path / "journal.jsonl"
     begin(path)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"version": version}) + "\n")
-    with pytest.raises(FileError, match="is not 2 or 1"):
+    with pytest.raises(FileError, match="not one of 1 to 3"):
         read_journal(path)

@@ -45,9 +45,10 @@ def test_what_cannot_be_gone_on_with_says_why(tmp_path: Path, alignment: Alignme
     (tmp_path / "empty" / "journal.jsonl").write_text("")
     with make(tmp_path, "running"):
         problems = {one.path.name: one.problem for one in unfinished_sessions(tmp_path)}
+        parts = {one.path.name: one.damaged for one in unfinished_sessions(tmp_path)}
     assert set(problems) == {"damaged", "foreign", "empty", "running"}
-    assert "1.npz is damaged" in problems["damaged"]
-    assert "not an event" in problems["foreign"]
+    assert (problems["damaged"], parts["damaged"]) == ("", 1)
+    assert "has version 9" in problems["foreign"]
     assert "does not begin" in problems["empty"]
     assert "in use by process" in problems["running"]
 

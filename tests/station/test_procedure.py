@@ -293,8 +293,13 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
     assert record.results == results_json(results)
     assert record.alignments[1].hand_m.tobytes() == alignment.hand_m.tobytes()
     assert [name for name, _ in events(session)] == [
-        "created", "cursor_made", "alignment_saved", "solved", "applied",
+        "created", "facts_saved", "cursor_made", "alignment_saved", "solved", "applied",
     ]  # fmt: skip
+    assert record.facts.camera is not None
+    assert record.facts.camera.depth_intrinsics == RIG.depth_intrinsics
+    age_s = record.alignment_facts[1].match_age_s
+    assert age_s is not None
+    assert 0.0 <= age_s <= CalibrationSettings().match_tolerance_s
 
 
 def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
@@ -971,6 +976,7 @@ def test_a_full_session_says_so_before_the_wearer_aligns(
     stage = Stage(server, client, None)
     stage.align()
     stage.calibration.redo()
+    stage.calibration.restore_alignment(1)  # a deleted one would not count
     stage.hold()
     with pytest.raises(ProcedureError, match="no room for more than 1 alignments in a session"):
         stage.calibration.make_cursor()

@@ -2,7 +2,7 @@
 
 A JSON object: file name to ``width``, ``height`` and ``hands``, each hand with ``box`` [x0, y0, x1,
 y1], ``quad`` (its four corners) and ``large``. The data set counts pixels from 1: (1, 1) is the
-middle of the first.
+middle of the first. ``skin`` and ``aspect`` of a photograph, if given, are names of its group.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from handcal.io.images import read_image
 from handcal.types import Bool, Float64, UInt8
 
 _CORNER = 0.5  # the image's upper left corner in these coordinates
+_NAME_MAX = 40  # letters of a group's name
 _REACH = 10.0  # largest distance of a box from the image, in image sides
 
 
@@ -36,6 +37,9 @@ class Photo:
     """(M, 4, 2); the same hands' corners, px."""
     large: Bool
     """(M,); the data set's own rule."""
+    skin: str = ""
+    aspect: str = ""
+    """Names of the skin's tone and of the side of the hand, empty if unknown."""
 
     @property
     def relative_sizes(self) -> Float64:
@@ -98,4 +102,7 @@ def _photo(images: Path, name: str, entry: dict[str, Any]) -> Photo:
     large = [hand["large"] for hand in hands]
     if not all(isinstance(one, bool) for one in large):
         raise TypeError(f'{name}: "large" must be true or false')
-    return Photo(images / name, width, height, boxes, quads, np.array(large, bool))
+    skin, aspect = entry.get("skin", ""), entry.get("aspect", "")
+    if not all(isinstance(one, str) and len(one) <= _NAME_MAX for one in (skin, aspect)):
+        raise TypeError(f'{name}: "skin" and "aspect" must be short texts')
+    return Photo(images / name, width, height, boxes, quads, np.array(large, bool), skin, aspect)

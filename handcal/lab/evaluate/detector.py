@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,13 @@ import numpy as np
 from handcal.hand.detect import CANDIDATE_SCORE_MIN, DetectSettings, overlaps
 from handcal.hand.roi import Detector
 from handcal.lab.evaluate.annotations import Photo
+from handcal.lab.evaluate.conditions import UNCHANGED, Conditions, shown
 from handcal.lab.evaluate.precision import (
     MATCH_OVERLAP,
     ImageResult,
     PrecisionRecall,
     precision_recall,
+    wilson,
 )
 from handcal.progress import Progress
 
@@ -25,20 +28,38 @@ EVALUATED = DetectSettings(score_min=CANDIDATE_SCORE_MIN)
 _CURVE_POINTS = 200
 
 
+@dataclass(frozen=True, slots=True)
+class FoundShare:
+    """Share of hands found at the product's threshold, with its Wilson interval at 95 %."""
+
+    skin: str
+    aspect: str
+    """Empty for all."""
+    hands: int
+    found: int
+    share: float
+    low: float
+    high: float
+
+
 def detect_all(
-    photos: Sequence[Photo], detector: Detector, progress: Progress = Progress()
+    photos: Sequence[Photo],
+    detector: Detector,
+    progress: Progress = Progress(),
+    conditions: Conditions = UNCHANGED,
 ) -> list[ImageResult]:
-    """Run a detector on every photograph.
+    """Run a detector on every photograph; the boxes are in the photograph's own pixels.
 
     Raises
     ------
-    FileError
-        If a photograph cannot be read.
+    HandcalError
+        If a photograph cannot be read or shown under the conditions.
     """
     results = []
     for number, photo in enumerate(photos, 1):
-        found = detector.detect(photo.read())
-        results.append(ImageResult(found.boxes_px, found.scores, photo.boxes))
+        view = shown(photo, conditions)
+        found = detector.detect(view.image)
+        results.append(ImageResult(view.in_photo(found.boxes_px), found.scores, photo.boxes))
         progress.at(number / len(photos), "Looking for hands")
     return results
 
@@ -52,6 +73,26 @@ def summary(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str
     COCO's area ranges.
     """
     return _averages(_curves(photos, results))
+
+
+def found_shares(photos: Sequence[Photo], results: Sequence[ImageResult]) -> list[FoundShare]:
+    """Return the share of hands found over all photographs, then by skin and aspect if given.
+
+    A hand is found if a box whose score is at least the product's threshold overlaps it by half.
+    """
+    groups: dict[tuple[str, str], list[bool]] = {("", ""): []}
+    for photo, result in zip(photos, results, strict=True):
+        sure = result.boxes[result.scores >= DetectSettings().score_min]
+        best = overlaps(sure, photo.boxes).max(axis=0, initial=0.0)
+        for group in {("", ""), (photo.skin, photo.aspect)}:
+            groups.setdefault(group, []).extend((best >= MATCH_OVERLAP).tolist())
+    return [
+        FoundShare(
+            *group, len(hits), sum(hits), sum(hits) / len(hits), *wilson(sum(hits), len(hits))
+        )
+        for group, hits in sorted(groups.items())
+        if hits
+    ]
 
 
 def _curves(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, PrecisionRecall]:
@@ -86,12 +127,13 @@ def _of_size(
 
 
 def evaluation(photos: Sequence[Photo], results: Sequence[ImageResult]) -> dict[str, Any]:
-    """Return `summary` with counts and the precision/recall curve over all hands, JSON-able."""
+    """Return `summary`, counts, `found_shares` and the curve over all hands, JSON-able."""
     curves = _curves(photos, results)
     return {
         **_averages(curves),
         "images": len(photos),
         "hands": sum(len(photo.boxes) for photo in photos),
+        "found": [asdict(share) for share in found_shares(photos, results)],
         "curve": _thinned(curves["ap50"]),
     }
 

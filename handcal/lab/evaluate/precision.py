@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -79,3 +80,12 @@ def _matches(result: ImageResult, counted: Bool) -> Float64:
         elif (overlap[box][~counted] >= MATCH_OVERLAP).any():
             hit[box] = np.nan
     return hit
+
+
+def wilson(hits: int, trials: int, z: float = 1.96) -> tuple[float, float]:
+    """Return the ends of Wilson's score interval of a share (1927); at least one trial."""
+    share = hits / trials
+    widened = 1.0 + z**2 / trials
+    middle = (share + z**2 / (2 * trials)) / widened
+    half = z * math.sqrt(share * (1.0 - share) / trials + z**2 / (4 * trials**2)) / widened
+    return max(0.0, middle - half), min(1.0, middle + half)

@@ -100,6 +100,8 @@ def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> 
             left_out[str(path)] = why
         else:
             kept[path] = record
+            if record.left_out:
+                left_out[str(path)] = record.left_out
     if not kept:
         reasons = "; ".join(f"{path}: {why}" for path, why in list(left_out.items())[:3])
         raise FileError(

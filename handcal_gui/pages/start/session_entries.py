@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handcal.errors import FileError
-from handcal.session.journal import read_journal
-from handcal.session.state import SessionState
+from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
 from handcal_gui.widgets.numbers import counted
 from handcal_gui.widgets.times import local_time
@@ -53,17 +52,17 @@ def _unfinished(session: UnfinishedSession) -> Entry:
         text = f"{session.path.name}: {session.problem}"
         return Entry(session.path, text, is_enabled=False)
     text = _text(session.wearer, session.started, session.alignments, session.trials)
+    if session.damaged:
+        text += f" · damaged: {counted(session.damaged, 'part')} left out"
     return Entry(session.path, text)
 
 
 def _recent(path: Path) -> Entry | None:
-    state = SessionState()
     try:
-        events = read_journal(path / "journal.jsonl").events
-        for event in events:
-            state.apply(event)
-    except (FileError, ValueError) as error:
+        replayed = replay(path)
+    except FileError as error:
         return Entry(path, f"{path.name}: {error}", is_enabled=False)
+    state, events = replayed.state, replayed.journal.events
     alignments, trials = state.alignments, state.trials
     if not (alignments.active or alignments.deleted or trials.active or trials.deleted):
         return None

@@ -107,15 +107,6 @@ def spoil_time(path: Path) -> None:
         overwrite("journal.jsonl", b""),
         overwrite("journal.jsonl", b"\xff\xfe garbage\n"),
         overwrite("journal.jsonl", b"[1]\n"),
-        remove("alignments/1.npz"),
-        overwrite("alignments/1.npz", b"PK\x03\x04 garbage"),
-        remove("rig.yaml"),
-        overwrite("rig.yaml", b"%YAML:1.0\n"),
-        overwrite("settings.json", b"{"),
-        overwrite("settings.json", b'{"calibration": {"solve": {"method": "magic"}}}'),
-        overwrite("settings.json", b'{"calibration": 7}'),
-        overwrite("results.json", b"\x00"),
-        spoil_time,
     ],
 )
 def test_a_damaged_session_is_refused_in_words_and_the_program_goes_on(
@@ -133,6 +124,29 @@ def test_a_damaged_session_is_refused_in_words_and_the_program_goes_on(
     assert program.window.page == "start"
     program.open_session(tmp_path / "nowhere")
     qtbot.waitUntil(lambda: "nowhere" in program.window.banner.text, timeout=PATIENCE_MS)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        remove("alignments/1.npz"),
+        overwrite("alignments/1.npz", b"PK\x03\x04 garbage"),
+        remove("rig.yaml"),
+        overwrite("rig.yaml", b"%YAML:1.0\n"),
+        overwrite("settings.json", b"{"),
+        overwrite("settings.json", b'{"calibration": {"solve": {"method": "magic"}}}'),
+        overwrite("settings.json", b'{"calibration": 7}'),
+        overwrite("results.json", b"\x00"),
+        spoil_time,
+    ],
+)
+def test_what_is_left_of_a_damaged_session_is_opened(
+    program: Program, qtbot: QtBot, record: SessionRecord, damage: Callable[[Path], object]
+) -> None:
+    damage(record.path)
+    program.open_session(record.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    assert "The session is damaged: " in child(program, QLabel, "reviewDamaged").text()
 
 
 def test_a_session_whose_last_line_was_cut_off_is_opened_without_it(

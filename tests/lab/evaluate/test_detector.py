@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -7,8 +8,9 @@ import pytest
 from handcal.errors import FileError
 from handcal.hand.detect import Detections
 from handcal.lab.evaluate.annotations import Photo
+from handcal.lab.evaluate.conditions import Conditions
 from handcal.lab.evaluate.contact_sheet import contact_sheet, write_contact_sheet
-from handcal.lab.evaluate.detector import detect_all, evaluation, summary
+from handcal.lab.evaluate.detector import detect_all, evaluation, found_shares, summary
 from handcal.lab.evaluate.precision import ImageResult
 from handcal.progress import Progress
 from handcal.types import Float64, UInt8
@@ -114,3 +116,38 @@ def test_the_sheet_is_written_as_a_picture(photo: Photo, tmp_path: Path) -> None
         assert cv2.imread(str(path)) is not None
     with pytest.raises(FileError, match="png"):
         write_contact_sheet(tmp_path / "sheet.what", [photo], [found([SMALL], photo)])
+
+
+def test_shares_are_counted_by_skin_and_aspect_at_the_products_threshold(photo: Photo) -> None:
+    dark = replace(photo, skin="dark", aspect="palmar", boxes=np.array([LARGE]))
+    fair = replace(photo, skin="fair", aspect="dorsal", boxes=np.array([LARGE]))
+    doubtful = found([LARGE], dark)
+    doubtful.scores[0] = 0.29
+    everything, by_dark, by_fair = found_shares([dark, fair], [doubtful, found([LARGE], fair)])
+    assert (everything.skin, everything.hands, everything.found) == ("", 2, 1)
+    assert (by_dark.skin, by_dark.aspect, by_dark.share) == ("dark", "palmar", 0.0)
+    assert (by_fair.skin, by_fair.aspect, by_fair.share) == ("fair", "dorsal", 1.0)
+
+
+def test_photographs_without_groups_are_counted_once(photo: Photo) -> None:
+    [everything] = found_shares([photo], [found([LARGE], photo)])
+    assert (everything.hands, everything.found) == (2, 1)
+
+
+def test_boxes_found_in_a_scaled_photograph_are_in_its_own_pixels(photo: Photo) -> None:
+    class Bright:
+        """Sees the box of what is bright."""
+
+        def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
+            assert color.shape == (480, 640, 3)
+            rows, columns = np.nonzero(color[..., 0] > 128)
+            box = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+            assert box[3] - box[1] == pytest.approx(160, abs=1)
+            return Detections(np.array([box], np.float64), np.array([0.8]))
+
+    image = np.zeros((80, 100, 3), np.uint8)
+    image[20:60, 30:70] = 255
+    cv2.imwrite(str(photo.path), image)
+    one = replace(photo, boxes=np.array([LARGE]))
+    [result] = detect_all([one], Bright(), conditions=Conditions(hand_height=1 / 3))
+    assert result.boxes == pytest.approx(np.array([LARGE]), abs=0.5)

@@ -3,7 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from handcal.lab.evaluate.precision import ImageResult, PrecisionRecall, precision_recall
+from handcal.lab.evaluate.precision import ImageResult, PrecisionRecall, precision_recall, wilson
 
 HAND = [0.0, 0.0, 10.0, 10.0]
 OTHER = [50.0, 50.0, 70.0, 70.0]
@@ -72,3 +72,10 @@ def test_without_hands_there_is_no_precision() -> None:
 
 def test_without_detections_it_is_zero() -> None:
     assert curve(image([], [HAND])).average_precision == 0.0
+
+
+def test_wilsons_interval_is_that_of_the_textbook() -> None:
+    # Newcombe 1998, table I: 81 of 263 and 0 of 20.
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=2e-4)
+    assert wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=2e-4)
+    assert wilson(20, 20) == pytest.approx((0.8389, 1.0), abs=2e-4)

@@ -38,8 +38,12 @@ def test_a_damaged_session_is_told_with_the_reason(tmp_path: Path, alignment: Al
     path = make(tmp_path, "Ada", [alignment, alignment], is_done=False)
     (path / "rig.yaml").write_text("nonsense")
     (entry,) = find_offers(tmp_path, ()).unfinished
+    assert entry.is_enabled  # the rest can be resumed
+    assert entry.text.endswith(" · 2 alignments · damaged: 1 part left out")
+    (path / "journal.jsonl").write_text("nonsense\n")
+    (entry,) = find_offers(tmp_path, ()).unfinished
     assert not entry.is_enabled
-    assert "rig.yaml is damaged" in entry.text
+    assert "does not begin as the journal" in entry.text
 
 
 def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(

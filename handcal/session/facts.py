@@ -1,0 +1,133 @@
+"""Facts about a session besides alignments and trials: devices, plan, verification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from handcal.errors import FileError
+from handcal.io.settings import read_settings
+from handcal.types import CameraIdentity, Eye, EyePlan, HeadsetIdentity, Intrinsics
+
+Facts = TypeVar("Facts")
+
+
+@dataclass(frozen=True, slots=True)
+class CameraUsed:
+    """The depth camera of a session; ValueError if its intrinsics are not of an image."""
+
+    identity: CameraIdentity
+    depth_intrinsics: Intrinsics
+    depth_scale_m: float
+    """Metres per unit of the depth image."""
+
+    def __post_init__(self) -> None:
+        one = self.depth_intrinsics
+        sizes = one.width, one.height, one.fx, one.fy, self.depth_scale_m
+        if not all(0 < size < np.inf for size in sizes):
+            raise ValueError("the camera's size, focal lengths and depth scale must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class EyeDistance:
+    """The wearer's eye distance; ValueError unless it and σ are positive."""
+
+    distance_m: float
+    sigma_m: float
+    """One standard deviation."""
+    source: str
+    """Origin of the value, such as ``ruler`` or ``headset``."""
+
+    def __post_init__(self) -> None:
+        if self.distance_m <= 0.0 or self.sigma_m <= 0.0:
+            raise ValueError("the eye distance and its σ must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """One eye's check by the wearer, who moves the drawing until it covers the hand."""
+
+    before_m: tuple[float, float, float]
+    """φ with which the hand's outline was first drawn."""
+    nudge_arcmin: tuple[float, float]
+    """Movement of the drawing by the wearer, to the right and down."""
+    after_m: tuple[float, float, float]
+    """φ after the nudge was taken into account."""
+
+
+@dataclass(frozen=True, slots=True)
+class AlignmentFacts:
+    """Circumstances of one alignment; None where unknown. ValueError if a value is negative."""
+
+    match_age_s: float | None = None
+    """Time between the confirmation and the depth frame taken for it."""
+    cursor_moved_m: float | None = None
+    hand_moved_m: float | None = None
+    """Movement of the hand while the cursor was frozen, and while the wearer confirmed."""
+    shape_change_m: float | None = None
+    """Root mean square change of the hand's shape from the cursor to the confirmation."""
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if value is not None and value < 0.0:
+                raise ValueError(f"{one.name} must not be negative")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionFacts:
+    """Facts about a session; None or empty where unknown, as in sessions of older versions."""
+
+    camera: CameraUsed | None = None
+    headset: HeadsetIdentity | None = None
+    plan: EyePlan | None = None
+    """The order in which the eyes were aligned."""
+    eye_distance: EyeDistance | None = None
+    verified: Mapping[Eye, Verification] = field(default_factory=dict)
+    """Newest verification of each eye."""
+    evidence: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
+    """Names of what supports and what contradicts the results."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "verified", MappingProxyType(dict(self.verified)))
+
+
+def facts_json(facts: Any) -> Any:
+    """Return a dataclass, or a mapping of facts by name, as JSON-able values."""
+    if is_dataclass(facts):
+        return {one.name: facts_json(getattr(facts, one.name)) for one in fields(facts)}
+    if isinstance(facts, Mapping):
+        return {name: facts_json(fact) for name, fact in facts.items()}
+    if isinstance(facts, np.ndarray):
+        return facts.tolist()
+    if isinstance(facts, tuple | list):
+        return [facts_json(fact) for fact in facts]
+    return facts
+
+
+def with_facts(before: SessionFacts, data: Mapping[str, Any]) -> SessionFacts:
+    """Return facts with those in `data`, as `facts_json` gives them, in place of earlier ones.
+
+    Raises
+    ------
+    ValueError
+        If anything in `data` is missing, unknown or invalid.
+    """
+    facts = read_facts(SessionFacts, data)
+    changes = {name: getattr(facts, name) for name in data}
+    if "verified" in changes:
+        changes["verified"] = {**before.verified, **changes["verified"]}
+    return replace(before, **changes)
+
+
+def read_facts(kind: type[Facts], data: object) -> Facts:
+    """Return a dataclass from what `facts_json` gives; ValueError if it is invalid."""
+    try:
+        return read_settings(kind, data, "facts")
+    except (FileError, TypeError) as error:  # TypeError: a field is missing
+        raise ValueError(str(error)) from error

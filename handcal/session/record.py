@@ -1,0 +1,325 @@
+"""Reading of a session: whatever is damaged costs only itself, and is named."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from handcal.errors import FileError
+from handcal.io.files import read_json, read_limited
+from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
+from handcal.session.alignment_file import decode_alignment
+from handcal.session.facts import AlignmentFacts, SessionFacts
+from handcal.session.journal import (
+    JOURNAL,
+    JOURNAL_VERSION,
+    Damage,
+    Event,
+    JournalContent,
+    read_journal,
+)
+from handcal.session.state import SessionEvent, SessionState
+from handcal.session.trial import Trial, make_trial
+from handcal.types import Alignment, Eye, Float64, Rig
+
+MAX_ALIGNMENT_BYTES = 16 * 2**20
+MAX_NOTES_CHARACTERS = 20_000
+_SAME_PX = 1e-6
+"""Rounding of a trial's error by another version of NumPy."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionRecord:
+    """The contents of a session folder."""
+
+    path: Path
+    rig: Rig
+    settings: dict[str, Any]
+    wearer: str
+    """Name or code; empty if none was given."""
+    notes: str
+    events: tuple[Event, ...]
+    alignments: Mapping[int, Alignment]
+    """The alignments that are not deleted, by number, in the order in which they were saved."""
+    deleted_alignments: Mapping[int, Alignment]
+    trials: Mapping[int, Trial]
+    deleted_trials: Mapping[int, Trial]
+    """Trials of the user test, likewise."""
+    results: dict[str, Any] | None
+    """The newest results; None if none were saved since an alignment was deleted or restored."""
+    is_solved: bool
+    """True if the results are those of all `alignments`."""
+    is_applied: bool
+    """True if the headset has acknowledged the projections of these results."""
+    applied_shift_m: Mapping[Eye, Float64]
+    """each (3,); the φ that the headset rendered with last, solved or set by hand; a missing eye
+    was rendered with the offline calibration."""
+    fine_tuned: Mapping[Eye, Float64] | None
+    """each (3,); the φ last set by hand; None if none was set since the last results."""
+    is_finished: bool
+    """True if the session was finished, and nothing was recorded since."""
+    journal_bytes: int
+    """Length of the journal's complete lines."""
+    torn_bytes: int
+    """Length of an incomplete last line, which is ignored; 0 if there is none."""
+    facts: SessionFacts = field(default_factory=SessionFacts)
+    alignment_facts: Mapping[int, AlignmentFacts] = field(default_factory=dict)
+    """Of each alignment, deleted ones too."""
+    damaged: tuple[Damage, ...] = ()
+    """Parts that are damaged; what they held is missing here, or was read from a copy."""
+
+    @property
+    def left_out(self) -> str:
+        """The damage in one line; empty if the session is sound."""
+        if not self.damaged:
+            return ""
+        more = f" (and {len(self.damaged) - 1} more)" if len(self.damaged) > 1 else ""
+        return f"the session is damaged: {self.damaged[0]}{more}"
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.alignments)} alignments, {len(self.trials)} trials"
+        damaged = f", {len(self.damaged)} parts damaged" if self.damaged else ""
+        return f"<SessionRecord {self.path}: {counts}{damaged}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """A session's journal, and the state that its events lead to."""
+
+    journal: JournalContent
+    state: SessionState
+    damaged: tuple[Damage, ...]
+    """Those of the journal, and the events that cannot follow those before."""
+
+
+def replay(path: Path) -> Replayed:
+    """Read the journal of the session in a folder.
+
+    Raises
+    ------
+    FileError
+        If the folder is not a session, or its journal is unreadable as a whole.
+    """
+    if not (path / JOURNAL).is_file():
+        raise FileError(f"{path} is not a session; choose the folder that contains {JOURNAL}")
+    journal = read_journal(path / JOURNAL)
+    damaged = list(journal.damaged)
+    first = journal.events[0]
+    if first.number == 1 and first.name != SessionEvent.CREATED:
+        raise FileError(f"{path / JOURNAL} does not begin as the journal of a session")
+    state = SessionState()
+    state.alignments.has_gaps = state.trials.has_gaps = bool(damaged)
+    for event in journal.events:
+        try:
+            state.apply(event)
+        except ValueError as error:
+            what = f"event {event.number} cannot follow those before it: {error}; left out"
+            damaged.append(Damage(JOURNAL, event.number, what))
+            state.alignments.has_gaps = state.trials.has_gaps = True
+    if damaged:  # a number may be that of an alignment whose event is lost
+        stored = (one.stem for one in path.glob("alignments/*.npz"))
+        taken = (int(name) for name in stored if name.isdecimal() and len(name) < 4)
+        state.alignments.taken = max(taken, default=0)
+    return Replayed(journal, state, tuple(damaged))
+
+
+def read_session(
+    path: Path, before: SessionRecord | None = None, rig: Rig | None = None
+) -> SessionRecord:
+    """Read a session; the parameters and errors are those of `Session.open`."""
+    replayed = replay(path)
+    journal, state = replayed.journal, replayed.state
+    damaged = list(replayed.damaged)
+    rig = _read_rig(path, state, damaged) if rig is None else rig
+    known = {**before.alignments, **before.deleted_alignments} if before else {}
+    alignments, deleted_alignments = (
+        _read_alignments(path, checksums, known, damaged)
+        for checksums in (state.alignments.active, state.alignments.deleted)
+    )
+    trials, deleted_trials = (
+        _sound_trials(trials, rig, before, journal.events, damaged)
+        for trials in (state.trials.active, state.trials.deleted)
+    )
+    is_old = journal.version < JOURNAL_VERSION
+    results = _read_results(path / "results.json", state, is_old, damaged)
+    return SessionRecord(
+        path=path,
+        rig=rig,
+        settings=_read_settings(path / "settings.json", state, damaged),
+        wearer=state.wearer,
+        notes=_read_notes(path / "notes.txt", _notes_checksums(replayed), damaged),
+        events=journal.events,
+        alignments=alignments,
+        deleted_alignments=deleted_alignments,
+        trials=trials,
+        deleted_trials=deleted_trials,
+        results=results,
+        is_solved=state.is_solved and results is not None,
+        is_applied=state.is_applied and results is not None,
+        applied_shift_m=MappingProxyType(state.applied_shift_m),
+        fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
+        is_finished=state.is_finished,
+        journal_bytes=journal.complete_bytes,
+        torn_bytes=journal.torn_bytes,
+        facts=state.facts,
+        alignment_facts=MappingProxyType(state.alignment_facts),
+        damaged=tuple(damaged),
+    )
+
+
+def alignment_path(path: Path, number: int) -> Path:
+    """Return the file of an alignment of the session in `path`."""
+    return path / "alignments" / f"{number}.npz"
+
+
+def sha256(data: bytes) -> str:
+    """Return the checksum by which the journal knows a file."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
+    """Return the rig: from its file, or from the journal's copy if there is one.
+
+    Raises
+    ------
+    FileError
+        If the file is damaged and there is no copy.
+    """
+    file = path / "rig.yaml"
+    try:
+        data = read_limited(file, MAX_RIG_BYTES)
+        rig = parse_rig(data)
+        if state.rig_sha256 not in (sha256(data), ""):
+            raise ValueError("its checksum is not the journal's")
+    except (FileError, ValueError) as error:
+        if not state.rig:
+            raise FileError(
+                f"{file} is damaged: {error}; repair the session with another copy of the rig file"
+            ) from error
+        damaged.append(Damage("rig.yaml", None, f"{error}; the journal's copy was read"))
+        try:
+            return parse_rig(state.rig.encode())
+        except ValueError as worse:
+            raise FileError(f"{file} and its copy in the journal are damaged: {worse}") from worse
+    if not state.rig_sha256:
+        damaged.append(Damage("rig.yaml", None, "its checksum, in the journal, is lost"))
+    return rig
+
+
+def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> dict[str, Any]:
+    """Return the settings of the journal, or for older versions of the file."""
+    try:
+        settings = read_json(file)
+        if state.settings is not None and settings != state.settings:
+            raise FileError(f"{file} is not what the journal holds")
+    except FileError as error:
+        used = "nothing was read" if state.settings is None else "the journal's copy was read"
+        damaged.append(Damage(file.name, None, f"{error}; {used}"))
+        return state.settings or {}
+    return settings if state.settings is None else state.settings
+
+
+def _read_results(
+    file: Path, state: SessionState, is_old: bool, damaged: list[Damage]
+) -> dict[str, Any] | None:
+    """Return the results of the journal, or for older versions of the file."""
+    try:
+        results = read_json(file) if file.exists() else None
+        # A killed program may leave the file of earlier results.
+        if not is_old and results not in (None, state.results, *state.older_results):
+            raise FileError(f"{file} is not what the journal holds")
+    except FileError as error:
+        used = "nothing was read" if is_old else "the journal's copy was read"
+        damaged.append(Damage(file.name, None, f"{error}; {used}"))
+        return state.results
+    return results if is_old else state.results
+
+
+def _notes_checksums(replayed: Replayed) -> tuple[str | None, ...]:
+    """Return the checksums that the notes may have; empty if unknown."""
+    journal = replayed.journal
+    saved = [event.number for event in journal.events if event.name == SessionEvent.NOTES_SAVED]
+    if journal.notes_sha256 is not None and max(saved, default=0) <= journal.ended:
+        return (journal.notes_sha256,)
+    return replayed.state.notes_sha256
+
+
+def _read_notes(file: Path, checksums: tuple[str | None, ...], damaged: list[Damage]) -> str:
+    data = b""
+    try:
+        if file.exists():
+            data = read_limited(file, 4 * MAX_NOTES_CHARACTERS)
+        found = sha256(data) if file.exists() else ""
+        if checksums and found not in checksums:
+            raise FileError("its checksum is not the journal's")
+    except FileError as error:
+        damaged.append(Damage(file.name, None, f"{error}; it was read as it is"))
+    return data.decode(errors="replace")
+
+
+def _read_alignments(
+    path: Path,
+    checksums: Mapping[int, str],
+    known: Mapping[int, Alignment],
+    damaged: list[Damage],
+) -> Mapping[int, Alignment]:
+    """Return those of the alignments that are sound."""
+    alignments = {}
+    for number, checksum in checksums.items():
+        file = alignment_path(path, number)
+        try:
+            alignments[number] = known.get(number) or _read_alignment(file, checksum)
+        except (FileError, ValueError) as error:
+            name = file.relative_to(path).as_posix()
+            damaged.append(Damage(name, None, f"{error}; alignment {number} was left out"))
+    return MappingProxyType(alignments)
+
+
+def _read_alignment(file: Path, checksum: str) -> Alignment:
+    data = read_limited(file, MAX_ALIGNMENT_BYTES)
+    if sha256(data) != checksum:
+        raise ValueError("its checksum is not the journal's")
+    return decode_alignment(data)
+
+
+def _sound_trials(
+    trials: Mapping[int, Trial],
+    rig: Rig,
+    before: SessionRecord | None,
+    events: Sequence[Event],
+    damaged: list[Damage],
+) -> Mapping[int, Trial]:
+    """Return those of the trials whose errors are those of their φ."""
+    known = {*before.trials, *before.deleted_trials} if before else set()
+    sound = {}
+    for number, trial in trials.items():
+        if number in known or _is_sound(trial, rig):
+            sound[number] = trial
+            continue
+        line = next(one.number for one in events if one.time == trial.time)
+        what = f"the error is not that of its φ; trial {number} was left out"
+        damaged.append(Damage(JOURNAL, line, what))
+    return MappingProxyType(sound)
+
+
+def _is_sound(trial: Trial, rig: Rig) -> bool:
+    try:
+        again = make_trial(
+            rig.eyes[trial.eye],
+            trial.eye,
+            trial.target_depth_m,
+            trial.calibrated_shift_m,
+            trial.adjusted_shift_m,
+        )
+    except ValueError:
+        return False
+    return all(
+        np.allclose(getattr(trial, name), getattr(again, name), rtol=1e-9, atol=_SAME_PX)
+        for name in ("corners_E_m", "drawn_px", "truth_px", "error_px", "error_arcmin")
+    )
