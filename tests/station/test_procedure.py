@@ -296,7 +296,7 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
         "created", "facts_saved", "cursor_made", "alignment_saved", "solved", "applied",
     ]  # fmt: skip
     assert record.facts.camera is not None
-    assert record.facts.camera.depth_intrinsics == RIG.depth_intrinsics
+    assert record.facts.camera.depth_intrinsics == CAMERA
     age_s = record.alignment_facts[1].match_age_s
     assert age_s is not None
     assert 0.0 <= age_s <= CalibrationSettings().match_tolerance_s
