@@ -57,10 +57,10 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     jump = round(settings.edge_jump_m / view.scale_m)
     pitch_m = float(located.palm_m[2]) / view.camera.fx
     solid = solid_surface(view.depth, jump)
-    within = solid & may_be_hand & between(view, settings.depth_min_m, settings.depth_max_m)
+    within = solid & may_be_hand & between(view, located.depth_min_m, settings.depth_max_m)
     near_wrist = pixels_of(within & may_be_arm)
-    from_palm_m = np.linalg.norm(deproject(view, *near_wrist).T - located.palm_m, axis=1)
-    within[near_wrist] = from_palm_m <= located.limit_m
+    along_m = (deproject(view, *near_wrist).T - located.palm_m) @ located.axis
+    within[near_wrist] = along_m <= located.limit_m
     if not within.any():
         raise HandError("the depth image is too sparse where the hand is; check the camera")
     outline, filled = _outline(within, settings.hole_area_m2 / pitch_m**2)

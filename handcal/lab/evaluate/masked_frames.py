@@ -68,9 +68,7 @@ def read_masked_names(folder: Path) -> dict[str, dict[str, Any]]:
     return dict(sorted(described.items(), key=lambda item: (item[0].zfill(64), item[0])))
 
 
-def read_masked_frames(
-    folder: Path, described: dict[str, dict[str, Any]]
-) -> Iterator[MaskedFrame]:
+def read_masked_frames(folder: Path, described: dict[str, dict[str, Any]]) -> Iterator[MaskedFrame]:
     """Read the frames of a folder, one after the other.
 
     For each name of `described`: ``NAME_depth.png`` (16 bits), ``NAME_handmask.png`` (not 0 on the
