@@ -37,7 +37,7 @@ _AXIS_STEPS = 4
 _LEAST_COS = 0.5  # of the angle between the axis and the image plane
 # Where the wrist is expected along the axis, from the palm's centre: palm length 95–120 mm in the
 # same survey, of which the inscribed circle's centre is a little more than half from the wrist.
-_WRIST_M, _WRIST_SIGMA_M = 0.06, 0.02
+_WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
 # The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
 # another is e times less likely the wrist.
 _BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006

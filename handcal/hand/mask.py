@@ -24,6 +24,8 @@ from handcal.types import Bool, Frame, UInt8
 
 # Share of the hand's outline that may touch the image border.
 _BORDER_CONTACT_M = 0.01
+# Share of a part's contour on the coarse hand.
+_PART_MIN = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +55,7 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     HandError
         If the image does not show the whole hand.
     """
-    view, may_be_hand, may_be_arm = _full_resolution(located, frame)
+    view, is_hand, may_be_hand, may_be_arm = _full_resolution(located, frame)
     jump = round(settings.edge_jump_m / view.scale_m)
     pitch_m = float(located.palm_m[2]) / view.camera.fx
     solid = solid_surface(view.depth, jump)
@@ -61,9 +63,10 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     near_wrist = pixels_of(within & may_be_arm)
     along_m = (deproject(view, *near_wrist).T - located.palm_m) @ located.axis
     within[near_wrist] = along_m <= located.limit_m
-    if not within.any():
+    outlined = _outline(within, is_hand, settings.hole_area_m2 / pitch_m**2)
+    if outlined is None:
         raise HandError("the depth image is too sparse where the hand is; check the camera")
-    outline, filled = _outline(within, settings.hole_area_m2 / pitch_m**2)
+    outline, filled = outlined
     surface = within & (filled > 0)
     if _border_contact_px(surface, view) * pitch_m > _BORDER_CONTACT_M:
         raise HandError("hand cut by the image border; move it toward the middle")
@@ -71,40 +74,58 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     return HandMask(view, surface, filled, outline, cut, pitch_m)
 
 
-def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool]:
-    """Return the image around the hand, with the candidate pixels of hand and arm."""
+def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool, Bool]:
+    """Return the image around the hand, the coarse hand in it, and candidates of hand and arm."""
     coarse, place = crop_view(located.view, located.hand, margin=3)
     view = view_depth(frame, coarse.box)
-    hand, arm = (
-        _enlarged(part[place], coarse.step_px, view) for part in (located.hand, located.arm)
+    hand, arm = located.hand[place].astype(np.uint8), located.arm[place].astype(np.uint8)
+    is_hand, may_be_hand, may_be_arm = (
+        _enlarged(part, coarse.step_px, view) for part in (hand, _wider(hand), _wider(arm))
     )
-    return view, hand, arm
+    return view, is_hand, may_be_hand, may_be_arm
 
 
-def _enlarged(mask: Bool, step_px: int, view: DepthView) -> Bool:
-    """Dilate a coarse mask by two pixels and resample it to the size of a view."""
-    wider = cv2.dilate(mask.astype(np.uint8), NEIGHBOURS, iterations=2)
+def _wider(mask: UInt8) -> UInt8:
+    """Dilate a coarse mask by two pixels."""
+    return np.asarray(cv2.dilate(mask, NEIGHBOURS, iterations=2), np.uint8)
+
+
+def _enlarged(mask: UInt8, step_px: int, view: DepthView) -> Bool:
+    """Resample a coarse mask to the size of a view."""
     height, width = view.depth.shape
     size = step_px * mask.shape[1], step_px * mask.shape[0]
-    return cv2.resize(wider, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
+    return cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
 
 
-def _outline(within: Bool, hole_area_px: float) -> tuple[Pixels, UInt8]:
-    """Return the outer contour of the largest part, and that part with small holes closed.
+def _outline(within: Bool, is_hand: Bool, hole_area_px: float) -> tuple[Pixels, UInt8] | None:
+    """Return the outer contour of the largest part, and all parts with small holes closed.
 
-    Border following as in Suzuki & Abe, "Topological structural analysis of digitized binary
-    images by border following", 1985.
+    Parts with most of their contour outside `is_hand` are of something beside the hand. None if no
+    part is left. Border following as in Suzuki & Abe, "Topological structural analysis of digitized
+    binary images by border following", 1985.
     """
     mask = np.where(within, np.uint8(255), np.uint8(0))
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    is_hole = hierarchy.reshape(-1, 4)[:, 3] >= 0
-    areas = np.array([cv2.contourArea(contour) for contour in contours])
-    outer = contours[int(np.argmax(np.where(is_hole, -1.0, areas)))]
-    small_holes = [contours[int(i)] for i in np.flatnonzero(is_hole & (areas <= hole_area_px))]
+    holes = hierarchy.reshape(-1, 4)[:, 3] >= 0 if contours else np.zeros(0, bool)
+    parts = [
+        contour
+        for contour, is_hole in zip(contours, holes, strict=True)
+        if not is_hole and is_hand[contour[:, 0, 1], contour[:, 0, 0]].mean() >= _PART_MIN
+    ]
+    if not parts:
+        return None
+    small_holes = [
+        contour
+        for contour, is_hole in zip(contours, holes, strict=True)
+        if is_hole and cv2.contourArea(contour) <= hole_area_px
+    ]
     cv2.drawContours(mask, small_holes, -1, 255, cv2.FILLED)
-    inside = cv2.drawContours(np.zeros_like(mask), [outer], 0, 255, cv2.FILLED)
-    columns, rows = outer.reshape(-1, 2).astype(np.intp).T
-    return (rows, columns), mask & inside
+    mask &= cv2.drawContours(np.zeros_like(mask), parts, -1, 255, cv2.FILLED)
+    if len(parts) > 1:  # the gap that a depth jump leaves between two parts of a hand
+        mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, NEIGHBOURS), np.uint8)
+        parts, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    columns, rows = max(parts, key=cv2.contourArea).reshape(-1, 2).astype(np.intp).T
+    return (rows, columns), mask
 
 
 def _border_contact_px(surface: Bool, view: DepthView) -> int:
