@@ -30,13 +30,14 @@ _HAND_REACH_M = 0.20
 _AREA_MIN_M2 = 0.004
 # The palm is the mean of the places whose inscribed radius is nearly the largest, weighted by the
 # excess over this share of it.
-_PALM_TOP = 0.85
+_PALM_TOP = 0.75
+_PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
 # The forearm's axis runs from the palm to the mean of the arm about this distance from it.
 _ARM_M, _ARM_SIGMA_M = 0.11, 0.025
 _AXIS_STEPS = 4
 _LEAST_COS = 0.5  # of the angle between the axis and the image plane
-# Where the wrist is expected along the axis, from the palm's centre: palm length 95–120 mm in the
-# same survey, of which the inscribed circle's centre is a little more than half from the wrist.
+# Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
+# (same survey), and an inscribed circle of 40 to 45 mm in radius touches its upper end.
 _WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
 # The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
 # another is e times less likely the wrist.
@@ -141,6 +142,11 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
         if nearest and _is_plausible(located):
             found = located
+    if found is None and box is not None:
+        raise HandError(
+            "what the detector sees as a hand has not the shape of one in the depth image; "
+            "show the whole bare hand, clear of other things"
+        )
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
@@ -241,16 +247,16 @@ def _locate_on(
     """Find palm and wrist on one surface."""
     surface, points_m = limb.surface, limb.points_m
     arm_m = _arm_end(limb)
-    fit_m = limb.radius_m
+    chosen = np.flatnonzero(surface)
+    on_limb_m, radius_m = points_m.reshape(3, -1)[:, chosen].T, limb.radius_m.ravel()[chosen]
     if within is None:
         tip_m = _farthest(surface, points_m, arm_m)
-        fit_m = fit_m * (surface & (_distance(points_m, tip_m) < _TIP_TO_PALM_M))
+        likely = (np.linalg.norm(on_limb_m - tip_m, axis=1) < _TIP_TO_PALM_M).astype(np.float32)
     else:
-        fit_m = fit_m * within * surface
-    palm_m, palm_radius_m = _palm(fit_m, points_m, limb.radius_m)
-    chosen = np.flatnonzero(surface)
-    from_palm_m = points_m.reshape(3, -1)[:, chosen].T - palm_m
-    depth_m = points_m[2].ravel()[chosen]
+        likely = within.ravel()[chosen]
+    palm_m, palm_radius_m = _palm(on_limb_m, radius_m, likely)
+    from_palm_m = on_limb_m - palm_m
+    depth_m = on_limb_m[:, 2]
     area_m2 = (_pitch(limb.view) * depth_m) ** 2
     axis, wrist_m = _wrist(from_palm_m, area_m2, palm_m, arm_m - palm_m)
     limit_m = wrist_m + settings.forearm_m
@@ -289,12 +295,21 @@ def _farthest(surface: Bool, points_m: Float32, from_m: Float32) -> Float32:
     return farthest
 
 
-def _palm(fit_m: Float32, points_m: Float32, radius_m: Float32) -> tuple[Float32, float]:
-    """Return centre and radius of the palm: the mean place of nearly the largest circles."""
-    top = fit_m > _PALM_TOP * fit_m.max()
-    weight = (fit_m[top] - _PALM_TOP * fit_m.max()) ** 2
-    weight /= max(float(weight.sum()), 1e-12)
-    return np.asarray(points_m[:, top] @ weight, np.float32), float(radius_m[top] @ weight)
+def _palm(points_m: Float32, radius_m: Float32, likely: Float32) -> tuple[Float32, float]:
+    """Return centre and radius of the palm: the mean place of nearly the largest circles.
+
+    The first is looked for where it is likely, the next ones about the one before, so that the
+    last depends on the limb only.
+    """
+    for _ in range(_PALM_STEPS):
+        fit_m = radius_m * likely
+        top = fit_m > _PALM_TOP * fit_m.max()
+        weight = (fit_m[top] - _PALM_TOP * fit_m.max()) ** 2
+        weight /= max(float(weight.sum()), 1e-12)
+        palm_m = weight @ points_m[top]
+        offset_m = points_m - palm_m
+        likely = np.exp(-0.5 / _PALM_SIGMA_M**2 * np.einsum("ij,ij->i", offset_m, offset_m))
+    return palm_m, float(weight @ radius_m[top])
 
 
 def _wrist(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,7 @@ def evaluation(rows: Sequence[FrameFigures]) -> dict[str, Any]:
     known_mm = [one for one in beyond_mm if one is not None]
     steps_mm = [
         abs(after - before)
-        for before, after in zip(beyond_mm, beyond_mm[1:], strict=False)
+        for before, after in pairwise(beyond_mm)
         if before is not None and after is not None
     ]
     ious, kept, changes = (
@@ -115,7 +116,7 @@ def evaluation(rows: Sequence[FrameFigures]) -> dict[str, Any]:
         "wrist_sd_mm": float(np.std(known_mm, ddof=1)) if len(known_mm) > 1 else None,
         "wrist_max_step_mm": max(steps_mm, default=None),
         "area_change_max": max(changes, default=None),
-        "area_changes_over_10_percent": sum(change > _LARGE_CHANGE for change in changes),
+        "area_changes_over_10_percent": sum(bool(change > _LARGE_CHANGE) for change in changes),
         "rows": [asdict(row) | {"area_change": row.area_change} for row in rows],
     }
 
@@ -150,7 +151,7 @@ def _changes(
 def _area_m2(cloud: HandCloud, frame: Frame) -> float:
     """Return the mask's area at a depth of 1 m."""
     camera = frame.depth_intrinsics
-    return np.count_nonzero(cloud.mask) / (camera.fx * camera.fy)
+    return int(np.count_nonzero(cloud.mask)) / (camera.fx * camera.fy)
 
 
 def _beyond_wrist_mm(shot: MaskedFrame, cloud: HandCloud) -> float | None:
