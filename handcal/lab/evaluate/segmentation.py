@@ -54,8 +54,10 @@ class FrameFigures:
         return max(self.crop_change, self.scale_change, self.sampling_change)
 
 
-def evaluate_frame(shot: MaskedFrame, find: Find, gate: SegmentSettings) -> FrameFigures:
-    """Segment the hand in a frame and in its variants, and compare.
+def evaluate_frame(
+    shot: MaskedFrame, find: Find, gate: SegmentSettings
+) -> tuple[FrameFigures, Bool | None]:
+    """Segment the hand in a frame and in its variants; return the figures and the frame's mask.
 
     Parameters
     ----------
@@ -67,13 +69,13 @@ def evaluate_frame(shot: MaskedFrame, find: Find, gate: SegmentSettings) -> Fram
     try:
         cloud = find(shot.frame)
     except HandError as error:
-        return FrameFigures(shot.name, str(error), *[None] * 7)
+        return FrameFigures(shot.name, str(error), *[None] * 7), None
     mask = cloud.mask > 0
     camera = shot.frame.depth_intrinsics
     depth = view_depth(shot.frame, (0, 0, camera.width, camera.height))
     gated = shot.is_hand & between(depth, gate.depth_min_m, gate.depth_max_m)
     changes = [_changes(shot.frame, cloud, kind, find) for kind in _variants(shot.frame)]
-    return FrameFigures(
+    figures = FrameFigures(
         name=shot.name,
         refused=None,
         iou=_share(mask & shot.is_hand, mask | shot.is_hand),
@@ -84,6 +86,7 @@ def evaluate_frame(shot: MaskedFrame, find: Find, gate: SegmentSettings) -> Fram
         sampling_change=changes[2][0],
         centroid_change_mm=max(centroid_mm for _, centroid_mm in changes),
     )
+    return figures, mask
 
 
 def evaluation(rows: Sequence[FrameFigures]) -> dict[str, Any]:
