@@ -45,7 +45,9 @@ _BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
 _PROFILE_M = (-0.02, 0.16)
 _LIMB_WIDTH_M = 0.03  # a narrower limb is no arm
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
-_GAP_M, _JUMP_M, _PART_M2 = 0.015, 0.05, 5e-5
+_GAP_M, _JUMP_M = 0.015, 0.05
+PART_M2 = 5e-5
+"""Least area of such a part."""
 # A detector's box weighs places by their distance from its middle, with this share of its sides as
 # sigma; what this share of the pixels near the middle is behind by a hand's thickness is not seen.
 _BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
@@ -123,7 +125,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
     solid = solid_surface(view.depth, jump)
     gated = solid & between(view, depth_min_m, settings.depth_max_m)
     ends = on_border(gated) | goes_on(gated, solid & ~gated, view.depth, jump)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(gated.astype(np.uint8), connectivity=8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(gated.view(np.uint8), connectivity=8)
     parts = _Parts(view, np.asarray(labels), np.asarray(stats), ends)
     if box is not None:
         within = _within(view, box)
@@ -170,60 +172,42 @@ def _within(view: DepthView, box: Box) -> Float32:
     """Return how well each pixel of a view lies within a box: 1 in its middle, (h, w)."""
     height, width = view.depth.shape
     across, down = (
-        np.exp(
-            -0.5
-            * (
-                (low + view.step_px * np.arange(count) - (start + end) / 2)
-                / (_BOX_SIGMA * (end - start))
-            )
-            ** 2
-        )
-        for low, count, start, end in (
-            (view.box[0], width, box[0], box[2]),
-            (view.box[1], height, box[1], box[3]),
+        np.exp(-0.5 * ((low + view.step_px * np.arange(count) - middle) / sigma) ** 2)
+        for low, count, middle, sigma in (
+            (view.box[0], width, (box[0] + box[2]) / 2, _BOX_SIGMA * (box[2] - box[0])),
+            (view.box[1], height, (box[1] + box[3]) / 2, _BOX_SIGMA * (box[3] - box[1])),
         )
     )
-    return np.asarray(down[:, None] * across, np.float32)
+    return down.astype(np.float32)[:, None] * across.astype(np.float32)
 
 
 def _seen_part(parts: _Parts, within: Float32) -> int | None:
     """Return the part that fills the middle of a box, of those nearest in it."""
-    in_box = (within > _IN_BOX) & (parts.labels > 0)
-    if not in_box.any():
+    in_box = np.flatnonzero((within > _IN_BOX) & (parts.labels > 0))
+    if not len(in_box):
         return None
-    depth = parts.view.depth
-    layer = np.quantile(depth[in_box], _NEAREST) + _LAYER_M / parts.view.scale_m
-    in_box &= depth < layer
-    weights = np.bincount(parts.labels[in_box], within[in_box], len(parts.stats))
-    return int(np.argmax(weights))
+    depth = parts.view.depth.ravel()[in_box]
+    nearest = depth < np.quantile(depth, _NEAREST) + _LAYER_M / parts.view.scale_m
+    chosen = in_box[nearest]
+    labels, weights = parts.labels.ravel()[chosen], within.ravel()[chosen]
+    return int(np.argmax(np.bincount(labels, weights)))
 
 
 def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
     """Return a part with those that belong to the same limb, and its place in the view."""
     view = parts.view
-    is_limb = np.zeros(len(parts.stats), bool)
-    is_limb[main] = True
     surface = parts.labels == main
-    depth_m = float(view.depth[surface].mean()) * view.scale_m
-    pitch_m = _pitch(view) * depth_m
-    gap_px = max(1, round(_GAP_M / pitch_m))
-    near = _widened(surface, gap_px)
-    near_area = np.bincount(parts.labels[near], minlength=len(parts.stats))
+    pitch_m = _pitch(view) * float(view.depth[surface].mean()) * view.scale_m
     size_px = parts.stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
-    may_join = (near_area > 0) & (parts.stats[:, cv2.CC_STAT_AREA] >= _PART_M2 / pitch_m**2)
+    may_join = parts.stats[:, cv2.CC_STAT_AREA] >= PART_M2 / pitch_m**2
     may_join &= size_px <= _HAND_REACH_M / pitch_m
-    for part in np.flatnonzero(may_join):
-        if part in (0, main):
-            continue
-        other = near & (parts.labels == part)
-        beside = surface & _widened(other, gap_px)
-        jump_m = (view.depth[other].mean() - view.depth[beside].mean()) * view.scale_m
-        is_limb[part] = abs(jump_m) <= _JUMP_M
-    surface = is_limb[parts.labels]
+    may_join[[0, main]] = False
+    if may_join.any():
+        surface = _joined(parts, surface, may_join, max(1, round(_GAP_M / pitch_m)))
     part_view, place = crop_view(view, surface, margin=3)
-    surface = surface[place]
+    surface = np.ascontiguousarray(surface[place])
     rows, columns = np.ogrid[: surface.shape[0], : surface.shape[1]]
-    closed = cv2.morphologyEx(surface.astype(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS, iterations=2)
+    closed = cv2.morphologyEx(surface.view(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS, iterations=2)
     distance_px = cv2.distanceTransform(closed, cv2.DIST_L2, 5)
     distance_px = np.minimum(distance_px, np.float32(max(surface.shape)))  # infinite without edge
     limb = _Limb(
@@ -236,9 +220,22 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
     return limb, place
 
 
+def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int) -> Bool:
+    """Return a surface with those parts that lie beside it at nearly the same depth."""
+    view, is_limb = parts.view, np.zeros(len(parts.stats), bool)
+    near = _widened(surface, gap_px)
+    beside = np.bincount(parts.labels[near], minlength=len(parts.stats)) > 0
+    for part in np.flatnonzero(may_join & beside):
+        other = near & (parts.labels == part)
+        opposite = surface & _widened(other, gap_px)
+        jump = view.depth[other].mean() - view.depth[opposite].mean()
+        is_limb[part] = abs(jump) * view.scale_m <= _JUMP_M
+    return surface | is_limb[parts.labels]
+
+
 def _widened(mask: Bool, by_px: int) -> Bool:
     square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
-    return cv2.dilate(mask.astype(np.uint8), square).astype(bool)
+    return cv2.dilate(mask.view(np.uint8), square).view(bool)
 
 
 def _locate_on(
@@ -248,20 +245,19 @@ def _locate_on(
     surface, points_m = limb.surface, limb.points_m
     arm_m = _arm_end(limb)
     chosen = np.flatnonzero(surface)
-    on_limb_m, radius_m = points_m.reshape(3, -1)[:, chosen].T, limb.radius_m.ravel()[chosen]
+    on_limb_m, radius_m = points_m.reshape(3, -1)[:, chosen], limb.radius_m.ravel()[chosen]
     if within is None:
         tip_m = _farthest(surface, points_m, arm_m)
-        likely = (np.linalg.norm(on_limb_m - tip_m, axis=1) < _TIP_TO_PALM_M).astype(np.float32)
+        likely = (_distance(on_limb_m, tip_m) < _TIP_TO_PALM_M).astype(np.float32)
     else:
         likely = within.ravel()[chosen]
     palm_m, palm_radius_m = _palm(on_limb_m, radius_m, likely)
-    from_palm_m = on_limb_m - palm_m
-    depth_m = on_limb_m[:, 2]
-    area_m2 = (_pitch(limb.view) * depth_m) ** 2
+    from_palm_m = on_limb_m - palm_m[:, None]
+    area_m2 = (np.float32(_pitch(limb.view)) * on_limb_m[2]) ** 2
     axis, wrist_m = _wrist(from_palm_m, area_m2, palm_m, arm_m - palm_m)
     limit_m = wrist_m + settings.forearm_m
-    is_arm = from_palm_m @ axis > limit_m
-    reached = np.einsum("ij,ij->i", from_palm_m, from_palm_m) < _HAND_REACH_M**2
+    is_arm = axis.astype(np.float32) @ from_palm_m > limit_m
+    reached = (from_palm_m**2).sum(axis=0) < _HAND_REACH_M**2
     hand, arm = np.zeros_like(surface), np.zeros_like(surface)
     hand.ravel()[chosen] = reached & ~is_arm
     arm.ravel()[chosen] = is_arm
@@ -306,9 +302,8 @@ def _palm(points_m: Float32, radius_m: Float32, likely: Float32) -> tuple[Float3
         top = fit_m > _PALM_TOP * fit_m.max()
         weight = (fit_m[top] - _PALM_TOP * fit_m.max()) ** 2
         weight /= max(float(weight.sum()), 1e-12)
-        palm_m = weight @ points_m[top]
-        offset_m = points_m - palm_m
-        likely = np.exp(-0.5 / _PALM_SIGMA_M**2 * np.einsum("ij,ij->i", offset_m, offset_m))
+        palm_m = points_m[:, top] @ weight
+        likely = np.exp(-0.5 / _PALM_SIGMA_M**2 * ((points_m - palm_m[:, None]) ** 2).sum(axis=0))
     return palm_m, float(weight @ radius_m[top])
 
 
@@ -318,11 +313,11 @@ def _wrist(
     """Return the forearm's axis and the distance of the wrist along it; infinite without an arm."""
     axis = toward_arm_m / max(float(np.linalg.norm(toward_arm_m)), 1e-9)
     for _ in range(_AXIS_STEPS):
-        along_m = from_palm_m @ axis
+        along_m = axis @ from_palm_m
         weight = area_m2 * np.exp(-0.5 * ((along_m - _ARM_M) / _ARM_SIGMA_M) ** 2)
-        center_m = weight @ from_palm_m
+        center_m = from_palm_m @ weight
         axis = center_m / max(float(np.linalg.norm(center_m)), 1e-12)
-    along_m = from_palm_m @ axis
+    along_m = axis @ from_palm_m
     # Seen at an angle, a limb's length is foreshortened, and so is its area.
     forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
     cosine = max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - forward**2))))

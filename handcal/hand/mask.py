@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from handcal.errors import HandError
-from handcal.hand.locate import LocatedHand
+from handcal.hand.locate import PART_M2, LocatedHand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
 from handcal.hand.view import (
@@ -26,6 +26,7 @@ from handcal.types import Bool, Frame, UInt8
 _BORDER_CONTACT_M = 0.01
 # Share of a part's contour on the coarse hand.
 _PART_MIN = 0.4
+_LEAST_CONTOUR_PX = 4  # a shorter contour encloses nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     near_wrist = pixels_of(within & may_be_arm)
     along_m = (deproject(view, *near_wrist).T - located.palm_m) @ located.axis
     within[near_wrist] = along_m <= located.limit_m
-    outlined = _outline(within, is_hand, settings.hole_area_m2 / pitch_m**2)
+    outlined = _outline(within, is_hand, settings.hole_area_m2 / pitch_m**2, PART_M2 / pitch_m**2)
     if outlined is None:
         raise HandError("the depth image is too sparse where the hand is; check the camera")
     outline, filled = outlined
@@ -78,7 +79,9 @@ def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Boo
     """Return the image around the hand, the coarse hand in it, and candidates of hand and arm."""
     coarse, place = crop_view(located.view, located.hand, margin=3)
     view = view_depth(frame, coarse.box)
-    hand, arm = located.hand[place].astype(np.uint8), located.arm[place].astype(np.uint8)
+    hand, arm = (
+        np.ascontiguousarray(one[place]).view(np.uint8) for one in (located.hand, located.arm)
+    )
     is_hand, may_be_hand, may_be_arm = (
         _enlarged(part, coarse.step_px, view) for part in (hand, _wider(hand), _wider(arm))
     )
@@ -97,28 +100,29 @@ def _enlarged(mask: UInt8, step_px: int, view: DepthView) -> Bool:
     return cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
 
 
-def _outline(within: Bool, is_hand: Bool, hole_area_px: float) -> tuple[Pixels, UInt8] | None:
+def _outline(
+    within: Bool, is_hand: Bool, hole_area_px: float, part_px: float
+) -> tuple[Pixels, UInt8] | None:
     """Return the outer contour of the largest part, and all parts with small holes closed.
 
     Parts with most of their contour outside `is_hand` are of something beside the hand. None if no
-    part is left. Border following as in Suzuki & Abe, "Topological structural analysis of digitized
-    binary images by border following", 1985.
+    part is left, of at least `part_px`. Border following as in Suzuki & Abe, "Topological
+    structural analysis of digitized binary images by border following", 1985.
     """
-    mask = np.where(within, np.uint8(255), np.uint8(0))
+    mask = within.view(np.uint8) * np.uint8(255)
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    holes = hierarchy.reshape(-1, 4)[:, 3] >= 0 if contours else np.zeros(0, bool)
-    parts = [
-        contour
-        for contour, is_hole in zip(contours, holes, strict=True)
-        if not is_hole and is_hand[contour[:, 0, 1], contour[:, 0, 0]].mean() >= _PART_MIN
-    ]
+    parts, small_holes = [], []
+    for contour, (_, _, _, parent) in zip(contours, hierarchy[0] if contours else (), strict=True):
+        area_px = cv2.contourArea(contour) if len(contour) > _LEAST_CONTOUR_PX else 0.0
+        if parent >= 0:
+            if area_px <= hole_area_px:
+                small_holes.append(contour)
+        elif area_px >= part_px:
+            columns, rows = contour.reshape(-1, 2).T
+            if is_hand[rows, columns].mean() >= _PART_MIN:
+                parts.append(contour)
     if not parts:
         return None
-    small_holes = [
-        contour
-        for contour, is_hole in zip(contours, holes, strict=True)
-        if is_hole and cv2.contourArea(contour) <= hole_area_px
-    ]
     cv2.drawContours(mask, small_holes, -1, 255, cv2.FILLED)
     mask &= cv2.drawContours(np.zeros_like(mask), parts, -1, 255, cv2.FILLED)
     if len(parts) > 1:  # the gap that a depth jump leaves between two parts of a hand

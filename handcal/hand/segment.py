@@ -58,10 +58,10 @@ def segmented_window(roi_px: Box | None, camera: Intrinsics, settings: SegmentSe
     if roi_px is None:
         return 0, 0, camera.width, camera.height
     x0, y0, x1, y1 = roi_px
-    wider = round(settings.roi_margin * max(x1 - x0, y1 - y0))
+    wider, higher = (round(settings.roi_margin * side) for side in (x1 - x0, y1 - y0))
     step_px = _coarse_step_px(camera)
-    x0, y0 = (max(0, low) // step_px * step_px for low in (x0 - wider, y0 - wider))
-    x1, y1 = min(camera.width, x1 + wider), min(camera.height, y1 + wider)
+    x0, y0 = (max(0, low) // step_px * step_px for low in (x0 - wider, y0 - higher))
+    x1, y1 = min(camera.width, x1 + wider), min(camera.height, y1 + higher)
     if x0 >= x1 or y0 >= y1:
         raise ValueError(f"the region of interest {roi_px} is empty or outside the depth image")
     return x0, y0, x1, y1
