@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from handcal.errors import HandError
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
-from handcal.hand.view import Box, DepthView, between, crop_view, deproject
+from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
 from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
@@ -34,7 +34,7 @@ _PALM_TOP = 0.75
 _PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
 # The forearm's axis runs from the palm to the mean of the arm about this distance from it.
 _ARM_M, _ARM_SIGMA_M = 0.11, 0.025
-_AXIS_STEPS = 4
+_AXIS_STEPS = 3
 _LEAST_COS = 0.5  # of the angle between the axis and the image plane
 # Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
 # (same survey), and an inscribed circle of 40 to 45 mm in radius touches its upper end.
@@ -43,7 +43,7 @@ _WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
 # another is e times less likely the wrist.
 _BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
 _PROFILE_M = (-0.02, 0.16)
-_LIMB_WIDTH_M = 0.03  # a narrower limb is no arm
+_LIMB_WIDTH_M, _ARM_RADIUS_M = 0.03, 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
 PART_M2 = 5e-5
@@ -93,15 +93,16 @@ class _Parts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Limb:
-    """A surface that may be a hand with its arm, on the coarse grid."""
+    """A surface that may be a hand with its arm, on the coarse grid; N pixels."""
 
     view: DepthView
-    surface: Bool
-    ends: Bool
+    pixels: Pixels
     points_m: Float32
-    """(3, h, w)"""
+    """(3, N)"""
     radius_m: Float32
-    """(h, w); inscribed radius of the limb's silhouette."""
+    """(N,); inscribed radius of the limb's silhouette."""
+    at_end: Bool
+    """(N,); where the surface continues out of view."""
 
 
 def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = None) -> LocatedHand:
@@ -140,7 +141,8 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
     found = None
     for part in candidates:
         limb, place = _limb(parts, part)
-        located = _locate_on(limb, None if within is None else within[place], settings, depth_min_m)
+        likely = None if within is None else within[place][limb.pixels]
+        located = _locate_on(limb, likely, settings, depth_min_m)
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
         if nearest and _is_plausible(located):
             found = located
@@ -187,7 +189,8 @@ def _seen_part(parts: _Parts, within: Float32) -> int | None:
     if not len(in_box):
         return None
     depth = parts.view.depth.ravel()[in_box]
-    nearest = depth < np.quantile(depth, _NEAREST) + _LAYER_M / parts.view.scale_m
+    rank = int(_NEAREST * len(depth))
+    nearest = depth < np.partition(depth, rank)[rank] + _LAYER_M / parts.view.scale_m
     chosen = in_box[nearest]
     labels, weights = parts.labels.ravel()[chosen], within.ravel()[chosen]
     return int(np.argmax(np.bincount(labels, weights)))
@@ -206,18 +209,13 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
         surface = _joined(parts, surface, may_join, max(1, round(_GAP_M / pitch_m)))
     part_view, place = crop_view(view, surface, margin=3)
     surface = np.ascontiguousarray(surface[place])
-    rows, columns = np.ogrid[: surface.shape[0], : surface.shape[1]]
     closed = cv2.morphologyEx(surface.view(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS, iterations=2)
-    distance_px = cv2.distanceTransform(closed, cv2.DIST_L2, 5)
-    distance_px = np.minimum(distance_px, np.float32(max(surface.shape)))  # infinite without edge
-    limb = _Limb(
-        part_view,
-        surface,
-        parts.ends[place],
-        deproject(part_view, rows, columns),
-        distance_px * part_view.depth * np.float32(_pitch(view) * view.scale_m),
-    )
-    return limb, place
+    pixels = pixels_of(surface)
+    points_m = deproject(part_view, *pixels)
+    # Infinite without an edge.
+    radius_px = np.minimum(cv2.distanceTransform(closed, cv2.DIST_L2, 5)[pixels], max(closed.shape))
+    radius_m = radius_px * points_m[2] * np.float32(_pitch(view))
+    return _Limb(part_view, pixels, points_m, radius_m, parts.ends[place][pixels]), place
 
 
 def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int) -> Bool:
@@ -239,30 +237,33 @@ def _widened(mask: Bool, by_px: int) -> Bool:
 
 
 def _locate_on(
-    limb: _Limb, within: Float32 | None, settings: SegmentSettings, depth_min_m: float
+    limb: _Limb, likely: Float32 | None, settings: SegmentSettings, depth_min_m: float
 ) -> LocatedHand:
-    """Find palm and wrist on one surface."""
-    surface, points_m = limb.surface, limb.points_m
+    """Find palm and wrist on one surface; the palm where `likely` (N,), or near its tip."""
+    points_m = limb.points_m
     arm_m = _arm_end(limb)
-    chosen = np.flatnonzero(surface)
-    on_limb_m, radius_m = points_m.reshape(3, -1)[:, chosen], limb.radius_m.ravel()[chosen]
-    if within is None:
-        tip_m = _farthest(surface, points_m, arm_m)
-        likely = (_distance(on_limb_m, tip_m) < _TIP_TO_PALM_M).astype(np.float32)
-    else:
-        likely = within.ravel()[chosen]
-    palm_m, palm_radius_m = _palm(on_limb_m, radius_m, likely)
-    from_palm_m = on_limb_m - palm_m[:, None]
-    area_m2 = (np.float32(_pitch(limb.view)) * on_limb_m[2]) ** 2
+    if likely is None:
+        likely = (_distance(points_m, _farthest(limb, arm_m)) < _TIP_TO_PALM_M).astype(np.float32)
+    palm_m, palm_radius_m = _palm(limb, likely)
+    from_palm_m = points_m - palm_m[:, None]
+    area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
     axis, wrist_m = _wrist(from_palm_m, area_m2, palm_m, arm_m - palm_m)
     limit_m = wrist_m + settings.forearm_m
-    is_arm = axis.astype(np.float32) @ from_palm_m > limit_m
-    reached = (from_palm_m**2).sum(axis=0) < _HAND_REACH_M**2
-    hand, arm = np.zeros_like(surface), np.zeros_like(surface)
-    hand.ravel()[chosen] = reached & ~is_arm
-    arm.ravel()[chosen] = is_arm
+    is_arm = axis @ from_palm_m > limit_m
+    if not (limb.radius_m[is_arm] >= _ARM_RADIUS_M).any():  # too thin for an arm: fingers
+        is_arm, limit_m = np.zeros_like(is_arm), np.inf
+    hand, arm = (np.zeros(limb.view.depth.shape, bool) for _ in range(2))
+    hand[limb.pixels] = ~is_arm & (_distance(points_m, palm_m) < _HAND_REACH_M)
+    arm[limb.pixels] = is_arm
     return LocatedHand(
-        limb.view, hand, arm, palm_m.astype(np.float64), palm_radius_m, axis, limit_m, depth_min_m
+        limb.view,
+        hand,
+        arm,
+        palm_m.astype(np.float64),
+        palm_radius_m,
+        axis.astype(np.float64),
+        limit_m,
+        depth_min_m,
     )
 
 
@@ -272,44 +273,44 @@ def _arm_end(limb: _Limb) -> Float32:
     Wide places count more, as fingers are thin. If it continues nowhere, this is the thicker of the
     surface's two tips.
     """
-    ends = limb.surface & limb.ends
-    if ends.any():
-        weight = limb.radius_m[ends] ** 2 + np.float32(1e-9)
-        return np.asarray(limb.points_m[:, ends] @ weight / weight.sum(), np.float32)
-    tip_m = limb.points_m[:, limb.surface].mean(axis=1)
+    if limb.at_end.any():
+        weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
+        return np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
+    tip_m = limb.points_m.mean(axis=1)
     tips = []
     for _ in range(2):
-        tip_m = _farthest(limb.surface, limb.points_m, tip_m)
-        tips.append(limb.surface & (_distance(limb.points_m, tip_m) < _TIP_M))
+        tip_m = _farthest(limb, tip_m)
+        tips.append(_distance(limb.points_m, tip_m) < _TIP_M)
     thicker = max(tips, key=lambda tip: float(limb.radius_m[tip].mean()))
     return np.asarray(limb.points_m[:, thicker].mean(axis=1), np.float32)
 
 
-def _farthest(surface: Bool, points_m: Float32, from_m: Float32) -> Float32:
-    distance_m = np.where(surface, _distance(points_m, from_m), 0)
-    farthest: Float32 = points_m.reshape(3, -1)[:, np.argmax(distance_m)]
+def _farthest(limb: _Limb, from_m: Float32) -> Float32:
+    farthest: Float32 = limb.points_m[:, np.argmax(_distance(limb.points_m, from_m))]
     return farthest
 
 
-def _palm(points_m: Float32, radius_m: Float32, likely: Float32) -> tuple[Float32, float]:
+def _palm(limb: _Limb, likely: Float32) -> tuple[Float32, float]:
     """Return centre and radius of the palm: the mean place of nearly the largest circles.
 
     The first is looked for where it is likely, the next ones about the one before, so that the
     last depends on the limb only.
     """
+    inner = limb.radius_m > _PALM_TOP * (limb.radius_m * likely).max()
+    points_m, radius_m, likely = limb.points_m[:, inner], limb.radius_m[inner], likely[inner]
     for _ in range(_PALM_STEPS):
         fit_m = radius_m * likely
         top = fit_m > _PALM_TOP * fit_m.max()
         weight = (fit_m[top] - _PALM_TOP * fit_m.max()) ** 2
         weight /= max(float(weight.sum()), 1e-12)
         palm_m = points_m[:, top] @ weight
-        likely = np.exp(-0.5 / _PALM_SIGMA_M**2 * ((points_m - palm_m[:, None]) ** 2).sum(axis=0))
+        likely = np.exp(-0.5 * (_distance(points_m, palm_m) / _PALM_SIGMA_M) ** 2)
     return palm_m, float(weight @ radius_m[top])
 
 
 def _wrist(
     from_palm_m: Float32, area_m2: Float32, palm_m: Float32, toward_arm_m: Float32
-) -> tuple[Float64, float]:
+) -> tuple[Float32, float]:
     """Return the forearm's axis and the distance of the wrist along it; infinite without an arm."""
     axis = toward_arm_m / max(float(np.linalg.norm(toward_arm_m)), 1e-9)
     for _ in range(_AXIS_STEPS):
@@ -329,10 +330,10 @@ def _wrist(
     width_m = np.convolve(width_m, _SMOOTHING, "same")
     at_m = start_m + _BIN_M * (np.arange(bins) + 0.5)
     if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
-        return axis.astype(np.float64), np.inf
+        return axis, np.inf
     likely = np.exp(-0.5 * ((at_m - _WRIST_M) / _WRIST_SIGMA_M) ** 2 - width_m / _WIDTH_SCALE_M)
     likely *= np.minimum(width_m / _LIMB_WIDTH_M, 1.0) ** 2
-    return axis.astype(np.float64), float(likely @ at_m / likely.sum())
+    return axis, float(likely @ at_m / likely.sum())
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:
