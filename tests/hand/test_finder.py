@@ -112,7 +112,7 @@ def test_another_thing_is_never_taken_for_the_hand_that_the_detector_sees(frame:
     with pytest.raises(HandError, match="only the background"):
         HandFinder(SETTINGS, elsewhere).find(frame)
     blind = Eyes((0, 0, 0, 0))
-    with pytest.raises(HandError, match="no hand is seen|only the background|measures nothing"):
+    with pytest.raises(HandError, match=r"no hand is seen|only the background|measures nothing"):
         HandFinder(SETTINGS, blind).find(frame)
 
 
