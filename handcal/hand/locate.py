@@ -51,6 +51,7 @@ PART_M2 = 5e-5
 # A detector's box weighs places by their distance from its middle, with this share of its sides as
 # sigma; what this share of the pixels near the middle is behind by a hand's thickness is not seen.
 _BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
+_ARM_IN_BOX_MAX = 0.25
 
 _SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
 _SMOOTHING /= _SMOOTHING.sum()
@@ -146,6 +147,8 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
         if nearest and _is_plausible(located):
             found = located
+            if within is not None:
+                _check_arm(located, within[place])
     if found is None and box is not None:
         raise HandError(
             "what the detector sees as a hand has not the shape of one in the depth image; "
@@ -168,6 +171,16 @@ def _is_plausible(located: LocatedHand) -> bool:
     area_m2 = np.count_nonzero(located.hand) * (_pitch(located.view) * located.palm_m[2]) ** 2
     has_palm = _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
     return bool(has_palm and area_m2 >= _AREA_MIN_M2)
+
+
+def _check_arm(located: LocatedHand, within: Float32) -> None:
+    """Raise HandError if much of what is in the middle of a hand's box would be arm."""
+    arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
+    if arm > _ARM_IN_BOX_MAX * (arm + hand):
+        raise HandError(
+            "the wrist cannot be told in the depth image; turn the palm or the back of the hand to "
+            "the camera"
+        )
 
 
 def _within(view: DepthView, box: Box) -> Float32:
@@ -293,8 +306,7 @@ def _farthest(limb: _Limb, from_m: Float32) -> Float32:
 def _palm(limb: _Limb, likely: Float32) -> tuple[Float32, float]:
     """Return centre and radius of the palm: the mean place of nearly the largest circles.
 
-    The first is looked for where it is likely, the next ones about the one before, so that the
-    last depends on the limb only.
+    It is looked for where it is likely, then near the one found, so that it depends on the limb.
     """
     inner = limb.radius_m > _PALM_TOP * (limb.radius_m * likely).max()
     points_m, radius_m, likely = limb.points_m[:, inner], limb.radius_m[inner], likely[inner]
