@@ -1,16 +1,18 @@
-"""``handcal evaluate detector, users``: the hand detector and the user test."""
+"""``handcal evaluate detector, segmentation, users``: hand detector, segmentation, user test."""
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
 from pathlib import Path
+from typing import get_args
 
 from rich.markup import escape
 
 from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import HandcalError
+from handcal.hand.settings import Roi
 from handcal.io.files import make_folder, require_suffix
 
 
@@ -94,6 +96,59 @@ def detector(arguments: argparse.Namespace) -> None:
     save(arguments.json, result)
     if arguments.sheet is not None:
         write_contact_sheet(arguments.sheet, photos, results)
+
+
+@command(
+    arg("folder", type=Path, help="folder of frames with true masks, and a meta.json"),
+    arg(
+        "--roi",
+        choices=get_args(Roi),
+        default="detector",
+        help="hand to segment: where the detector sees one, or the nearest object by depth alone",
+    ),
+    arg("--sheet", type=Path, metavar="FILE", help="PNG with all frames, masks and numbers"),
+    json=True,
+)
+def segmentation(arguments: argparse.Namespace) -> None:
+    """Measure the segmentation of the hand on frames with true masks."""
+    from handcal.lab.evaluate.run import run_segmentation_test
+    from handcal.lab.settings import SegmentationTestSettings
+
+    settings = SegmentationTestSettings(
+        str(arguments.folder), arguments.roi, str(arguments.sheet or "")
+    )
+    with show_progress() as progress:
+        result = run_segmentation_test(settings, progress)
+    save(arguments.json, result)
+    shown_table = table(
+        "frame", "IoU", "kept, %", "beyond wrist, mm", "area ±, %", "centroid ±, mm"
+    )
+    for row in result["rows"]:
+        shown_table.add_row(
+            row["name"],
+            _cell(row["iou"], 1, 3),
+            _cell(row["kept"], 100, 1),
+            _cell(row["beyond_wrist_mm"], 1, 1),
+            _cell(row["area_change"], 100, 1),
+            _cell(row["centroid_change_mm"], 1, 1),
+        )
+    console.print(shown_table)
+    for row in result["rows"]:
+        if row["refused"] is not None:
+            console.print(f"{row['name']}: {row['refused']}", markup=False)
+    console.print(
+        f"{result['frames']} frames, {result['refused']} refused. "
+        f"IoU {_cell(result['iou_mean'], 1, 3)}, at least {_cell(result['iou_min'], 1, 3)}; "
+        f"at least {_cell(result['kept_min'], 100, 1)} % of the hand kept. Cut at the wrist: "
+        f"SD {_cell(result['wrist_sd_mm'], 1, 1)} mm, largest step "
+        f"{_cell(result['wrist_max_step_mm'], 1, 1)} mm. Area of cropped, scaled and sub-sampled "
+        f"frames: at most {_cell(result['area_change_max'], 100, 1)} % different; more than 10 % "
+        f"in {result['area_changes_over_10_percent']} frames."
+    )
+
+
+def _cell(value: float | None, scale: float, digits: int) -> str:
+    return "–" if value is None else f"{scale * value:.{digits}f}"
 
 
 @command(

@@ -44,6 +44,9 @@ _EVALUATE: Mapping[str, Entry] = {
     "detector": Entry(
         "Measure the hand detector's precision on annotated photographs.", "evaluate"
     ),
+    "segmentation": Entry(
+        "Measure the segmentation of the hand on frames with true masks.", "evaluate"
+    ),
     "users": Entry(
         "Evaluate the user test over sessions: errors of calibrations against the wearers' view.",
         "evaluate",

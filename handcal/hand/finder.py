@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,19 +14,20 @@ from handcal.hand.view import Box
 from handcal.types import Frame, HandCloud, Intrinsics
 
 _EDGE_PX = 3  # a hand this close to a side of its window may continue beyond it
+_EVERYWHERE = 1000.0  # margin of a window that is the whole image
+_IN_BOX_MIN = 0.3  # least share of the hand within its box, which covers at least the palm
 
 
 class HandFinder:
     """Segments the hand in each frame of a camera.
 
-    The detector only selects where to look first. If it sees no hand, or the hand extends beyond
-    that region, the nearest hand-sized object in the depth image is used.
+    The hand is the one that the detector sees, or none. Without a detector or without colour, it is
+    the nearest hand-sized object in the depth image.
 
     Parameters
     ----------
     settings : SegmentSettings
     detector : Detector, optional
-        Without it only the depth image is used.
     """
 
     def __init__(self, settings: SegmentSettings, detector: Detector | None = None) -> None:
@@ -39,16 +40,27 @@ class HandFinder:
         Raises
         ------
         HandError
-            See `segment_hand`.
+            See `segment_hand`; also if the detector sees no hand, or where it sees one the depth
+            image shows none within reach. The text says why.
         """
-        roi_px = self._roi.find(frame) if self._roi else None
-        if roi_px is not None:
-            window = segmented_window(roi_px, frame.depth_intrinsics, self._settings)
-            with suppress(HandError):
-                hand = segment_hand(frame, self._settings, roi_px)
-                if _is_within(hand.box_px, window, frame.depth_intrinsics):
-                    return hand
-        return segment_hand(frame, self._settings)
+        if self._roi is None or frame.color is None:
+            return segment_hand(frame, self._settings)
+        roi_px = self._roi.find(frame)
+        if roi_px is None:
+            raise HandError(self._roi.problem)
+        camera = frame.depth_intrinsics
+        hand = segment_hand(frame, self._settings, roi_px)
+        if not _is_within(hand.box_px, segmented_window(roi_px, camera, self._settings), camera):
+            wider = replace(self._settings, roi_margin=_EVERYWHERE)
+            hand = segment_hand(frame, wider, roi_px)
+        x0, y0, x1, y1 = roi_px
+        in_box = np.count_nonzero(hand.mask[y0:y1, x0:x1])
+        if in_box < _IN_BOX_MIN * np.count_nonzero(hand.mask):
+            raise HandError(
+                "the detector and the depth image disagree about where the hand is; hold it clear "
+                "of other things"
+            )
+        return hand
 
 
 def _is_within(box: Box, window: Box, camera: Intrinsics) -> bool:

@@ -1,28 +1,23 @@
-"""Locate the hand in a coarse depth image: its surface, its palm, and the start of the arm.
+"""Locate the hand in a coarse depth image: its surface, its palm, and the wrist.
 
-The palm is the largest inscribed circle near the end of a limb. A ball about its centre separates
-the hand from the arm. It depends neither on the limb's direction nor on the visible length of the
-forearm, so two frames of one hand are cut at the same place.
+The palm is the largest inscribed circle near the end of a limb, or in a detector's box. The wrist
+is the narrowest place beyond it along the forearm. Both are means over all candidates, weighted by
+how well they fit, so that they vary continuously with the image: no single pixel decides.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from handcal.errors import HandError
-from handcal.hand.settings import SegmentSettings
-from handcal.hand.surface import (
-    NEIGHBOURS,
-    component_of,
-    components,
-    goes_on,
-    on_border,
-    solid_surface,
-)
-from handcal.hand.view import DepthView, between, crop_view, deproject
+from handcal.hand.settings import NEARER_M, SegmentSettings
+from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
+from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
 from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
@@ -31,18 +26,37 @@ from handcal.types import Bool, Float32, Float64
 _PALM_RADIUS_M = (0.018, 0.065)
 _TIP_M = 0.05
 _TIP_TO_PALM_M = 0.15
-_PALM_TO_ARM_M = 0.03
-_PALM_TO_WRIST_MAX_M = 0.11
 _HAND_REACH_M = 0.20
 _AREA_MIN_M2 = 0.004
-# The fall of the inscribed radius ends this close to its minimum, measured in shells of this
-# thickness about the palm, in this cone about the arm, averaged over this many shells; the last
-# value is the distance from there to the wrist.
-_WRIST_NARROW = 1.1
-_SHELL_M = 0.0025
-_SMOOTH_SHELLS = 9
-_ARMWARD_COS = 0.6
-_WRIST_BEYOND_M = 0.02
+# The palm is the mean of the places whose inscribed radius is nearly the largest, weighted by the
+# excess over this share of it.
+_PALM_TOP = 0.75
+_PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
+# The forearm's axis runs from the palm to the mean of the arm about this distance from it.
+_ARM_M, _ARM_SIGMA_M = 0.11, 0.025
+_AXIS_STEPS = 3
+_LEAST_COS = 0.5  # of the angle between the axis and the image plane
+# Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
+# (same survey), and an inscribed circle of 40 to 45 mm in radius touches its upper end.
+_WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
+# The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
+# another is e times less likely the wrist.
+_BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
+_PROFILE_M = (-0.02, 0.16)
+_LIMB_WIDTH_M, _ARM_RADIUS_M = 0.03, 0.014  # a narrower limb is no arm; a finger is 24 mm wide
+# A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
+_GAP_M, _JUMP_M = 0.015, 0.05
+PART_M2 = 5e-5
+"""Least area of such a part."""
+# A detector's box weighs places by their distance from its middle, with this share of its sides as
+# sigma; what this share of the pixels near the middle is behind by a hand's thickness is not seen.
+_BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
+_ARM_IN_BOX_MAX = 0.25
+
+_SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
+_SMOOTHING /= _SMOOTHING.sum()
+
+Labels: TypeAlias = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,18 +71,51 @@ class LocatedHand:
     palm_m: Float64
     """(3,); centre of the visible palm or back of the hand, camera frame."""
     palm_radius_m: float
+    axis: Float64
+    """(3,); direction of the forearm, from hand to elbow."""
     limit_m: float
-    """Distance from `palm_m` to the start of the arm."""
+    """Distance from `palm_m` along `axis` to the start of the arm; infinite if none is seen."""
+    depth_min_m: float
+    """Nearest depth at which it was looked for."""
 
 
-def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
-    """Find the nearest hand-sized end of a surface.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Parts:
+    """Connected parts of the surface within the depth gate, on the coarse grid."""
+
+    view: DepthView
+    labels: Labels
+    """(h, w); number of each pixel's part, 0 outside."""
+    stats: Labels
+    """(N, 5); as `cv2.connectedComponentsWithStats` gives them, the background's first."""
+    ends: Bool
+    """(h, w); where the surface continues out of view."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Limb:
+    """A surface that may be a hand with its arm, on the coarse grid; N pixels."""
+
+    view: DepthView
+    pixels: Pixels
+    points_m: Float32
+    """(3, N)"""
+    radius_m: Float32
+    """(N,); inscribed radius of the limb's silhouette."""
+    at_end: Bool
+    """(N,); where the surface continues out of view."""
+
+
+def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = None) -> LocatedHand:
+    """Find the hand in a box, or else the nearest hand-sized end of a surface.
 
     Parameters
     ----------
     view : DepthView
         With a pitch of about 2 mm on a hand.
     settings : SegmentSettings
+    box : Box, optional
+        Of a detected hand, in the whole image. That hand may be `NEARER_M` nearer than the gate.
 
     Raises
     ------
@@ -76,20 +123,37 @@ def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
         If no such surface is found.
     """
     jump = round(settings.edge_jump_m / view.scale_m)
+    depth_min_m = settings.depth_min_m - (0.0 if box is None else NEARER_M)
     solid = solid_surface(view.depth, jump)
-    gated = solid & between(view, settings.depth_min_m, settings.depth_max_m)
+    gated = solid & between(view, depth_min_m, settings.depth_max_m)
     ends = on_border(gated) | goes_on(gated, solid & ~gated, view.depth, jump)
-    radius_px = _inscribed_radius_px(view.depth > 0, solid)
-    pitch = view.step_px / view.camera.fx
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(gated.view(np.uint8), connectivity=8)
+    parts = _Parts(view, np.asarray(labels), np.asarray(stats), ends)
+    if box is not None:
+        within = _within(view, box)
+        chosen = _seen_part(parts, within)
+        candidates = [] if chosen is None else [chosen]
+    else:
+        within = None
+        least_px = _AREA_MIN_M2 / (_pitch(view) * settings.depth_max_m) ** 2
+        areas = parts.stats[:, cv2.CC_STAT_AREA]
+        candidates = [part for part in range(1, len(areas)) if areas[part] >= least_px]
 
     found = None
-    for surface in components(gated, _AREA_MIN_M2 / (pitch * settings.depth_max_m) ** 2):
-        part, place = crop_view(view, surface, margin=3)
-        radius_m = radius_px[place] * part.depth * np.float32(pitch * view.scale_m)
-        located = _locate_on(part, surface[place], ends[place], radius_m, settings.forearm_m)
+    for part in candidates:
+        limb, place = _limb(parts, part)
+        likely = None if within is None else within[place][limb.pixels]
+        located = _locate_on(limb, likely, settings, depth_min_m)
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
-        if nearest and _is_plausible(located, pitch):
+        if nearest and _is_plausible(located):
             found = located
+            if within is not None:
+                _check_arm(located, within[place])
+    if found is None and box is not None:
+        raise HandError(
+            "what the detector sees as a hand has not the shape of one in the depth image; "
+            "show the whole bare hand, clear of other things"
+        )
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
@@ -98,120 +162,190 @@ def locate_hand(view: DepthView, settings: SegmentSettings) -> LocatedHand:
     return found
 
 
-def _is_plausible(located: LocatedHand, pitch: float) -> bool:
-    area_m2 = np.count_nonzero(located.hand) * (pitch * located.palm_m[2]) ** 2
+def _pitch(view: DepthView) -> float:
+    """Return the distance of neighbouring pixels of a view at a depth of 1 m."""
+    return view.step_px / view.camera.fx
+
+
+def _is_plausible(located: LocatedHand) -> bool:
+    area_m2 = np.count_nonzero(located.hand) * (_pitch(located.view) * located.palm_m[2]) ** 2
     has_palm = _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
     return bool(has_palm and area_m2 >= _AREA_MIN_M2)
 
 
+def _check_arm(located: LocatedHand, within: Float32) -> None:
+    """Raise HandError if much of what is in the middle of a hand's box would be arm."""
+    arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
+    if arm > _ARM_IN_BOX_MAX * (arm + hand):
+        raise HandError(
+            "the wrist cannot be told in the depth image; turn the palm or the back of the hand to "
+            "the camera"
+        )
+
+
+def _within(view: DepthView, box: Box) -> Float32:
+    """Return how well each pixel of a view lies within a box: 1 in its middle, (h, w)."""
+    height, width = view.depth.shape
+    across, down = (
+        np.exp(-0.5 * ((low + view.step_px * np.arange(count) - middle) / sigma) ** 2)
+        for low, count, middle, sigma in (
+            (view.box[0], width, (box[0] + box[2]) / 2, _BOX_SIGMA * (box[2] - box[0])),
+            (view.box[1], height, (box[1] + box[3]) / 2, _BOX_SIGMA * (box[3] - box[1])),
+        )
+    )
+    return down.astype(np.float32)[:, None] * across.astype(np.float32)
+
+
+def _seen_part(parts: _Parts, within: Float32) -> int | None:
+    """Return the part that fills the middle of a box, of those nearest in it."""
+    in_box = np.flatnonzero((within > _IN_BOX) & (parts.labels > 0))
+    if not len(in_box):
+        return None
+    depth = parts.view.depth.ravel()[in_box]
+    rank = int(_NEAREST * len(depth))
+    nearest = depth < np.partition(depth, rank)[rank] + _LAYER_M / parts.view.scale_m
+    chosen = in_box[nearest]
+    labels, weights = parts.labels.ravel()[chosen], within.ravel()[chosen]
+    return int(np.argmax(np.bincount(labels, weights)))
+
+
+def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
+    """Return a part with those that belong to the same limb, and its place in the view."""
+    view = parts.view
+    surface = parts.labels == main
+    pitch_m = _pitch(view) * float(view.depth[surface].mean()) * view.scale_m
+    size_px = parts.stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    may_join = parts.stats[:, cv2.CC_STAT_AREA] >= PART_M2 / pitch_m**2
+    may_join &= size_px <= _HAND_REACH_M / pitch_m
+    may_join[[0, main]] = False
+    if may_join.any():
+        surface = _joined(parts, surface, may_join, max(1, round(_GAP_M / pitch_m)))
+    part_view, place = crop_view(view, surface, margin=3)
+    surface = np.ascontiguousarray(surface[place])
+    closed = cv2.morphologyEx(surface.view(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS, iterations=2)
+    pixels = pixels_of(surface)
+    points_m = deproject(part_view, *pixels)
+    # Infinite without an edge.
+    radius_px = np.minimum(cv2.distanceTransform(closed, cv2.DIST_L2, 5)[pixels], max(closed.shape))
+    radius_m = radius_px * points_m[2] * np.float32(_pitch(view))
+    return _Limb(part_view, pixels, points_m, radius_m, parts.ends[place][pixels]), place
+
+
+def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int) -> Bool:
+    """Return a surface with those parts that lie beside it at nearly the same depth."""
+    view, is_limb = parts.view, np.zeros(len(parts.stats), bool)
+    near = _widened(surface, gap_px)
+    beside = np.bincount(parts.labels[near], minlength=len(parts.stats)) > 0
+    for part in np.flatnonzero(may_join & beside):
+        other = near & (parts.labels == part)
+        opposite = surface & _widened(other, gap_px)
+        jump = view.depth[other].mean() - view.depth[opposite].mean()
+        is_limb[part] = abs(jump) * view.scale_m <= _JUMP_M
+    return surface | is_limb[parts.labels]
+
+
+def _widened(mask: Bool, by_px: int) -> Bool:
+    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
+    return cv2.dilate(mask.view(np.uint8), square).view(bool)
+
+
 def _locate_on(
-    view: DepthView, surface: Bool, ends: Bool, radius_m: Float32, forearm_m: float
+    limb: _Limb, likely: Float32 | None, settings: SegmentSettings, depth_min_m: float
 ) -> LocatedHand:
-    """Find palm and wrist on one surface, which continues out of view where `ends` is set."""
-    rows, columns = np.ogrid[: surface.shape[0], : surface.shape[1]]
-    points_m = deproject(view, rows, columns)
-    arm_end = _arm_end(surface, ends, points_m, radius_m)
-    tip_m = _farthest(surface, points_m, points_m[:, arm_end].mean(axis=1))
-    near_tip = surface & (_distance(points_m, tip_m) < _TIP_TO_PALM_M)
-    palm_m, palm_radius_m = _palm(near_tip, points_m, radius_m)
+    """Find palm and wrist on one surface; the palm where `likely` (N,), or near its tip."""
+    points_m = limb.points_m
+    arm_m = _arm_end(limb)
+    if likely is None:
+        likely = (_distance(points_m, _farthest(limb, arm_m)) < _TIP_TO_PALM_M).astype(np.float32)
+    palm_m, palm_radius_m = _palm(limb, likely)
+    from_palm_m = points_m - palm_m[:, None]
+    area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
+    axis, wrist_m = _wrist(from_palm_m, area_m2, palm_m, arm_m - palm_m)
+    limit_m = wrist_m + settings.forearm_m
+    is_arm = axis @ from_palm_m > limit_m
+    if not (limb.radius_m[is_arm] >= _ARM_RADIUS_M).any():  # too thin for an arm: fingers
+        is_arm, limit_m = np.zeros_like(is_arm), np.inf
+    hand, arm = (np.zeros(limb.view.depth.shape, bool) for _ in range(2))
+    hand[limb.pixels] = ~is_arm & (_distance(points_m, palm_m) < _HAND_REACH_M)
+    arm[limb.pixels] = is_arm
+    return LocatedHand(
+        limb.view,
+        hand,
+        arm,
+        palm_m.astype(np.float64),
+        palm_radius_m,
+        axis.astype(np.float64),
+        limit_m,
+        depth_min_m,
+    )
 
-    from_palm_m = _distance(points_m, palm_m)
-    arm = component_of(surface & (from_palm_m > palm_radius_m + _PALM_TO_ARM_M), arm_end)
-    wrist_m = _palm_to_wrist(surface, arm, palm_m, points_m, from_palm_m, radius_m)
-    limit_m = wrist_m + forearm_m
-    arm = component_of(surface & (from_palm_m > limit_m), arm_end)
-    if not (radius_m[arm] >= _PALM_RADIUS_M[0]).any():  # too thin for an arm: a finger
-        arm = np.zeros_like(arm)
-    hand = surface & ~arm & (from_palm_m < _HAND_REACH_M)
-    return LocatedHand(view, hand, arm, palm_m.astype(np.float64), palm_radius_m, limit_m)
 
+def _arm_end(limb: _Limb) -> Float32:
+    """Return where the arm leaves the view: the mean of the places where the surface continues.
 
-def _arm_end(surface: Bool, ends: Bool, points_m: Float32, radius_m: Float32) -> Bool:
-    """Return where the arm leaves the view: the widest place at which the surface continues.
-
-    If it continues nowhere, this is the thicker of the surface's two tips, as fingers are thin.
+    Wide places count more, as fingers are thin. If it continues nowhere, this is the thicker of the
+    surface's two tips.
     """
-    places = components(surface & ends)
-    if places:
-        return places[0]
-    tip_m = points_m[:, surface].mean(axis=1)
+    if limb.at_end.any():
+        weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
+        return np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
+    tip_m = limb.points_m.mean(axis=1)
     tips = []
     for _ in range(2):
-        tip_m = _farthest(surface, points_m, tip_m)
-        tips.append(surface & (_distance(points_m, tip_m) < _TIP_M))
-    return max(tips, key=lambda tip: float(radius_m[tip].mean()))
+        tip_m = _farthest(limb, tip_m)
+        tips.append(_distance(limb.points_m, tip_m) < _TIP_M)
+    thicker = max(tips, key=lambda tip: float(limb.radius_m[tip].mean()))
+    return np.asarray(limb.points_m[:, thicker].mean(axis=1), np.float32)
 
 
-def _farthest(surface: Bool, points_m: Float32, from_m: Float32) -> Float32:
-    distance_m = np.where(surface, _distance(points_m, from_m), 0)
-    farthest: Float32 = points_m.reshape(3, -1)[:, np.argmax(distance_m)]
+def _farthest(limb: _Limb, from_m: Float32) -> Float32:
+    farthest: Float32 = limb.points_m[:, np.argmax(_distance(limb.points_m, from_m))]
     return farthest
 
 
-def _palm(near_tip: Bool, points_m: Float32, radius_m: Float32) -> tuple[Float32, float]:
-    """Return centre and radius of the largest inscribed circle."""
-    inscribed_m = np.where(near_tip, radius_m, 0)
-    best = np.unravel_index(np.argmax(inscribed_m), inscribed_m.shape)
-    palm_radius_m = float(inscribed_m[best])
-    # Averaged over the top of the distance map: a single pixel is too coarse for the cut.
-    top = (inscribed_m > 0.95 * palm_radius_m) & (
-        _distance(points_m, points_m[:, best[0], best[1]]) < palm_radius_m
-    )
-    return points_m[:, top].mean(axis=1), palm_radius_m
+def _palm(limb: _Limb, likely: Float32) -> tuple[Float32, float]:
+    """Return centre and radius of the palm: the mean place of nearly the largest circles.
 
-
-def _palm_to_wrist(
-    surface: Bool,
-    arm: Bool,
-    palm_m: Float32,
-    points_m: Float32,
-    from_palm_m: Float32,
-    radius_m: Float32,
-) -> float:
-    """Return the distance from the palm's centre to the wrist, along the arm.
-
-    In shells about the palm the inscribed radius falls to that of the wrist, then grows along the
-    forearm. The wrist is placed where the fall ends, because the minimum itself is too flat to be
-    located repeatably.
+    It is looked for where it is likely, then near the one found, so that it depends on the limb.
     """
-    near_palm = surface & (from_palm_m < _PALM_TO_WRIST_MAX_M)
-    near_arm = arm & near_palm
-    if not near_arm.any():
-        return _PALM_TO_WRIST_MAX_M
-    weight = radius_m[near_arm] ** 2  # a thumb next to the arm is thin
-    axis = (points_m[:, near_arm] - palm_m[:, None]) @ weight
-    axis /= np.linalg.norm(axis)
-    along_axis_m = np.tensordot(axis, points_m, 1) - axis @ palm_m
-    armward = near_palm & (along_axis_m > _ARMWARD_COS * from_palm_m)
-    shell = (from_palm_m[armward] / _SHELL_M).astype(int)
-    # Same type as radius_m: ufunc.at is thirty times slower otherwise.
-    profile_m = np.zeros(1 + int(_PALM_TO_WRIST_MAX_M / _SHELL_M), radius_m.dtype)
-    np.maximum.at(profile_m, shell, radius_m[armward])
-    return _end_of_fall(profile_m.astype(np.float64)) * _SHELL_M + _WRIST_BEYOND_M
+    inner = limb.radius_m > _PALM_TOP * (limb.radius_m * likely).max()
+    points_m, radius_m, likely = limb.points_m[:, inner], limb.radius_m[inner], likely[inner]
+    for _ in range(_PALM_STEPS):
+        fit_m = radius_m * likely
+        top = fit_m > _PALM_TOP * fit_m.max()
+        weight = (fit_m[top] - _PALM_TOP * fit_m.max()) ** 2
+        weight /= max(float(weight.sum()), 1e-12)
+        palm_m = points_m[:, top] @ weight
+        likely = np.exp(-0.5 * (_distance(points_m, palm_m) / _PALM_SIGMA_M) ** 2)
+    return palm_m, float(weight @ radius_m[top])
 
 
-def _end_of_fall(profile_m: Float64) -> float:
-    """Return the shell at which the smoothed profile has nearly fallen to its minimum."""
-    kernel = np.ones(_SMOOTH_SHELLS)
-    seen = np.convolve(profile_m > 0, kernel, "same")
-    smooth_m = np.convolve(profile_m, kernel, "same") / np.maximum(seen, 1)
-    smooth_m[profile_m == 0] = np.inf
-    narrowest = int(np.argmin(smooth_m))
-    level_m = _WRIST_NARROW * smooth_m[narrowest]
-    wide = np.flatnonzero(smooth_m[:narrowest] > level_m)
-    if not len(wide) or not np.isfinite(smooth_m[wide[-1]]):
-        return narrowest + 0.5
-    last = wide[-1]
-    drop_m = smooth_m[last] - smooth_m[last + 1]
-    return float(last + 0.5 + (smooth_m[last] - level_m) / drop_m)
-
-
-def _inscribed_radius_px(measured: Bool, solid: Bool) -> Float32:
-    """Return each pixel's distance in pixels to the surface's edge, pinholes closed."""
-    closed = cv2.morphologyEx(solid.astype(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS)
-    closed[measured & ~solid] = 0
-    distance_px = cv2.distanceTransform(closed, cv2.DIST_L2, 5)
-    return np.minimum(distance_px, np.float32(max(solid.shape)))  # infinite without an edge
+def _wrist(
+    from_palm_m: Float32, area_m2: Float32, palm_m: Float32, toward_arm_m: Float32
+) -> tuple[Float32, float]:
+    """Return the forearm's axis and the distance of the wrist along it; infinite without an arm."""
+    axis = toward_arm_m / max(float(np.linalg.norm(toward_arm_m)), 1e-9)
+    for _ in range(_AXIS_STEPS):
+        along_m = axis @ from_palm_m
+        weight = area_m2 * np.exp(-0.5 * ((along_m - _ARM_M) / _ARM_SIGMA_M) ** 2)
+        center_m = from_palm_m @ weight
+        axis = center_m / max(float(np.linalg.norm(center_m)), 1e-12)
+    along_m = axis @ from_palm_m
+    # Seen at an angle, a limb's length is foreshortened, and so is its area.
+    forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
+    cosine = max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - forward**2))))
+    start_m, end_m = _PROFILE_M
+    bins = round((end_m - start_m) / _BIN_M)
+    place = np.floor((along_m - start_m) / _BIN_M).astype(int)
+    kept = (place >= 0) & (place < bins)
+    width_m = np.bincount(place[kept], area_m2[kept], bins) / (_BIN_M * cosine)
+    width_m = np.convolve(width_m, _SMOOTHING, "same")
+    at_m = start_m + _BIN_M * (np.arange(bins) + 0.5)
+    if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
+        return axis, np.inf
+    likely = np.exp(-0.5 * ((at_m - _WRIST_M) / _WRIST_SIGMA_M) ** 2 - width_m / _WIDTH_SCALE_M)
+    likely *= np.minimum(width_m / _LIMB_WIDTH_M, 1.0) ** 2
+    return axis, float(likely @ at_m / likely.sum())
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from handcal.errors import HandError
-from handcal.hand.locate import LocatedHand
+from handcal.hand.locate import PART_M2, LocatedHand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
 from handcal.hand.view import (
@@ -24,6 +24,10 @@ from handcal.types import Bool, Frame, UInt8
 
 # Share of the hand's outline that may touch the image border.
 _BORDER_CONTACT_M = 0.01
+# Share of a part's contour on the coarse hand.
+_PART_MIN = 0.4
+_HAND, _MAY_BE_HAND, _MAY_BE_ARM = np.uint8(1), np.uint8(2), np.uint8(4)
+_LEAST_CONTOUR_PX = 4  # a shorter contour encloses nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,17 +57,18 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     HandError
         If the image does not show the whole hand.
     """
-    view, may_be_hand, may_be_arm = _full_resolution(located, frame)
+    view, is_hand, may_be_hand, may_be_arm = _full_resolution(located, frame)
     jump = round(settings.edge_jump_m / view.scale_m)
     pitch_m = float(located.palm_m[2]) / view.camera.fx
     solid = solid_surface(view.depth, jump)
-    within = solid & may_be_hand & between(view, settings.depth_min_m, settings.depth_max_m)
+    within = solid & may_be_hand & between(view, located.depth_min_m, settings.depth_max_m)
     near_wrist = pixels_of(within & may_be_arm)
-    from_palm_m = np.linalg.norm(deproject(view, *near_wrist).T - located.palm_m, axis=1)
-    within[near_wrist] = from_palm_m <= located.limit_m
-    if not within.any():
+    along_m = (deproject(view, *near_wrist).T - located.palm_m) @ located.axis
+    within[near_wrist] = along_m <= located.limit_m
+    outlined = _outline(within, is_hand, settings.hole_area_m2 / pitch_m**2, PART_M2 / pitch_m**2)
+    if outlined is None:
         raise HandError("the depth image is too sparse where the hand is; check the camera")
-    outline, filled = _outline(within, settings.hole_area_m2 / pitch_m**2)
+    outline, filled = outlined
     surface = within & (filled > 0)
     if _border_contact_px(surface, view) * pitch_m > _BORDER_CONTACT_M:
         raise HandError("hand cut by the image border; move it toward the middle")
@@ -71,40 +76,57 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     return HandMask(view, surface, filled, outline, cut, pitch_m)
 
 
-def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool]:
-    """Return the image around the hand, with the candidate pixels of hand and arm."""
+def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool, Bool]:
+    """Return the image around the hand, the coarse hand in it, and candidates of hand and arm."""
     coarse, place = crop_view(located.view, located.hand, margin=3)
     view = view_depth(frame, coarse.box)
-    hand, arm = (
-        _enlarged(part[place], coarse.step_px, view) for part in (located.hand, located.arm)
-    )
-    return view, hand, arm
-
-
-def _enlarged(mask: Bool, step_px: int, view: DepthView) -> Bool:
-    """Dilate a coarse mask by two pixels and resample it to the size of a view."""
-    wider = cv2.dilate(mask.astype(np.uint8), NEIGHBOURS, iterations=2)
+    hand, arm = (one[place].astype(np.uint8) for one in (located.hand, located.arm))
+    # Together, as each resampling takes as long as the rest.
+    coded = _HAND * hand + _MAY_BE_HAND * _wider(hand) + _MAY_BE_ARM * _wider(arm)
     height, width = view.depth.shape
-    size = step_px * mask.shape[1], step_px * mask.shape[0]
-    return cv2.resize(wider, size, interpolation=cv2.INTER_NEAREST)[:height, :width].astype(bool)
+    size = coarse.step_px * coded.shape[1], coarse.step_px * coded.shape[0]
+    coded = cv2.resize(coded, size, interpolation=cv2.INTER_NEAREST)[:height, :width]
+    is_hand, may_be_hand, may_be_arm = (
+        (coded & part) != 0 for part in (_HAND, _MAY_BE_HAND, _MAY_BE_ARM)
+    )
+    return view, is_hand, may_be_hand, may_be_arm
 
 
-def _outline(within: Bool, hole_area_px: float) -> tuple[Pixels, UInt8]:
-    """Return the outer contour of the largest part, and that part with small holes closed.
+def _wider(mask: UInt8) -> UInt8:
+    """Dilate a coarse mask by two pixels."""
+    return np.asarray(cv2.dilate(mask, NEIGHBOURS, iterations=2), np.uint8)
 
-    Border following as in Suzuki & Abe, "Topological structural analysis of digitized binary
-    images by border following", 1985.
+
+def _outline(
+    within: Bool, is_hand: Bool, hole_area_px: float, part_px: float
+) -> tuple[Pixels, UInt8] | None:
+    """Return the outer contour of the largest part, and all parts with small holes closed.
+
+    Parts with most of their contour outside `is_hand` are of something beside the hand. None if no
+    part is left, of at least `part_px`. Border following as in Suzuki & Abe, "Topological
+    structural analysis of digitized binary images by border following", 1985.
     """
-    mask = np.where(within, np.uint8(255), np.uint8(0))
+    mask = within.view(np.uint8) * np.uint8(255)
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    is_hole = hierarchy.reshape(-1, 4)[:, 3] >= 0
-    areas = np.array([cv2.contourArea(contour) for contour in contours])
-    outer = contours[int(np.argmax(np.where(is_hole, -1.0, areas)))]
-    small_holes = [contours[int(i)] for i in np.flatnonzero(is_hole & (areas <= hole_area_px))]
+    parts, small_holes = [], []
+    for contour, (_, _, _, parent) in zip(contours, hierarchy[0] if contours else (), strict=True):
+        area_px = cv2.contourArea(contour) if len(contour) > _LEAST_CONTOUR_PX else 0.0
+        if parent >= 0:
+            if area_px <= hole_area_px:
+                small_holes.append(contour)
+        elif area_px >= part_px:
+            columns, rows = contour.reshape(-1, 2).T
+            if is_hand[rows, columns].mean() >= _PART_MIN:
+                parts.append(contour)
+    if not parts:
+        return None
     cv2.drawContours(mask, small_holes, -1, 255, cv2.FILLED)
-    inside = cv2.drawContours(np.zeros_like(mask), [outer], 0, 255, cv2.FILLED)
-    columns, rows = outer.reshape(-1, 2).astype(np.intp).T
-    return (rows, columns), mask & inside
+    mask &= cv2.drawContours(np.zeros_like(mask), parts, -1, 255, cv2.FILLED)
+    if len(parts) > 1:  # the gap that a depth jump leaves between two parts of a hand
+        mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, NEIGHBOURS), np.uint8)
+        parts, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    columns, rows = max(parts, key=cv2.contourArea).reshape(-1, 2).astype(np.intp).T
+    return (rows, columns), mask
 
 
 def _border_contact_px(surface: Bool, view: DepthView) -> int:

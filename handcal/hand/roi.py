@@ -7,10 +7,11 @@ from typing import Protocol
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from handcal.geometry import camera_matrix, image_points, invert, transform
 from handcal.hand.detect import Detections, overlaps
-from handcal.hand.settings import Roi, SegmentSettings
+from handcal.hand.settings import NEARER_M, Roi, SegmentSettings
 from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
 from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 
@@ -19,6 +20,8 @@ _PIXELS_MIN = 6
 _DEPTH_SPREAD_M = 0.10  # within one hand
 _SAME_OVERLAP = 0.3
 _SHIFTS, _STILL_PX = 3, 1.0
+_MEASURED_MIN = 0.1  # least share of a box with depth, to say how far it is
+_NOT_SEEN = "no hand is seen in the colour image; raise the bare hand in front of the camera"
 
 
 class Detector(Protocol):
@@ -79,6 +82,11 @@ class RoiFinder:
     segmenting : SegmentSettings
         Its depth gate limits the search; its `roi` selects among several hands.
     settings : RoiSettings, optional
+
+    Attributes
+    ----------
+    problem : str
+        Why the last frame gave no hand, and what to do.
     """
 
     def __init__(
@@ -88,7 +96,8 @@ class RoiFinder:
         settings: RoiSettings | None = None,
     ) -> None:
         self._detector = detector
-        self._gate_m = segmenting.depth_min_m, segmenting.depth_max_m
+        self.problem = _NOT_SEEN
+        self._gate_m = segmenting.depth_min_m - NEARER_M, segmenting.depth_max_m
         self._wanted = segmenting.roi
         self._settings = settings or RoiSettings()
         self._track: _Track | None = None
@@ -138,6 +147,7 @@ class RoiFinder:
         A hand seen only in the whole image would soon be dropped and detected again.
         """
         height, width = color.shape[:2]
+        self.problem = _NOT_SEEN
         hands = self._hands(color, (0, 0, width, height), None, cloud)
         least = self._settings.sure_min * max((hand.score for hand in hands), default=0.0)
         sure = sorted((hand for hand in hands if hand.score >= least), key=self._order)
@@ -160,21 +170,32 @@ class RoiFinder:
         hands: list[_Track] = []
         for box, score in zip(boxes, found.scores, strict=True):
             hand = cloud.track(box, float(score))
-            if hand is None or not self._is_plausible(hand, cloud):
+            problem = (
+                cloud.problem(box, self._settings.side_max_m)
+                if hand is None
+                else self._problem(hand, box, cloud)
+            )
+            if hand is None or problem:
+                if self.problem == _NOT_SEEN:  # that of the surest
+                    self.problem = problem
                 continue
             if not any(_on_one_hand(hand, surer) for surer in hands):
                 hands.append(hand)
         return hands
 
-    def _is_plausible(self, track: _Track, cloud: _CoarseCloud) -> bool:
-        """Return whether the content of a box has a hand's size and fills the box like a hand."""
+    def _problem(self, track: _Track, color_box: Float64, cloud: _CoarseCloud) -> str:
+        """Return why the content of a box has not a hand's size or does not fill the box."""
         settings = self._settings
         side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
-        side_m = side_px * track.depth_m / cloud.camera.fx
-        filled = track.pixels * _STEP_PX**2 / side_px**2
-        return bool(
-            settings.side_min_m <= side_m <= settings.side_max_m and filled >= settings.filled_min
-        )
+        side_m = float(side_px * track.depth_m / cloud.camera.fx)
+        if not settings.side_min_m <= side_m <= settings.side_max_m:
+            return (
+                f"what looks like a hand {track.depth_m:.2f} m away is {100 * side_m:.0f} cm "
+                "large; show the bare hand"
+            )
+        if track.pixels * _STEP_PX**2 < settings.filled_min * side_px**2:
+            return cloud.problem(color_box, settings.side_max_m)
+        return ""
 
     def _order(self, track: _Track) -> float:
         if self._wanted in ("left", "right"):
@@ -193,13 +214,14 @@ class _CoarseCloud:
         self._aligned = self.camera == self._color_camera and bool((np.eye(4) == self._T_C_D).all())
         whole = 0, 0, self.camera.width, self.camera.height
         self._view = view_depth(frame, whole, _STEP_PX)
+        self._gate_m = gate_m
         self._rows, self._columns = pixels_of(between(self._view, *gate_m))
         self._px = _STEP_PX * np.column_stack([self._columns, self._rows]).astype(np.float64)
         self._depth_m = self._view.depth[self._rows, self._columns] * self._view.scale_m
 
     def track(self, color_box: Float64, score: float) -> _Track | None:
         """Return the nearest object in a box of the colour image."""
-        inside = _inside(self._color_px(), color_box)
+        inside = _inside(self._color_px(self._rows, self._columns), color_box)
         if np.count_nonzero(inside) < _PIXELS_MIN:
             return None
         nearest_m = np.quantile(self._depth_m[inside], 0.1)
@@ -208,6 +230,36 @@ class _CoarseCloud:
         box = self._in_depth(color_box, depth_m)
         offset = self._px[inside].mean(0) - _center(box)
         return _Track(score, box, depth_m, offset, int(np.count_nonzero(inside)))
+
+    def problem(self, color_box: Float64, size_max_m: float) -> str:
+        """Return why a box of the colour image holds no object of its size within the gate."""
+        rows, columns = pixels_of(self._view.depth > 0)
+        inside = _inside(self._color_px(rows, columns), color_box)
+        depth_m = self._view.depth[rows, columns][inside] * self._view.scale_m
+        side_px = np.prod(color_box[2:] - color_box[:2]) / _STEP_PX**2
+        if len(depth_m) < max(_PIXELS_MIN, _MEASURED_MIN * side_px):
+            return (
+                "the depth camera measures nothing where the hand is; move the hand, or out of "
+                "strong light"
+            )
+        near_m, far_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
+        nearest_m = np.quantile(depth_m, 0.1)
+        hand_m = float(np.median(depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]))
+        if hand_m < near_m:
+            back_cm = 100 * (near_m - hand_m)
+            return f"the hand is too near, at {hand_m:.2f} m; move it back by {back_cm:.0f} cm"
+        if (
+            np.sqrt(np.prod(color_box[2:] - color_box[:2])) * hand_m
+            > size_max_m * self._color_camera.fx
+        ):
+            return (
+                f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
+                "is; move the hand, or further from the camera"
+            )
+        if hand_m > far_m:
+            forward_cm = 100 * (hand_m - far_m)
+            return f"the hand is too far, at {hand_m:.2f} m; bring it nearer by {forward_cm:.0f} cm"
+        return "most of the hand is hidden or without depth; show all of it to the camera"
 
     def follow(self, track: _Track) -> _Track | None:
         """Move a track's box with the pixels in it; None if most of them are gone."""
@@ -249,11 +301,11 @@ class _CoarseCloud:
         x1, y1 = min(x1, self.camera.width), min(y1, self.camera.height)
         return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
 
-    def _color_px(self) -> Float64:
-        """Return the pixels' coordinates in the colour image, (N, 2)."""
+    def _color_px(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Float64:
+        """Return coordinates of coarse pixels in the colour image, (N, 2)."""
         if self._aligned:
-            return self._px
-        points_m = deproject(self._view, self._rows, self._columns).T
+            return _STEP_PX * np.column_stack([columns, rows]).astype(np.float64)
+        points_m = deproject(self._view, rows, columns).T
         return image_points(transform(self._T_C_D, points_m), self._color_camera)
 
     def _in_depth(self, color_box: Float64, depth_m: float) -> Float64:

@@ -46,7 +46,7 @@ def segment_hand(frame: Frame, settings: SegmentSettings, roi_px: Box | None = N
     """
     camera = frame.depth_intrinsics
     window = segmented_window(roi_px, camera, settings)
-    located = locate_hand(view_depth(frame, window, _coarse_step_px(camera)), settings)
+    located = locate_hand(view_depth(frame, window, _coarse_step_px(camera)), settings, roi_px)
     return _cloud(frame, mask_hand(frame, located, settings), settings)
 
 

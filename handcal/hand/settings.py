@@ -8,6 +8,9 @@ from typing import Literal
 # Fewer points cannot be registered; more than 50,000 cannot be sent to the headset.
 _LEAST_POINTS, _MOST_POINTS = 200, 40_000
 
+NEARER_M = 0.05
+"""A hand that the detector has seen may be this much nearer than the depth gate."""
+
 Roi = Literal["detector", "left", "right", "depth"]
 
 

@@ -29,8 +29,10 @@ def solid_surface(depth: UInt16, jump: int) -> Bool:
     -------
     (h, w) bool
     """
-    measured = depth > 0
-    return measured & (behind_nearest(depth, measured) <= jump)
+    shifted = depth - np.uint16(1)  # unmeasured pixels become the farthest
+    behind = cv2.subtract(shifted, cv2.erode(shifted, NEIGHBOURS))
+    solid: Bool = (behind <= jump) & (depth > 0)
+    return solid
 
 
 def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
@@ -85,7 +87,7 @@ def on_border(mask: Bool) -> Bool:
 
 def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
     """Return the 8-connected components of `mask` of at least that area, largest first."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest_first = np.argsort(-areas, kind="stable")
     return [labels == 1 + i for i in largest_first if areas[i] >= area_min_px]
@@ -93,7 +95,7 @@ def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
 
 def component_of(mask: Bool, seed: Bool) -> Bool:
     """Return the 8-connected component of `mask` that holds given neighbouring pixels, if any."""
-    _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    _, labels = cv2.connectedComponents(mask.view(np.uint8), connectivity=8)
     at_seed = labels[mask & seed]
     part: Bool = labels == at_seed[0] if at_seed.size else np.zeros_like(mask)
     return part

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from handcal.errors import FileError
+from handcal.hand.settings import Roi
 from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]
@@ -78,6 +79,17 @@ class UserTestSettings:
     """Sessions, and folders of sessions."""
     output: str = "results/users"
     """Folder for the report."""
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentationTestSettings:
+    """Settings of a test of the segmentation on frames with true masks."""
+
+    folder: str = ""
+    """Folder of the frames, as `read_masked_frames` reads it."""
+    roi: Roi = "detector"
+    sheet: str = ""
+    """PNG for a contact sheet of the frames; empty for none."""
 
 
 def output_folder(text: str) -> Path:

@@ -8,7 +8,7 @@ from handcal.hand.detect import Detections
 from handcal.hand.finder import HandFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.hand.view import Box
-from handcal.types import Frame, UInt8
+from handcal.types import Frame, HandCloud, UInt8
 
 from .conftest import CAMERA, shoot
 
@@ -33,6 +33,12 @@ def coloured(frame: Frame) -> Frame:
     return replace(frame, color=color, color_intrinsics=CAMERA)
 
 
+def agreement(found: HandCloud, expected: HandCloud) -> float:
+    """Return the intersection over union of two masks."""
+    both, either = found.mask & expected.mask, found.mask | expected.mask
+    return np.count_nonzero(both) / np.count_nonzero(either)
+
+
 @pytest.fixture(scope="module")
 def frame() -> Frame:
     return coloured(shoot().frame)
@@ -44,8 +50,8 @@ def test_the_detectors_hand_is_the_one_that_depth_alone_finds(frame: Frame) -> N
     third = (x1 - x0) // 6  # a box as poor as a detector's may be
     seen = Eyes((x0 + third, y0 + third, x1 - third, y1))
     found = HandFinder(SETTINGS, seen).find(frame)
-    assert np.array_equal(found.mask, expected.mask)
-    assert np.array_equal(found.points_m, expected.points_m)
+    assert agreement(found, expected) > 0.98
+    assert abs(found.points_m.mean(axis=0) - expected.points_m.mean(axis=0)).max() < 0.001
 
 
 def test_of_two_hands_the_one_that_the_detector_sees(frame: Frame) -> None:
@@ -56,15 +62,18 @@ def test_of_two_hands_the_one_that_the_detector_sees(frame: Frame) -> None:
     seen = segment_hand(frame, SETTINGS)
     assert segment_hand(two, SETTINGS).box_px[2] <= width  # by depth alone the other is taken
     found = HandFinder(SETTINGS, Eyes(seen.box_px)).find(two)
-    assert np.array_equal(found.mask, seen.mask)
+    assert agreement(found, seen) > 0.98
 
 
-def test_a_box_that_cuts_the_hand_is_not_trusted(frame: Frame) -> None:
+@pytest.mark.parametrize("part", [(0, 0.5, 1, 1), (0, 0, 1, 0.5), (0.5, 0, 1, 1), (0, 0.3, 1, 1.3)])
+def test_a_box_that_cuts_the_hand_gives_the_whole_hand(
+    frame: Frame, part: tuple[float, float, float, float]
+) -> None:
     expected = segment_hand(frame, SETTINGS)
     x0, y0, x1, y1 = expected.box_px
-    lower_half = Eyes((x0, (y0 + y1) // 2, x1, y1))
-    found = HandFinder(SETTINGS, lower_half).find(frame)
-    assert np.array_equal(found.mask, expected.mask)
+    seen = np.array([x0, y0, x0, y0]) + np.array(part) * [x1 - x0, y1 - y0, x1 - x0, y1 - y0]
+    found = HandFinder(SETTINGS, Eyes((*seen.astype(int).tolist(),))).find(frame)
+    assert agreement(found, expected) > 0.94
 
 
 def test_without_a_detector_or_colour_depth_decides(frame: Frame) -> None:
@@ -74,7 +83,42 @@ def test_without_a_detector_or_colour_depth_decides(frame: Frame) -> None:
     assert np.array_equal(HandFinder(SETTINGS, Eyes((0, 0, 9, 9))).find(blind).mask, expected)
 
 
-def test_says_that_there_is_no_hand(frame: Frame) -> None:
-    empty = replace(frame, depth=np.full_like(frame.depth, 1500))
-    with pytest.raises(HandError, match="no hand-sized object"):
-        HandFinder(SETTINGS, Eyes((100, 100, 300, 300))).find(empty)
+def moved(frame: Frame, by_m: float) -> Frame:
+    """Return a frame with everything measured that much further away."""
+    depth = np.where(
+        frame.depth > 0, frame.depth.astype(int) + round(by_m / frame.depth_scale_m), 0
+    )
+    return replace(frame, depth=depth.clip(0, 65535).astype(np.uint16))
+
+
+def test_where_the_detector_sees_a_hand_the_reason_names_what_is_there(frame: Frame) -> None:
+    seen = segment_hand(frame, SETTINGS)
+    eyes = Eyes(seen.box_px)
+    x0, y0, x1, y1 = seen.box_px
+    hole = frame.depth.copy()
+    hole[y0:y1, x0:x1] = 0
+    for there, reason in (
+        (moved(frame, -0.25), r"too near, at 0\.2\d m; move it back by (8|9|10|11) cm"),
+        (moved(frame, 0.25), r"too far, at 0\.7\d m; bring it nearer by [4-7] cm"),
+        (replace(frame, depth=hole), "measures nothing where the hand is"),
+        (replace(frame, depth=np.full_like(hole, 15000)), "only the background, at 1.50 m"),
+    ):
+        with pytest.raises(HandError, match=reason):
+            HandFinder(SETTINGS, eyes).find(there)
+
+
+def test_another_thing_is_never_taken_for_the_hand_that_the_detector_sees(frame: Frame) -> None:
+    elsewhere = Eyes((20, 20, 160, 180))
+    with pytest.raises(HandError, match="only the background"):
+        HandFinder(SETTINGS, elsewhere).find(frame)
+    blind = Eyes((0, 0, 0, 0))
+    with pytest.raises(HandError, match=r"no hand is seen|only the background|measures nothing"):
+        HandFinder(SETTINGS, blind).find(frame)
+
+
+def test_a_detected_hand_may_be_a_little_nearer_than_the_gate(frame: Frame) -> None:
+    seen = segment_hand(frame, SETTINGS)
+    nearest_m = float(seen.points_m[:, 2].min())
+    narrow = SegmentSettings(depth_min_m=nearest_m + 0.02)
+    found = HandFinder(narrow, Eyes(seen.box_px)).find(frame)
+    assert agreement(found, seen) > 0.98

@@ -61,7 +61,7 @@ class Eyes:
 def look(settings: SegmentSettings) -> None:
     camera = Intrinsics(width=64, height=36, fx=50.0, fy=50.0, cx=31.5, cy=17.5)
     depth, color = np.full((36, 64), 2000, np.uint16), np.zeros((36, 64, 3), np.uint8)
-    with pytest.raises(HandError, match="no hand-sized object"):
+    with pytest.raises(HandError, match="no hand"):
         make_finder(settings).find(Frame(0, 0, 0, depth, 0.001, camera, color, camera))
 
 

@@ -1,4 +1,4 @@
-"""Evaluations that can be ordered: the cube test and the user test, with their reports."""
+"""Evaluations that can be ordered: cube test, user test and test of the segmentation."""
 
 from __future__ import annotations
 
@@ -6,15 +6,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from handcal.errors import FileError, HandcalError
+from handcal.hand.settings import SegmentSettings
+from handcal.hand.shipped import make_finder
+from handcal.io.files import make_folder, require_suffix
+from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.lab.evaluate.cube_report import cube_report
 from handcal.lab.evaluate.cube_summary import ErrorSummary, cube_summary
 from handcal.lab.evaluate.cube_test import CubeTest, judge_captures
+from handcal.lab.evaluate.masked_frames import read_masked_frames, read_masked_names
+from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
+from handcal.lab.evaluate.segmentation_sheet import contact_sheet, tile
 from handcal.lab.evaluate.user_test import UserTestResult, evaluate_user_test, read_user_test
 from handcal.lab.evaluate.user_test_report import user_test_report
-from handcal.lab.settings import CubeTestSettings, UserTestSettings, output_folder
+from handcal.lab.settings import (
+    CubeTestSettings,
+    SegmentationTestSettings,
+    UserTestSettings,
+    output_folder,
+)
 from handcal.lab.study.store import free_of_studies
 from handcal.progress import Progress
 from handcal.report.document import Report
@@ -112,6 +125,38 @@ def run_user_test(settings: UserTestSettings, progress: Progress = Progress()) -
     result = evaluate_user_test(test)
     report = user_test_report(test, result)
     return UserTestRun(result, report, _write(output, report, progress))
+
+
+def run_segmentation_test(
+    settings: SegmentationTestSettings, progress: Progress = Progress()
+) -> dict[str, Any]:
+    """Segment the hand in a folder of frames with true masks; return `evaluation`'s figures.
+
+    Writes the contact sheet, if one is wanted.
+
+    Raises
+    ------
+    CancelledError
+    FileError
+        If a file cannot be used or written.
+    """
+    sheet = Path(settings.sheet).expanduser() if settings.sheet else None
+    if sheet is not None:  # before the long work, whose result would be lost
+        require_suffix(sheet, ".png")
+        make_folder(sheet.parent)
+    folder = Path(settings.folder).expanduser()
+    segmenting = SegmentSettings(roi=settings.roi)
+    described = read_masked_names(folder)
+    rows, tiles = [], []
+    for shot in read_masked_frames(folder, described):
+        row, mask = evaluate_frame(shot, lambda one: make_finder(segmenting).find(one), segmenting)
+        rows.append(row)
+        if sheet is not None:
+            tiles.append(tile(shot, mask, row))
+        progress.at(len(rows) / len(described), "Segmenting hands")
+    if sheet is not None:
+        write_png(sheet, contact_sheet(tiles))
+    return evaluation(rows)
 
 
 def cube_and_grid(settings: CubeTestSettings, folder: Path) -> tuple[Cube, Grid]:
