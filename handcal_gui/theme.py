@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from PySide6.QtCore import QByteArray, QRectF, Qt
+from PySide6.QtCore import QByteArray, QEvent, QObject, QRectF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFont,
@@ -156,8 +157,14 @@ def is_dark() -> bool:
 
 
 def colors() -> Colors:
-    """Return the colours of the current scheme; call again on ``QEvent.Type.PaletteChange``."""
+    """Return the colours of the current scheme, which `follow_theme` observes."""
     return _DARK if is_dark() else _LIGHT
+
+
+def follow_theme(widget: QWidget, redraw: Callable[[], object]) -> None:
+    """Call a method of a widget now and after each change of the widget's palette."""
+    _PaletteWatch(widget).changed.connect(redraw)
+    redraw()
 
 
 def quiet(header: QHeaderView) -> None:
@@ -197,6 +204,21 @@ def icon(name: str, color: str = "") -> QIcon:
         for size_px in (16, 24, 32, 48, 64):
             result.addPixmap(_draw(tinted, size_px), mode)
     return result
+
+
+class _PaletteWatch(QObject):
+    """Emits `changed` when the palette of its parent changes."""
+
+    changed = Signal()
+
+    def __init__(self, widget: QWidget) -> None:
+        super().__init__(widget)
+        widget.installEventFilter(self)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.PaletteChange:
+            self.changed.emit()
+        return False
 
 
 def _palette(shades: _Shades) -> QPalette:

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.pages.wizard.steps import ButtonSpec, View
-from handcal_gui.theme import SPACING_PX, colors, scale_font
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.fields import main_button, named
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
@@ -104,18 +104,12 @@ class ActionBar(QWidget):
         """Press the main button."""
         self._main.click()
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the key when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw_key()
-
     def _lay_out(self) -> None:
         label = self._main.text()
         self._main.setText(_LONGEST_LABEL)
         self._main.setFixedSize(self._main.sizeHint().width() + 4 * SPACING_PX, 5 * SPACING_PX)
         self._main.setText(label)
-        self._draw_key()
+        follow_theme(self, self._draw_key)
         scale_font(self._key, 0.9)
         widest = max(self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in _KEYS)
         self._key.setFixedSize(widest + 2 * SPACING_PX, 3 * SPACING_PX)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -27,7 +27,7 @@ from handcal.types import EYES, Eye, Rig
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -90,7 +90,7 @@ class FineTunePanel(QWidget):
         self._make_actions()
         self._make_depths()
         self._lay_out()
-        self._draw_icons()
+        follow_theme(self, self._draw_icons)
         self._steps.actions()[0].trigger()
         self._say("wait", self._why_not)
         self._refresh()
@@ -152,12 +152,6 @@ class FineTunePanel(QWidget):
         """End any comparison, so that the headset keeps φ as set."""
         super().hideEvent(event)
         self.settle()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw_icons()
 
     def _draw_icons(self) -> None:
         for action, name in ((self._undo, "undo"), (self._redo, "redo")):
