@@ -233,14 +233,14 @@ class Program(QObject):
         self.start.example_requested.connect(self.open_example)
         self.start.rig_wanted.connect(self.calibrate_rig)
         self.start.evaluation_wanted.connect(self.evaluate)
-        self.live.ended.connect(self._take_end)
+        self.live.ended.connect(self._on_ended)
         self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
         self.live.export_requested.connect(lambda: self.export())
         self.live.next_wearer_requested.connect(self.show_start)
         self.review.opened.connect(
             lambda path: self._remember(self._preferences.with_session(path))
         )
-        self.review.failed.connect(self._take_end)
+        self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.export())
         review_page.resume_requested.connect(self._resume_reviewed)
         review_page.close_requested.connect(self.show_start)
@@ -306,7 +306,7 @@ class Program(QObject):
             return self.live.snapshot.record
         return self.review.record
 
-    def _take_end(self, why: str) -> None:
+    def _on_ended(self, why: str) -> None:
         if why:
             self.show_start()
             self.window.banner.show_message(why)

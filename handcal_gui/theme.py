@@ -167,7 +167,7 @@ def follow_theme(widget: QWidget, redraw: Callable[[], object]) -> None:
     redraw()
 
 
-def quiet(header: QHeaderView) -> None:
+def flat_header(header: QHeaderView) -> None:
     """Make a table's header look like its cells, with muted text."""
     header.setStyleSheet(
         "QHeaderView { background: palette(base); }"

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
-from handcal_gui.widgets.fields import button, named, paragraph
+from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.sentence import sentence
 
 _ICONS = {Health.GOOD: "check", Health.LIMITED: "warning", Health.BROKEN: "cross"}
@@ -24,7 +24,7 @@ class FindingLine(QWidget):
         self.setObjectName(f"{name}Finding")
         self._finding: Finding | None = None
         self._mend: Callable[[], object] | None = None
-        self._icon = named(QLabel(), f"{name}Health")
+        self._icon = with_name(QLabel(), f"{name}Health")
         self._icon.setFixedSize(2 * SPACING_PX, 2 * SPACING_PX)
         self._text = paragraph(f"{name}Found")
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import follow_theme, number_font, quiet
+from handcal_gui.theme import flat_header, follow_theme, number_font
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class NumberTable(QTableWidget):
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(self.verticalHeader().minimumSectionSize())
         self.verticalHeader().setSectionsClickable(False)
-        follow_theme(self, self._take_colors)
+        follow_theme(self, self._recolor)
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
 
@@ -83,9 +83,9 @@ class NumberTable(QTableWidget):
         super().resizeEvent(event)
         self._fit_columns()
 
-    def _take_colors(self) -> None:
-        quiet(self.horizontalHeader())
-        quiet(self.verticalHeader())
+    def _recolor(self) -> None:
+        flat_header(self.horizontalHeader())
+        flat_header(self.verticalHeader())
         for corner in self.findChildren(QAbstractButton):
             corner.setStyleSheet(
                 "QTableCornerButton::section { background: palette(base); border: 0; }"

@@ -18,7 +18,7 @@ import pytest
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.session.session import Session, SessionRecord
-from handcal_gui.pages.start.session_entries import find_offers
+from handcal_gui.pages.start.session_entries import find_sessions
 from tests.helpers import ROOT, Patience
 
 ARTEFACTS = ROOT / "artefacts"
@@ -267,7 +267,7 @@ def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
     session = newest_session(sessions)
     assert session is not None
     assert not session.is_finished
-    (offer,) = find_offers(sessions, ()).unfinished
+    (offer,) = find_sessions(sessions, ()).unfinished
     assert offer.is_enabled
     with Window(display, session.path, "--preferences", preferences) as window:
         window.find()
@@ -276,7 +276,7 @@ def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
         def is_resumed() -> bool:
             window.press("alt+r")
             time.sleep(1.0)
-            return not find_offers(sessions, ()).unfinished[0].is_enabled
+            return not find_sessions(sessions, ()).unfinished[0].is_enabled
 
         wait_for("the session in use again", is_resumed, window)
         window.shoot("real-6-resumed")

@@ -26,7 +26,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, View, Wizard
+from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, WizardView
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
@@ -60,7 +60,7 @@ def main_button(window: MainWindow) -> QPushButton:
 def offer_solve(window: MainWindow) -> None:
     bar = window.findChild(ActionBar)
     assert isinstance(bar, ActionBar)
-    bar.show_view(View(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
+    bar.show_view(WizardView(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
 
 
 def shown(window: MainWindow) -> set[str]:
@@ -209,13 +209,13 @@ Maker = Callable[..., Snapshot]
 class Saying(Wizard):
     """A wizard that says what it is given."""
 
-    said: View
+    said: WizardView
 
-    def view(self, _snapshot: Snapshot) -> View:
+    def view(self, _snapshot: Snapshot) -> WizardView:
         return self.said
 
 
-def say(program: Program, snapshot: Snapshot, view: View) -> None:
+def say(program: Program, snapshot: Snapshot, view: WizardView) -> None:
     program.wizard_panel.wizard = wizard = Saying()
     wizard.said = view
     program.wizard_panel.show_snapshot(snapshot)
@@ -307,7 +307,7 @@ def focusable(window: MainWindow) -> Iterator[QWidget]:
 TEXT_FIELDS = (QLineEdit, QPlainTextEdit, QAbstractSpinBox)
 
 
-def offer(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[object]:
+def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[object]:
     """Show a page with everything on it, ready for keys; return the list of what will be asked."""
     window = program.window
     window.show_page("live")
@@ -322,7 +322,7 @@ def offer(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[obj
         ButtonSpec(Action.BACK, "&Back"),
     )
     main = ButtonSpec(Action.SOLVE, "Solve", is_enabled)
-    say(program, snapshot, View(Step.SOLVE, "", (), main, others))
+    say(program, snapshot, WizardView(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
     program.wizard_panel.asked.connect(asked.append)
     for table in window.findChildren(RecordTable):
@@ -349,7 +349,7 @@ def test_space_presses_only_the_main_button_from_every_focus(
     qtbot: QtBot, program: Program, snapshot: Maker, is_enabled: bool
 ) -> None:
     window = program.window
-    asked = offer(program, snapshot(State.APPLIED), is_enabled=is_enabled)
+    asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=is_enabled)
     qtbot.waitActive(window)
     wrong: list[object] = []
     window.panels.session.delete_requested.connect(wrong.append)
@@ -381,7 +381,7 @@ def test_return_presses_the_button_or_opens_the_list_that_has_the_focus(
     qtbot: QtBot, program: Program, snapshot: Maker
 ) -> None:
     window = program.window
-    asked = offer(program, snapshot(State.APPLIED), is_enabled=True)
+    asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     qtbot.waitActive(window)
     clicked = watch_clicks(window)
     boxes = window.panels.cloud.findChildren(QCheckBox)
@@ -406,7 +406,7 @@ def test_tab_leads_to_nothing_that_discards_or_deletes(
     qtbot: QtBot, program: Program, snapshot: Maker
 ) -> None:
     window = program.window
-    offer(program, snapshot(State.APPLIED), is_enabled=True)
+    show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     qtbot.waitActive(window)
     reached: set[str] = set()
     for name, dock in window.docks.items():
@@ -426,7 +426,7 @@ def test_keys_belong_to_other_pages_and_dialogs_as_usual(
     qtbot: QtBot, program: Program, snapshot: Maker
 ) -> None:
     window = program.window
-    asked = offer(program, snapshot(State.APPLIED), is_enabled=True)
+    asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     dialog = QDialog(window)
     box = QCheckBox("Really", dialog)
     dialog.open()

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.pages.wizard.steps import ButtonSpec, View
+from handcal_gui.pages.wizard.steps import ButtonSpec, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
-from handcal_gui.widgets.fields import main_button, named
+from handcal_gui.widgets.fields import main_button, with_name
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
 _KEYS = (_KEY, _TEXT_KEY, "Ctrl+Enter")
@@ -30,7 +30,7 @@ _ARMING_MS = 700
 
 
 class ActionBar(QWidget):
-    """The buttons of a `View`; its height and the main button's position never change.
+    """The buttons of a `WizardView`; its height and the main button's position never change.
 
     The space bar presses the main button, except while a text field has the focus; Ctrl+Return
     always does. The main button never has the focus, because a disabled button would pass it on.
@@ -47,7 +47,7 @@ class ActionBar(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("actionBar")
-        self._view: View | None = None
+        self._view: WizardView | None = None
         self._is_repeat = False
         self._released = (0, 0)  # key, and time in ms
         self._main = main_button("wizardMain")
@@ -55,7 +55,7 @@ class ActionBar(QWidget):
         self._main.setToolTip(f"{_native(_KEY)}, or {_native(_TEXT_KEY)} from a text field")
         self._key = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
         self._key.setObjectName("wizardMainKey")
-        self._others = [named(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
+        self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
         self._arming = QTimer(self, interval=_ARMING_MS, singleShot=True)
         self._lay_out()
         self._main.clicked.connect(lambda: self._ask(self._view.main if self._view else None))
@@ -65,12 +65,12 @@ class ActionBar(QWidget):
         for keys in _KEYS:
             # Always enabled: the key of a disabled shortcut would go to the focused widget.
             shortcut = QShortcut(QKeySequence(keys), self, autoRepeat=False)
-            shortcut.activated.connect(self._take_key)
+            shortcut.activated.connect(self._on_key)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
 
-    def show_view(self, view: View | None) -> None:
+    def show_view(self, view: WizardView | None) -> None:
         """Show the buttons of a view; if it is None, no button can be pressed."""
         before, self._view = self._view, view
         self._main.setEnabled(view is not None and view.main.is_enabled)
@@ -141,7 +141,7 @@ class ActionBar(QWidget):
             button.setToolTip(f"{letter}, or Return while this button has the focus")
             button.setEnabled(spec.is_enabled)
 
-    def _take_key(self) -> None:
+    def _on_key(self) -> None:
         if not self._is_repeat:
             self._main.click()
 

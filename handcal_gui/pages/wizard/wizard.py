@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 from handcal.station.snapshot import Snapshot
 from handcal.types import EyePlan
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import PLANS, STEPS, Check, Step, View, Wizard
+from handcal_gui.pages.wizard.steps import PLANS, STEPS, Precondition, Step, Wizard, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 
 _MOST_CHECKS = 3
@@ -29,7 +29,7 @@ class WizardPanel(QWidget):
     wizard : Wizard
     bar : ActionBar
         Its buttons, for the window's bottom strip.
-    shown : View or None
+    shown : WizardView or None
         The view shown; None before the first snapshot.
     asked : Signal(Action)
         A button was pressed.
@@ -46,7 +46,7 @@ class WizardPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("wizard")
         self.wizard = Wizard()
-        self.shown: View | None = None
+        self.shown: WizardView | None = None
         self._rail = _Rail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True)
@@ -179,7 +179,7 @@ class _CheckRow(QWidget):
         layout.addWidget(self._text, 1)
         self.setMinimumHeight(3 * SPACING_PX)
 
-    def show_check(self, check: Check | None) -> None:
+    def show_check(self, check: Precondition | None) -> None:
         if check is None:
             self._icon.clear()
             self._text.clear()

@@ -17,7 +17,7 @@ from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.orbit import Direction
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.widgets.legend import LegendEntry
-from handcal_gui.widgets.missing import what_is_missing
+from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
@@ -107,7 +107,7 @@ class CloudPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the cursor, if there is one, and the live hand."""
         seen, cursor = snapshot.observation, snapshot.procedure.cursor
-        problem = what_is_missing(snapshot)
+        problem = missing_text(snapshot)
         if seen is None and not problem:
             return
         hand = seen.hand if seen and not problem else None

@@ -20,9 +20,9 @@ from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
-    alignment_rows,
     another_text,
     result_rows,
+    single_alignment_rows,
     verdict_rows,
 )
 
@@ -94,7 +94,7 @@ class ResultsPanel(QWidget):
         self._numbers.show_rows(eyes, result_rows(results, rig))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
-        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, rig))
+        self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results, rig))
         self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
 

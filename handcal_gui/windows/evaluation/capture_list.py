@@ -9,7 +9,7 @@ from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.lab.evaluate.cube_folder import PlannedCapture
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, quiet
+from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 
 _IMAGE, _STATE = range(2)
 
@@ -34,7 +34,7 @@ class CaptureList(QTreeWidget):
         self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self.setHeaderLabels(["Image", "State"])
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        quiet(self.header())
+        flat_header(self.header())
         self.header().setStretchLastSection(False)
         self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
         self.header().setSectionResizeMode(_STATE, QHeaderView.ResizeMode.ResizeToContents)

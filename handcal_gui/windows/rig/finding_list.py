@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.rig.report import RigFinding
-from handcal_gui.theme import colors, follow_theme, icon, quiet
+from handcal_gui.theme import colors, flat_header, follow_theme, icon
 
 
 class FindingList(QTreeWidget):
@@ -26,7 +26,7 @@ class FindingList(QTreeWidget):
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
         self.setHeaderLabels(["Item", "Found", "Expected"])
-        quiet(self.header())
+        flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.header().setStretchLastSection(False)

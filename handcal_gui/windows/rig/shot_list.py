@@ -10,7 +10,7 @@ from PySide6.QtGui import QIcon, QImage, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.types import UInt8
-from handcal_gui.theme import SPACING_PX, follow_theme, icon, number_font, quiet
+from handcal_gui.theme import SPACING_PX, flat_header, follow_theme, icon, number_font
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.rig.shots import Shot
@@ -54,13 +54,13 @@ class ShotList(QTreeWidget):
             self.headerItem().setToolTip(column, tooltip)
             if column != _IMAGE:
                 self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
-        quiet(self.header())
+        flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
         self.header().setStretchLastSection(False)
         self.setMinimumSize(50 * SPACING_PX, 12 * SPACING_PX)
         self.currentItemChanged.connect(self._choose)
-        self.itemChanged.connect(self._take_change)
+        self.itemChanged.connect(self._on_item_changed)
         follow_theme(self, self._mark_all)
 
     @property
@@ -104,7 +104,7 @@ class ShotList(QTreeWidget):
     def _choose(self, item: QTreeWidgetItem | None) -> None:
         self.chosen.emit(-1 if item is None else self.indexOfTopLevelItem(item))
 
-    def _take_change(self, _item: QTreeWidgetItem, column: int) -> None:
+    def _on_item_changed(self, _item: QTreeWidgetItem, column: int) -> None:
         if column == _IMAGE:
             self.dropped_changed.emit()
 

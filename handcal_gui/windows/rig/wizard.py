@@ -21,7 +21,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.types import RIG_PARTS, RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.fields import button, named
+from handcal_gui.widgets.fields import button, with_name
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
 from handcal_gui.windows.rig.project import RigProject
@@ -84,7 +84,7 @@ class RigWizard(QDialog):
         self.setWindowTitle("Calibrate a rig")
         self.project = RigProject(folder, realsense or RealSenseSettings(), self)
         self._banner = Banner()
-        self._rail = named(QListWidget(), "rigRail", "Steps")
+        self._rail = with_name(QListWidget(), "rigRail", "Steps")
         self._title, self._purpose = QLabel(), QLabel()
         self._stack = QStackedWidget()
         result = ResultPage(self.project)

@@ -13,10 +13,10 @@ from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
-    alignment_rows,
     another_text,
     comparison_rows,
     result_rows,
+    single_alignment_rows,
     verdict_rows,
 )
 
@@ -74,12 +74,12 @@ def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -
         assert left != NOTHING
         assert right == NOTHING
     assert cells(rows, "Eye distance") == (NOTHING,)
-    assert [row.label for row in alignment_rows(left_only, rig)] == ["1 left"]
+    assert [row.label for row in single_alignment_rows(left_only, rig)] == ["1 left"]
     assert "right" not in another_text(left_only, rig)
 
 
 def test_each_alignment_is_told_alone(results: Results, rig: Rig) -> None:
-    rows = alignment_rows(results, rig)
+    rows = single_alignment_rows(results, rig)
     assert [row.label for row in rows] == ["1 left", "1 right", "2 left", "2 right"]
     expected = PHI[2].text(results.alignments[2]["left"], rig.eyes["left"])
     assert rows[2].cells[2] == expected

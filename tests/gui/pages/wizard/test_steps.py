@@ -15,8 +15,8 @@ from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
     Step,
-    View,
     Wizard,
+    WizardView,
     is_complete,
     next_eyes,
 )
@@ -29,7 +29,7 @@ def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
         wizard.move(Action.NEXT, snapshot)
 
 
-def actions(view: View) -> list[Action]:
+def actions(view: WizardView) -> list[Action]:
     return [offer.action for offer in view.others]
 
 
