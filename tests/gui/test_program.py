@@ -533,7 +533,7 @@ def test_an_unexpected_error_is_logged_and_shown(
     technician: Technician, caplog: pytest.LogCaptureFixture
 ) -> None:
     error = ZeroDivisionError("oh")
-    launch._tell(technician.program, type(error), error, error.__traceback__)
+    launch._report_error(technician.program, type(error), error, error.__traceback__)
     assert "ZeroDivisionError: oh" in technician.banner
     assert "unexpected error" in caplog.text
     technician.program.show_start()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -25,6 +26,7 @@ from pytestqt.qtbot import QtBot
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal_gui.keys import keys_by_group, keys_html
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, WizardView
 from handcal_gui.preferences import PreferencesFile
@@ -126,15 +128,32 @@ def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
     assert window.banner.text == ""
 
 
+def test_help_lists_every_key_of_an_action(program: Program) -> None:
+    groups = keys_by_group(program.window)
+    html = keys_html(program.window)
+    listed = [key for rows in groups.values() for keys, _ in rows for key in keys.split(", ")]
+    for action in program.window.findChildren(QAction):
+        for shortcut in action.shortcuts():
+            assert shortcut.toString(QKeySequence.SequenceFormat.NativeText) in listed
+    for group, keys, meaning in (
+        ("File", "Ctrl+N", "Next wearer"),
+        ("Window", "Space", "Press the large button, except from a text field"),
+        ("Camera", "F", "Freeze"),
+        ("Hand cloud", "+, =", "Zoom in"),
+        ("Fine-tune", "1", "Step of 0.1 mm"),
+    ):
+        assert (keys, meaning) in groups[group]
+        assert f"<b>{keys}</b>&nbsp;{meaning}" in html
+
+
 def test_no_key_is_taken_twice(window: MainWindow) -> None:
-    keys = [
-        action.shortcut().toString()
-        for menu in window.menuBar().actions()
-        for action in menu.menu().actions()  # type: ignore[attr-defined]
-        if not action.shortcut().isEmpty()
+    groups = keys_by_group(window)
+    everywhere = [
+        keys for group in ("Window", "File", "Go to", "Help") for keys, _ in groups[group]
     ]
-    assert {"Ctrl+N", "Ctrl+O", "Ctrl+E", "F1"} <= set(keys)
-    assert len(keys) == len(set(keys))
+    assert {"Space", "Ctrl+N", "Ctrl+O", "Ctrl+E", "F1"} <= set(everywhere)
+    for keys in (everywhere, *([keys for keys, _ in rows] for rows in groups.values())):
+        assert len(keys) == len(set(keys))
 
 
 def has_title(window: MainWindow, name: str) -> bool:

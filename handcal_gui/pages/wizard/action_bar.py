@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -22,7 +22,10 @@ from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.fields import main_button, with_name
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
-_KEYS = (_KEY, _TEXT_KEY, "Ctrl+Enter")
+_KEYS = {
+    (_KEY,): "Press the large button, except from a text field",
+    (_TEXT_KEY, "Ctrl+Enter"): "Press the large button from anywhere",
+}
 _LONGEST_LABEL = "Confirm for the wearer"
 _MOST_OTHERS = 3
 _ARMING_MS = 700
@@ -62,10 +65,12 @@ class ActionBar(QWidget):
         for i, other in enumerate(self._others):
             other.clicked.connect(lambda _checked=False, i=i: self._ask(self._spec(i)))
         self._arming.timeout.connect(self._arm)
-        for keys in _KEYS:
-            # Always enabled: the key of a disabled shortcut would go to the focused widget.
-            shortcut = QShortcut(QKeySequence(keys), self, autoRepeat=False)
-            shortcut.activated.connect(self._on_key)
+        for keys, text in _KEYS.items():
+            # Always enabled: the key of a disabled action would go to the focused widget.
+            action = QAction(text, self, autoRepeat=False)
+            action.setShortcuts([QKeySequence(key) for key in keys])
+            action.triggered.connect(self._on_key)
+            self.addAction(action)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
@@ -111,7 +116,9 @@ class ActionBar(QWidget):
         self._main.setText(label)
         follow_theme(self, self._draw_key)
         scale_font(self._key, 0.9)
-        widest = max(self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in _KEYS)
+        widest = max(
+            self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in (_KEY, _TEXT_KEY)
+        )
         self._key.setFixedSize(widest + 2 * SPACING_PX, 3 * SPACING_PX)
         self._show_key(None, None)
         layout = QHBoxLayout(self)

@@ -281,6 +281,7 @@ class FineTunePanel(QWidget):
         self._steps.triggered.connect(self._set_step)
         for key, step_mm in enumerate(_STEPS_MM, 1):
             step = add(f"{step_mm:g}", str(key), f"Arrows move by {step_mm:g} mm")
+            step.setWhatsThis(f"Step of {step_mm:g} mm")
             step.setCheckable(True)
             step.setData(1e-3 * step_mm)
             self._steps.addAction(step)

@@ -166,9 +166,9 @@ class CaptureDialog(PreparationDialog):
         self._take.setEnabled(is_ready and is_seen)
         self._take.setText("Take again" if self._list.chosen_is_taken else "Take")
         self._take.setShortcut(Qt.Key.Key_Space)  # setText removes the shortcut
-        self._instruction.setText(self._instruction())
+        self._instruction.setText(self._next_instruction())
 
-    def _instruction(self) -> str:
+    def _next_instruction(self) -> str:
         if self._plan_problem:
             return f"{sentence(self._plan_problem)}."
         if self._list.is_complete and self._list.chosen is None:
