@@ -29,8 +29,8 @@ def keys_by_group(window: QMainWindow) -> dict[str, list[tuple[str, str]]]:
             rows = groups.setdefault(_group(action), [])
             if row not in rows:
                 rows.append(row)
-    for group, rows in _NOT_ACTIONS.items():
-        groups.setdefault(group, []).extend(rows)
+    for group, others in _NOT_ACTIONS.items():
+        groups.setdefault(group, []).extend(others)
     return groups
 
 

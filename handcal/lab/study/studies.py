@@ -102,7 +102,7 @@ def run_and_report(
         progress=progress.part(0.0, STUDY_SHARE),
     )
     report = report_of(study.settings, rows)
-    writing = progress.part(STUDY_SHARE, 1.0)
+    writing = progress.part(STUDY_SHARE, 1.0, "Writing the report")
     with resumable():
-        files = write_report(folder, report, lambda share: writing.at(share, "Writing the report"))
+        files = write_report(folder, report, writing)
     return StudyResult(report, files)
