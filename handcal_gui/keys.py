@@ -1,7 +1,10 @@
-"""The keys of the window, collected from its actions."""
+"""Actions with keys, and the keys of the window collected from them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
@@ -16,6 +19,41 @@ _NOT_ACTIONS = {
     "Fine-tune": (("Arrows, PgUp, PgDown", "Move φ of the chosen eye"),),
 }
 """Keys that widgets handle themselves, as their meaning depends on the focus."""
+
+
+def add_action(
+    widget: QWidget,
+    text: str,
+    keys: str,
+    do: Callable[[], object] | None = None,
+    *,
+    tooltip: str = "",
+    context: Qt.ShortcutContext = Qt.ShortcutContext.WidgetWithChildrenShortcut,
+) -> QAction:
+    """Add an action to a widget and return it.
+
+    Parameters
+    ----------
+    widget : QWidget
+    text : str
+    keys : str
+        Shortcuts, separated by spaces; may be empty.
+    do : callable, optional
+        Called when the action is triggered.
+    tooltip : str
+        By default the text.
+    context : Qt.ShortcutContext
+        Focus with which the keys work: by default that of the widget and its children.
+    """
+    action = QAction(text, widget)
+    action.setShortcuts([QKeySequence(key) for key in keys.split()])
+    action.setShortcutContext(context)
+    if tooltip:
+        action.setToolTip(tooltip)
+    if do is not None:
+        action.triggered.connect(lambda _checked=False: do())
+    widget.addAction(action)
+    return action
 
 
 def keys_by_group(window: QMainWindow) -> dict[str, list[tuple[str, str]]]:

@@ -13,9 +13,10 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
+from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX, colors, flat_header, number_font
 
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
@@ -79,12 +80,14 @@ class RecordTable(QTableView):
         across.setHighlightSections(False)
         across.setResizeContentsPrecision(_MEASURED_ROWS)
         across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.delete_action = QAction("Delete", self)
-        self.delete_action.setToolTip("Delete the selected row (Del); can be undone")
-        self.delete_action.setShortcut(Qt.Key.Key_Delete)
-        self.delete_action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        self.delete_action.triggered.connect(self._delete)
-        self.addAction(self.delete_action)
+        self.delete_action = add_action(
+            self,
+            "Delete",
+            "Del",
+            self._delete,
+            tooltip="Delete the selected row (Del); can be undone",
+            context=Qt.ShortcutContext.WidgetShortcut,
+        )
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.selectionModel().selectionChanged.connect(self._refresh)
         self._refresh()

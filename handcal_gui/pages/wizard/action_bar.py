@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
+from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -17,14 +17,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.steps import ButtonSpec, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.fields import main_button, with_name
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
 _KEYS = {
-    (_KEY,): "Press the large button, except from a text field",
-    (_TEXT_KEY, "Ctrl+Enter"): "Press the large button from anywhere",
+    _KEY: "Press the large button, except from a text field",
+    f"{_TEXT_KEY} Ctrl+Enter": "Press the large button from anywhere",
 }
 _LONGEST_LABEL = "Confirm for the wearer"
 _MOST_OTHERS = 3
@@ -67,10 +68,8 @@ class ActionBar(QWidget):
         self._arming.timeout.connect(self._arm)
         for keys, text in _KEYS.items():
             # Always enabled: the key of a disabled action would go to the focused widget.
-            action = QAction(text, self, autoRepeat=False)
-            action.setShortcuts([QKeySequence(key) for key in keys])
-            action.triggered.connect(self._on_key)
-            self.addAction(action)
+            window = Qt.ShortcutContext.WindowShortcut
+            add_action(self, text, keys, self._on_key, context=window).setAutoRepeat(False)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)

@@ -11,9 +11,7 @@ import math
 import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import (
-    QAction,
     QColor,
-    QKeySequence,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -24,6 +22,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.types import Float64, UInt8
+from handcal_gui.keys import add_action
 from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.panels.cloud.orbit import Direction, Orbit
 from handcal_gui.theme import SPACING_PX, colors, number_font
@@ -148,22 +147,18 @@ class CloudView(QWidget):
         """Rotate by arrow keys, zoom by + and −, select a direction by 1, 2, 3 and R."""
         turn, zoom = _KEY_TURN_RAD, _ZOOM_PER_NOTCH
         for text, keys, do in (
-            ("Rotate left", ("Left",), lambda: self._turn(turn, 0.0)),
-            ("Rotate right", ("Right",), lambda: self._turn(-turn, 0.0)),
-            ("Rotate up", ("Up",), lambda: self._turn(0.0, -turn)),
-            ("Rotate down", ("Down",), lambda: self._turn(0.0, turn)),
-            ("Zoom in", ("+", "="), lambda: self._change(self._orbit.zoomed(zoom))),
-            ("Zoom out", ("-",), lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
-            ("Front", ("1",), lambda: self.look(Direction.FRONT)),
-            ("Side", ("2",), lambda: self.look(Direction.SIDE)),
-            ("Top", ("3",), lambda: self.look(Direction.TOP)),
-            ("Reset", ("R",), lambda: self.look(Direction.ASLANT)),
+            ("Rotate left", "Left", lambda: self._turn(turn, 0.0)),
+            ("Rotate right", "Right", lambda: self._turn(-turn, 0.0)),
+            ("Rotate up", "Up", lambda: self._turn(0.0, -turn)),
+            ("Rotate down", "Down", lambda: self._turn(0.0, turn)),
+            ("Zoom in", "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
+            ("Zoom out", "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
+            ("Front", "1", lambda: self.look(Direction.FRONT)),
+            ("Side", "2", lambda: self.look(Direction.SIDE)),
+            ("Top", "3", lambda: self.look(Direction.TOP)),
+            ("Reset", "R", lambda: self.look(Direction.ASLANT)),
         ):
-            action = QAction(text, self)
-            action.setShortcuts([QKeySequence(key) for key in keys])
-            action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-            action.triggered.connect(do)
-            self.addAction(action)
+            add_action(self, text, keys, do, context=Qt.ShortcutContext.WidgetShortcut)
 
     def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
         self._orbit = self._orbit.turned(yaw_rad, pitch_rad)

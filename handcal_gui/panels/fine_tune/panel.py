@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QKeySequence
+from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
@@ -24,6 +24,7 @@ from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
+from handcal_gui.keys import add_action
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
@@ -288,12 +289,7 @@ class FineTunePanel(QWidget):
         add("Other eye", "E", "").triggered.connect(self._change_eye)
 
     def _add_action(self, text: str, keys: str, tooltip: str) -> QAction:
-        action = QAction(text, self)
-        action.setShortcut(QKeySequence(keys))
-        action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        action.setToolTip(f"{tooltip} ({keys})" if keys else tooltip)
-        self.addAction(action)
-        return action
+        return add_action(self, text, keys, tooltip=f"{tooltip} ({keys})" if keys else tooltip)
 
     def _set_step(self) -> None:
         for editor in self._editors.values():

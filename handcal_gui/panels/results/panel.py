@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
 
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig
+from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
@@ -115,11 +116,12 @@ class ResultsPanel(QWidget):
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
     def _add_copy(self) -> None:
-        copy = QAction("Copy as text", self)
-        copy.setShortcut(QKeySequence.StandardKey.Copy)
-        copy.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        copy.triggered.connect(lambda: QGuiApplication.clipboard().setText(self.as_text()))
-        self.addAction(copy)
+        add_action(
+            self,
+            "Copy as text",
+            "Ctrl+C",
+            lambda: QGuiApplication.clipboard().setText(self.as_text()),
+        )
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
 
     def _lay_out(self) -> None:

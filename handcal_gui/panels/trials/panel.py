@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -23,6 +22,7 @@ from handcal.session.trial import summarise_trials
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
+from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.number_table import NumberTable
@@ -219,15 +219,15 @@ class TrialsPanel(QWidget):
         self._shows_target.toggled.connect(self._request_target)
 
     def _make_record_action(self) -> None:
-        self.record_action = QAction("Record trial", self)
-        self.record_action.setToolTip(
-            "Record the error of the solved φ relative to the φ set by hand (T)"
+        self.record_action = add_action(
+            self,
+            "Record trial",
+            "T",
+            self._ask,
+            tooltip="Record the error of the solved φ relative to the φ set by hand (T)",
+            # Also from the fine-tune panel, where the study leader works.
+            context=Qt.ShortcutContext.WindowShortcut,
         )
-        self.record_action.setShortcut(Qt.Key.Key_T)
-        # Also available from the fine-tune panel, where the study leader works.
-        self.record_action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        self.record_action.triggered.connect(self._ask)
-        self.addAction(self.record_action)
 
     def _lay_out(self) -> None:
         hint = QLabel(text=_HOW, wordWrap=True)
