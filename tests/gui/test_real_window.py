@@ -133,8 +133,8 @@ def preferences(tmp_path: Path) -> Path:
 class Technician:
     """Works at a window, and reads in the newest session what has happened."""
 
-    def __init__(self, window: Window, sessions: Path) -> None:
-        self._window, self._sessions = window, sessions
+    def __init__(self, window: Window, sessions: Path, preferences: Path) -> None:
+        self._window, self._sessions, self._preferences = window, sessions, preferences
 
     def session(self) -> SessionRecord | None:
         """Return the newest session; None while there is none, or it is being created."""
@@ -153,11 +153,12 @@ class Technician:
         self._window.shoot(f"real-1-start-{wearer}")
         self._window.press("Return")
 
-        def has_begun() -> bool:
+        def is_shown() -> bool:
             session = self.session()
-            return session is not None and session.wearer == wearer
+            known = self._preferences.read_text()  # from when the page is shown
+            return session is not None and session.wearer == wearer and session.path.name in known
 
-        wait_for(f"{wearer}'s session", has_begun, self._window)
+        wait_for(f"{wearer}'s session", is_shown, self._window)
 
     def wait_until(self, name: str, count: int = 1) -> None:
         wait_for(f"{name} {count}", lambda: self.count(name) >= count, self._window)
@@ -180,7 +181,7 @@ def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
     """One calibration to its export; in the next the space bar is held, and the program killed."""
     sessions = tmp_path / "sessions"
     with Window(display, "--preferences", preferences) as window:
-        technician = Technician(window, sessions)
+        technician = Technician(window, sessions, preferences)
         window.find()
         time.sleep(2.0)
         ada = calibrated_and_exported(window, technician)
@@ -240,7 +241,6 @@ def calibrated_and_exported(window: Window, technician: Technician) -> SessionRe
 
 def hold_the_space_bar(window: Window, technician: Technician) -> None:
     """Align one eye, and check that a space bar held down presses once and deletes nothing."""
-    time.sleep(2.0)
     for key in ("alt+y", "Down", "Escape", "Tab"):  # into the list of eyes, and on
         window.press(key)
         time.sleep(0.3)
@@ -252,8 +252,7 @@ def hold_the_space_bar(window: Window, technician: Technician) -> None:
     time.sleep(2.0)
     window.shoot("real-6-held")
     assert not technician.count("applied")  # the next that the button offered
-    window.press("space")
-    technician.wait_until("applied")
+    technician.press_space_until("applied")
     assert not technician.count("alignment_deleted")
 
 

@@ -78,7 +78,7 @@ class StudyEvaluation:
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
-            return Readiness(_note(f"{folder} holds all of this study"), "Show results")
+            return Readiness(_note(f"{folder} contains the complete study"), "Show results")
         if share:
             advice = "completed trials are kept"
             return Readiness(

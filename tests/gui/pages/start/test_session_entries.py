@@ -34,7 +34,9 @@ def test_unfinished_sessions_are_told_by_wearer_time_and_alignments(
     assert entry.text.endswith(" · 1 alignment")
 
 
-def test_a_damaged_session_is_told_with_the_reason(tmp_path: Path, alignment: Alignment) -> None:
+def test_a_damaged_session_is_reported_with_the_reason(
+    tmp_path: Path, alignment: Alignment
+) -> None:
     path = make(tmp_path, "Ada", [alignment, alignment], is_done=False)
     (path / "rig.yaml").write_text("nonsense")
     (entry,) = find_sessions(tmp_path, ()).unfinished

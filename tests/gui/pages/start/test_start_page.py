@@ -354,7 +354,7 @@ def test_a_hidden_page_leaves_the_station_alone(
     assert len(inspector.asked) == asked
 
 
-def test_a_check_that_breaks_down_is_told_and_starts_nothing(
+def test_a_check_that_breaks_down_is_reported_and_starts_nothing(
     qtbot: QtBot,
     inspector: Inspector,
     open_page: Callable[..., StartPage],

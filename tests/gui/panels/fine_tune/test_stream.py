@@ -108,7 +108,7 @@ def test_others_do_not_settle(qtbot: QtBot, stream: ShiftStream, see: Callable[.
         pass
 
 
-def test_a_silent_headset_is_told_from_a_slow_one(
+def test_a_silent_headset_is_distinguished_from_a_slow_one(
     stream: ShiftStream, see: Callable[..., bool]
 ) -> None:
     stream.send(shifts_of(0.001))

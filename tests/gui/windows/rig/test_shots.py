@@ -47,6 +47,6 @@ def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path:
         look([tmp_path / "a", tmp_path / "b"], photographs.work.board)
 
 
-def test_an_empty_folder_is_told(photographs: Any, tmp_path: Path) -> None:
+def test_an_empty_folder_is_reported(photographs: Any, tmp_path: Path) -> None:
     with pytest.raises(FileError, match="no PNG"):
         look([tmp_path], photographs.work.board)

@@ -203,6 +203,6 @@ def command(*words: object) -> None:
     arguments.command(arguments)
 
 
-def test_a_grid_without_room_is_told() -> None:
+def test_a_grid_without_room_is_reported() -> None:
     with pytest.raises(HandcalError, match="no room"):
         grid_on(1268, 720, square_px=700)
