@@ -128,7 +128,7 @@ def _require_display() -> None:
     if not _answers(display):
         _fail(
             f"cannot connect to the X server at DISPLAY={display}; start it, or set DISPLAY to "
-            "one that accepts you, or use `handcal demo`, which needs none",
+            "a server that accepts connections from you, or use `handcal demo`, which needs none",
             1,
         )
 

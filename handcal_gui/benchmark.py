@@ -72,15 +72,15 @@ _BARE_WINDOW = (
 )
 
 
-class _FilmCamera(Closable):
+class _ReplayCamera(Closable):
     """Plays frames from memory at the camera's rate, as its SDK would deliver them."""
 
-    name = "Film"
+    name = "Replay"
     identity = CameraIdentity()
 
-    def __init__(self, film: _Film) -> None:
-        self._film = film
-        self.depth_intrinsics = film.frames[0][0].depth_intrinsics
+    def __init__(self, replay: _ReplayFrames) -> None:
+        self._replay = replay
+        self.depth_intrinsics = replay.frames[0][0].depth_intrinsics
         self._index = 0
         self._next_s = time.monotonic()
 
@@ -89,14 +89,14 @@ class _FilmCamera(Closable):
         self._next_s = max(self._next_s + 1.0 / _RATE_HZ, time.monotonic() - timeout_s)
         self._index += 1
         now_ns = time.monotonic_ns()
-        frame = self._film.frames[self._film.is_turned][self._index % _NOISES]
+        frame = self._replay.frames[self._replay.is_turned][self._index % _NOISES]
         return replace(frame, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns)
 
     def close(self) -> None:
         pass
 
 
-class _Film:
+class _ReplayFrames:
     """Frames of the hand in the cursor's pose and rotated, each with its own noise."""
 
     def __init__(self) -> None:
@@ -105,15 +105,15 @@ class _Film:
         self.frames = [noisy_frames(T_D_hand, _NOISES) for T_D_hand in poses]
 
 
-class _FilmStation(Station):
-    """A station that plays a film instead of opening a camera."""
+class _ReplayStation(Station):
+    """A station that replays frames instead of opening a camera."""
 
-    def __init__(self, film: _Film, settings: StationSettings) -> None:
-        self._film = film
+    def __init__(self, replay: _ReplayFrames, settings: StationSettings) -> None:
+        self._replay = replay
         super().__init__(settings, "Benchmark", pairings=_KEY)
 
     def _open_camera(self) -> Camera:
-        return _FilmCamera(self._film)
+        return _ReplayCamera(self._replay)
 
 
 class _Measurement(QObject):
@@ -126,14 +126,14 @@ class _Measurement(QObject):
         and memory of the process every hundred frames.
     """
 
-    def __init__(self, program: Program, film: _Film, frames: int) -> None:
+    def __init__(self, program: Program, replay: _ReplayFrames, frames: int) -> None:
         super().__init__()
         self.delays_ms: list[float] = []
         self.ages_ms: list[float] = []
         self.memory_mb: list[float] = []
         self.started_s = self.ended_s = 0.0
         self._program = program
-        self._film = film
+        self._replay = replay
         self._frames = frames
         self._seen = 0
         self._shown_ns = 0
@@ -167,7 +167,7 @@ class _Measurement(QObject):
             return
         if snapshot.procedure.state is State.SHOW_HAND and seen.is_steady:
             self._program.live.do(Action.MAKE_CURSOR)
-        self._film.is_turned = snapshot.procedure.state is State.ALIGN
+        self._replay.is_turned = snapshot.procedure.state is State.ALIGN
         self._shown_ns = snapshot.frame.t_host_ns
         self._seen = snapshot.frame.index
         if self._seen > _WARM_UP and not self.started_s:
@@ -190,7 +190,7 @@ def measure(frames: int) -> list[BenchFigure]:
     assert isinstance(app, QApplication)
     keep_window_quick()
     app.setStyle("Fusion")
-    film = _Film()
+    replay = _ReplayFrames()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         program = Program(PreferencesFile(folder / "preferences.json"))
@@ -205,8 +205,8 @@ def measure(frames: int) -> list[BenchFigure]:
             sessions=str(folder / "sessions"),
         )
         program.live.opened.connect(lambda _path: _show_every_panel(program))
-        program.live.start(lambda: _FilmStation(film, settings), "both")
-        watch = _Measurement(program, film, frames)
+        program.live.start(lambda: _ReplayStation(replay, settings), "both")
+        watch = _Measurement(program, replay, frames)
         with _headset(settings.port):
             app.exec()
         program.close()

@@ -59,7 +59,7 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
         program = Program(file, remembers=not _is_demonstration(arguments))
     except HandcalError as error:
         raise LaunchError(error, 1) from error
-    sys.excepthook = lambda *error: _tell(program, *error)
+    sys.excepthook = lambda *error: _report_error(program, *error)
     for number in (signal.SIGINT, signal.SIGTERM):
         # From the event loop, which may not run yet.
         signal.signal(number, lambda *_: QTimer.singleShot(0, program.window.close))
@@ -127,7 +127,7 @@ def _log_to(path: Path) -> None:
     )
 
 
-def _tell(
+def _report_error(
     program: Program, kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> None:
     """Log and show an unexpected error; captured data is already on the disk."""

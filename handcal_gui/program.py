@@ -24,6 +24,7 @@ from handcal_gui.control.review import ReviewController
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.keys import keys_html
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.pages.start.start_page import StartPage
@@ -44,29 +45,6 @@ from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.wizard import RigWizard
-
-_KEYS = (
-    ("Space", "Press the large button, except from a text field"),
-    ("Ctrl+Return", "Press the large button from anywhere"),
-    ("Return", "Press the button, or open the list, that has the focus"),
-    ("Alt and the underlined letter", "Press a button at the lower left"),
-    ("Esc", "Close the message at the top"),
-    ("Tab", "Move to the next button or field"),
-    ("F", "Freeze the camera image"),
-    ("T", "Record a trial"),
-    ("1, 2, 3, R", "Hand cloud: front, side, top, reset"),
-    ("Arrows, Page Up, Page Down", "Fine-tune: φ1, φ2, φ3 of the chosen eye"),
-    ("1, 2, 3", "Fine-tune: steps of 0.1, 0.5, 1 mm"),
-    ("E, L", "Fine-tune: the other eye, both eyes together"),
-    ("S, B", "Fine-tune: show the solved φ, show φ = 0"),
-    ("Ctrl+Z, Ctrl+Shift+Z", "Fine-tune: undo, redo; session and trials: undo a deletion"),
-    ("Del", "Delete the chosen alignment or trial"),
-    ("Ctrl+C", "Copy the results as text"),
-    ("Ctrl+1 to Ctrl+9", "Go to a panel, in the order of the View menu"),
-    ("Ctrl+N, Ctrl+O", "Next wearer, open a session"),
-    ("Ctrl+E", "Export"),
-    ("Ctrl+,  Ctrl+Q  F1", "Preferences, quit, these keys"),
-)
 
 
 class Program(QObject):
@@ -238,14 +216,14 @@ class Program(QObject):
         self.start.example_requested.connect(self.open_example)
         self.start.rig_wanted.connect(self.calibrate_rig)
         self.start.evaluation_wanted.connect(self.evaluate)
-        self.live.ended.connect(self._take_end)
+        self.live.ended.connect(self._on_ended)
         self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
         self.live.export_requested.connect(lambda: self.export())
         self.live.next_wearer_requested.connect(self.show_start)
         self.review.opened.connect(
             lambda path: self._remember(self._preferences.with_session(path))
         )
-        self.review.failed.connect(self._take_end)
+        self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.export())
         review_page.resume_requested.connect(self._resume_reviewed)
         review_page.close_requested.connect(self.show_start)
@@ -311,7 +289,7 @@ class Program(QObject):
             return self.live.snapshot.record
         return self.review.record
 
-    def _take_end(self, why: str) -> None:
+    def _on_ended(self, why: str) -> None:
         if why:
             self.show_start()
             self.window.banner.show_message(why)
@@ -353,11 +331,7 @@ class Program(QObject):
             self.window.banner.show_message(f"The preferences could not be saved: {error}")
 
     def _show_keys(self) -> None:
-        rows = (
-            f"<tr><td><b>{keys}</b></td><td style='padding-left: 16px'>{meaning}</td></tr>"
-            for keys, meaning in _KEYS
-        )
-        QMessageBox.information(self.window, "Keys", f"<table>{''.join(rows)}</table>")
+        QMessageBox.information(self.window, "Keys", keys_html(self.window))
 
     def _show_about(self) -> None:
         QMessageBox.about(

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
-from PySide6.QtCore import QByteArray, QRectF, Qt
+from PySide6.QtCore import QByteArray, QEvent, QObject, QRectF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFont,
     QFontDatabase,
     QGuiApplication,
     QIcon,
+    QImage,
     QPainter,
     QPalette,
     QPixmap,
@@ -156,11 +159,17 @@ def is_dark() -> bool:
 
 
 def colors() -> Colors:
-    """Return the colours of the current scheme; call again on ``QEvent.Type.PaletteChange``."""
+    """Return the colours of the current scheme, which `follow_theme` observes."""
     return _DARK if is_dark() else _LIGHT
 
 
-def quiet(header: QHeaderView) -> None:
+def follow_theme(widget: QWidget, redraw: Callable[[], object]) -> None:
+    """Call a method of a widget now and after each change of the widget's palette."""
+    _PaletteWatch(widget).changed.connect(redraw)
+    redraw()
+
+
+def flat_header(header: QHeaderView) -> None:
     """Make a table's header look like its cells, with muted text."""
     header.setStyleSheet(
         "QHeaderView { background: palette(base); }"
@@ -195,8 +204,23 @@ def icon(name: str, color: str = "") -> QIcon:
     ):
         tinted = svg.replace(b"currentColor", shade.name().encode())
         for size_px in (16, 24, 32, 48, 64):
-            result.addPixmap(_draw(tinted, size_px), mode)
+            result.addPixmap(QPixmap.fromImage(_draw(tinted, size_px)), mode)
     return result
+
+
+class _PaletteWatch(QObject):
+    """Emits `changed` when the palette of its parent changes."""
+
+    changed = Signal()
+
+    def __init__(self, widget: QWidget) -> None:
+        super().__init__(widget)
+        widget.installEventFilter(self)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.PaletteChange:
+            self.changed.emit()
+        return False
 
 
 def _palette(shades: _Shades) -> QPalette:
@@ -219,10 +243,11 @@ def _palette(shades: _Shades) -> QPalette:
     return palette
 
 
-def _draw(svg: bytes, size_px: int) -> QPixmap:
-    pixmap = QPixmap(size_px, size_px)
-    pixmap.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(pixmap)
+@lru_cache(maxsize=512)  # half the time of opening a window
+def _draw(svg: bytes, size_px: int) -> QImage:
+    image = QImage(size_px, size_px, QImage.Format.Format_ARGB32_Premultiplied)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
     QSvgRenderer(QByteArray(svg)).render(painter, QRectF(0, 0, size_px, size_px))
     painter.end()
-    return pixmap
+    return image

@@ -45,7 +45,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.banner import Banner
 
 Page = Literal["start", "live", "review"]
@@ -162,6 +162,7 @@ class MainWindow(QMainWindow):
         self._make_menus()
         self._keep_focus_off_clicked_buttons()
         self.show_page("start")
+        follow_theme(self, self._draw_title_buttons)
 
     @property
     def docks(self) -> Mapping[str, QDockWidget]:
@@ -267,12 +268,6 @@ class MainWindow(QMainWindow):
                 self.keyPressEvent(event)
                 return event.isAccepted()
         return super().eventFilter(watched, event)
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw_title_buttons()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Emit `closing` before the window closes."""

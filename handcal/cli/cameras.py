@@ -26,7 +26,7 @@ REALSENSE_OPTIONS = (
         "--profile",
         choices=get_args(Profile),
         default="auto",
-        help="size of the RealSense's images; auto: the largest on offer",
+        help="size of the RealSense's images; auto: the largest available",
     ),
     arg(
         "--preset",

@@ -25,7 +25,7 @@ from handcal.errors import HandcalError
     json=True,
 )
 def bench(arguments: argparse.Namespace) -> None:
-    """Measure accuracy and speed beside targets and a baseline."""
+    """Measure accuracy and speed, and compare them with targets and a baseline."""
     from handcal.lab.bench import PARTS, QUICK, BenchSettings, bench_table, run_bench
 
     if arguments.only not in ("", *PARTS):

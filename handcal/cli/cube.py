@@ -135,7 +135,7 @@ def net(arguments: argparse.Namespace) -> None:
         nargs="+",
         default=(),
         metavar="NAME",
-        help="names of the ways of drawing to compare (default: one way, without a name)",
+        help="names of the drawing methods to compare (default: a single one, unnamed)",
     ),
     arg("--no-grid", action="store_true", help="do not capture the display's grid"),
 )
@@ -174,7 +174,7 @@ def capture(arguments: argparse.Namespace) -> None:
         type=number(int, 0, 2**32 - 1),
         metavar="N",
         default=1,
-        help="random seed of everything that varies",
+        help="random seed",
     ),
     arg(
         "--poses",

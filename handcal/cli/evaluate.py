@@ -163,7 +163,7 @@ def _cell(value: float | None, scale: float, digits: int) -> str:
     json=True,
 )
 def users(arguments: argparse.Namespace) -> None:
-    """Evaluate the user test over sessions: errors of calibrations against the wearers' view."""
+    """Evaluate the user test: the errors that wearers saw after calibration."""
     from handcal.lab.evaluate.run import run_user_test
     from handcal.lab.settings import UserTestSettings
     from handcal.report.cells import interval_ends, mean_sd

@@ -48,7 +48,7 @@ _EVALUATE: Mapping[str, Entry] = {
         "Measure the segmentation of the hand on frames with true masks.", "evaluate"
     ),
     "users": Entry(
-        "Evaluate the user test over sessions: errors of calibrations against the wearers' view.",
+        "Evaluate the user test: the errors that wearers saw after calibration.",
         "evaluate",
     ),
 }
@@ -83,7 +83,7 @@ _RIG: Mapping[str, Entry] = {
         "Calibrate one eye's display from the viewpoint camera's images of its grid.", "rig_files"
     ),
     "make": Entry(
-        "Put the depth camera's pose, a stereo calibration, into a rig file.", "rig_files"
+        "Write the depth camera's pose, from a stereo calibration, into a rig file.", "rig_files"
     ),
     "depth": Entry(
         "Check the depth camera against a board at several distances, and put it into a rig file.",
@@ -92,7 +92,9 @@ _RIG: Mapping[str, Entry] = {
     "check": Entry(
         "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
     ),
-    "compare": Entry("Compare two rig files, and show how far apart they draw.", "rig_files"),
+    "compare": Entry(
+        "Compare two rig files, and show how far apart they draw a target.", "rig_files"
+    ),
     "migrate": Entry(
         "Convert a rig file of any known version to the newest, and list what it does not say.",
         "rig_files",
@@ -128,7 +130,9 @@ COMMANDS: Mapping[str, Entry] = {
     "rig": Entry("Calibrate the rig offline: boards, cameras, displays, and the rig file.", _RIG),
     "evaluate": Entry("Evaluate handcal on given images and sessions.", _EVALUATE),
     "study": Entry("Run a study on simulated wearers, in many processes, with a report.", _STUDY),
-    "bench": Entry("Measure accuracy and speed beside targets and a baseline.", "checks"),
+    "bench": Entry(
+        "Measure accuracy and speed, and compare them with targets and a baseline.", "checks"
+    ),
     "doctor": Entry(
         "Check the installation and the camera, with advice for each problem.", "checks"
     ),

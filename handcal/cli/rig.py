@@ -77,7 +77,7 @@ _CALIBRATION_OPTIONS = (
         "--format",
         choices=CALIBRATION_FORMATS,
         default="json",
-        help="format of the result; only json holds all of it",
+        help="format of the result; only json contains everything",
     ),
 )
 

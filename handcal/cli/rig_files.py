@@ -192,7 +192,7 @@ def display(arguments: argparse.Namespace) -> None:
     *_RIG_AND_OUTPUT,
 )
 def make(arguments: argparse.Namespace) -> None:
-    """Put the depth camera's pose, a stereo calibration, into a rig file."""
+    """Write the depth camera's pose, from a stereo calibration, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
     from handcal.rig.steps import identity_in, intrinsics_in, pose_in
@@ -278,7 +278,7 @@ def check(arguments: argparse.Namespace) -> None:
     json=True,
 )
 def compare(arguments: argparse.Namespace) -> None:
-    """Compare two rig files, and show how far apart they draw."""
+    """Compare two rig files, and show how far apart they draw a target."""
     from handcal.rig.compare import compare_rigs
 
     differences = compare_rigs(_read_rig(arguments.a), _read_rig(arguments.b))

@@ -97,11 +97,11 @@ def _write(
 
             report = session_report(outcome)
             if name == "report":
-                write_pdf(place / "report.pdf", report, progress.at)
+                write_pdf(place / "report.pdf", report, progress)
             else:
-                write_html(place / "report.html", report, progress.part(0.0, 0.5).at)
+                write_html(place / "report.html", report, progress.part(0.0, 0.5))
                 figures = place / "figures"
-                write_figures(figures, report, progress.part(0.5, 1.0).at)
+                write_figures(figures, report, progress.part(0.5, 1.0))
         case "csv":
             write_parameters(place / "parameters.csv", outcome)
             write_trials(place / "trials.csv", outcome)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,6 +10,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure as Canvas
 
 from handcal.io.files import make_folder, write_atomic
+from handcal.progress import Progress
 from handcal.report.document import Figure, Report
 from handcal.report.page import CONTENT_MM, MM_PER_INCH, add_strip
 from handcal.report.rows import rows_csv
@@ -18,7 +18,7 @@ from handcal.report.rows import rows_csv
 _DPI = 200
 
 
-def write_figures(folder: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
+def write_figures(folder: Path, report: Report, progress: Progress) -> None:
     """Write NAME.png and NAME.csv for each of a report's figures.
 
     Parameters
@@ -26,11 +26,11 @@ def write_figures(folder: Path, report: Report, checkpoint: Callable[[float], No
     folder : Path
         Created if there is any figure.
     report : Report
-    checkpoint : callable
-        Called with the share done before each figure; any exception it raises ends the writing.
+    progress : Progress
+        Told the share done before each figure.
     """
     for done, figure in enumerate(report.figures):
-        checkpoint(done / len(report.figures))
+        progress.at(done / len(report.figures))
         make_folder(folder)
         write_atomic(folder / f"{figure.name}.png", picture(figure, "png"))
         write_atomic(folder / f"{figure.name}.csv", rows_csv(figure.rows))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from handcal.io.files import write_atomic
 from handcal.io.resources import resource_path
+from handcal.progress import Progress
 from handcal.report.document import Figure, Report, Table
 from handcal.report.figures import picture
 from handcal.report.rows import rows_csv
@@ -18,15 +18,15 @@ from handcal.report.rows import rows_csv
 _NO_BREAK = "\u00a0"
 
 
-def write_html(path: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
+def write_html(path: Path, report: Report, progress: Progress) -> None:
     """Write a report as HTML with embedded figures and data.
 
     Parameters
     ----------
     path : Path
     report : Report
-    checkpoint : callable
-        Called with the share done before each figure; any exception it raises ends the writing.
+    progress : Progress
+        Told the share done before each figure.
     """
     template = resource_path("report.html.jinja")
     environment = Environment(
@@ -45,7 +45,7 @@ def write_html(path: Path, report: Report, checkpoint: Callable[[float], None]) 
 
     def drawn(figure: Figure) -> str:
         nonlocal done
-        checkpoint(done / len(report.figures))
+        progress.at(done / len(report.figures))
         done += 1
         return _data_url("image/svg+xml", picture(figure, "svg"))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure as Page
 
 from handcal.io.files import write_atomic
+from handcal.progress import Progress
 from handcal.report.document import Figure, Item, Report, Table
 from handcal.report.page import Document, plain
 
@@ -23,18 +24,18 @@ if TYPE_CHECKING:
 _HEADING_MM, _PARAGRAPH_MM, _TABLE_MM = 15.0, 12.0, 25.0
 
 
-def write_pdf(path: Path, report: Report, checkpoint: Callable[[float], None]) -> None:
+def write_pdf(path: Path, report: Report, progress: Progress) -> None:
     """Write a report as PDF, A4, with embedded fonts.
 
     Parameters
     ----------
     path : Path
     report : Report
-    checkpoint : callable
-        Called with the share done, many times a second; any exception it raises ends the writing.
+    progress : Progress
+        Told the share done many times a second.
     """
-    pages = compose(report, lambda share: checkpoint(0.4 * share))
-    stream = _CheckedStream(checkpoint, 0.4)
+    pages = compose(report, progress.part(0.0, 0.4))
+    stream = _CheckedStream(progress, 0.4)
     # TrueType, as publishers refuse Type 3; images at 200 dots per inch.
     with rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
         pdf: Any = PdfPages(stream, metadata=_metadata(report))
@@ -46,7 +47,7 @@ def write_pdf(path: Path, report: Report, checkpoint: Callable[[float], None]) -
     write_atomic(path, stream.getvalue())
 
 
-def compose(report: Report, checkpoint: Callable[[float], None]) -> list[Page]:
+def compose(report: Report, progress: Progress) -> list[Page]:
     """Return the report's pages; parameters as in `write_pdf`."""
     document = Document(report.subject)
     document.title(report.title)
@@ -60,22 +61,22 @@ def compose(report: Report, checkpoint: Callable[[float], None]) -> list[Page]:
         if section.title:
             document.heading(section.title, _HEADING_MM + _room_mm(section.items))
         for item in section.items:
-            checkpoint(done / count)
+            progress.at(done / count)
             done += 1
             _set(document, item)
     return document.finish()
 
 
 class _CheckedStream(io.BytesIO):
-    """A buffer that calls the checkpoint on every write, as matplotlib is slow between pages."""
+    """A buffer that checks the progress on every write, as matplotlib is slow between pages."""
 
-    def __init__(self, checkpoint: Callable[[float], None], share: float) -> None:
+    def __init__(self, progress: Progress, share: float) -> None:
         super().__init__()
         self.share = share
-        self._checkpoint = checkpoint
+        self._progress = progress
 
     def write(self, data: Buffer, /) -> int:
-        self._checkpoint(self.share)
+        self._progress.at(self.share)
         return super().write(data)
 
 

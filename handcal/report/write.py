@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from handcal.io.files import make_folder
+from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.report.figures import write_figures
 from handcal.report.html import write_html
@@ -13,7 +13,7 @@ from handcal.report.pdf import write_pdf
 
 
 def write_report(
-    folder: Path, report: Report, checkpoint: Callable[[float], None] = lambda _share: None
+    folder: Path, report: Report, progress: Progress = Progress()
 ) -> tuple[Path, Path]:
     """Write report.pdf, report.html, figures/NAME.png and figures/NAME.csv, each atomically.
 
@@ -22,8 +22,8 @@ def write_report(
     folder : Path
         Created if needed.
     report : Report
-    checkpoint : callable
-        Told the share done, many times a second; what it raises ends the writing.
+    progress : Progress
+        Told the share done many times a second.
 
     Returns
     -------
@@ -32,12 +32,13 @@ def write_report(
 
     Raises
     ------
+    CancelledError
     FileError
         If a file cannot be written.
     """
     pdf, html = make_folder(folder) / "report.pdf", folder / "report.html"
-    write_pdf(pdf, report, lambda share: checkpoint(0.4 * share))
-    write_html(html, report, lambda share: checkpoint(0.4 + 0.3 * share))
-    write_figures(folder / "figures", report, lambda share: checkpoint(0.7 + 0.3 * share))
-    checkpoint(1.0)
+    write_pdf(pdf, report, progress.part(0.0, 0.4))
+    write_html(html, report, progress.part(0.4, 0.7))
+    write_figures(folder / "figures", report, progress.part(0.7, 1.0))
+    progress.at(1.0)
     return pdf, html

@@ -8,7 +8,7 @@ through it. Then a cube is tracked by the depth camera and captured, real and dr
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import product
@@ -22,6 +22,7 @@ from handcal.errors import FileError
 from handcal.geometry import image_points, invert, project, rigid, transform
 from handcal.io.files import make_folder, write_json
 from handcal.io.images import write_png
+from handcal.progress import Progress
 from handcal.register.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import write_cube
@@ -82,9 +83,7 @@ class CaptureSettings:
     pictures: PictureSettings = field(default_factory=lambda: PictureSettings(samples=2))
 
 
-def write_captures(
-    folder: Path, rig: Rig, settings: CaptureSettings, report: Callable[[str, float], None]
-) -> None:
+def write_captures(folder: Path, rig: Rig, settings: CaptureSettings, progress: Progress) -> None:
     """Write the captures of a test, `camera.json`, `cube.json`, and the truth, `truth.json`.
 
     The cube is drawn with the offline calibration (``virtual-offline``), with φ solved from the
@@ -100,11 +99,11 @@ def write_captures(
         Must be empty if it exists.
     rig : Rig
     settings : CaptureSettings
-    report : callable
-        Told what is being done, and the share done; may raise to give up.
+    progress : Progress
 
     Raises
     ------
+    CancelledError
     FileError
         If the folder is not empty, or cannot be written.
     CubeError
@@ -113,7 +112,7 @@ def write_captures(
     if any(make_folder(folder).iterdir()):
         raise FileError(f"{folder} is not empty: choose a new folder")
     with _appearing_in(folder) as rendering:
-        _render(rendering, rig, settings, report)
+        _render(rendering, rig, settings, progress)
 
 
 @contextmanager
@@ -130,9 +129,7 @@ def _appearing_in(folder: Path) -> Iterator[Path]:
         shutil.rmtree(hidden, ignore_errors=True)
 
 
-def _render(
-    folder: Path, rig: Rig, settings: CaptureSettings, report: Callable[[str, float], None]
-) -> None:
+def _render(folder: Path, rig: Rig, settings: CaptureSettings, progress: Progress) -> None:
     write_intrinsics(folder / "camera.json", settings.camera, "json")
     write_cube(folder / "cube.json", settings.cube)
     studio = _Studio(rig, settings)
@@ -149,7 +146,7 @@ def _render(
         write_png(place / "grid.png", studio.capture_display(studio.grid, T_E_C, rng))
         for pose in range(settings.poses):
             done = (number + pose / settings.poses) / len(settings.positions)
-            report(f"{position}, pose {pose + 1}", done)
+            progress.at(done, f"Rendering {position}, pose {pose + 1}")
             images = make_folder(place / f"pose-{pose + 1}")
             for name, image in studio.capture_cube(T_E_C, shifts_m, rng):
                 write_png(images / f"{name}.png", image)

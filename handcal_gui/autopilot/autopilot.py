@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from handcal.station.snapshot import Snapshot
 from handcal_gui.control.live import CalibrationController
-from handcal_gui.pages.wizard.steps import Action, View
+from handcal_gui.pages.wizard.steps import Action, WizardView
 from handcal_gui.pages.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7
@@ -46,22 +46,22 @@ class Autopilot(QObject):
         self,
         live: CalibrationController,
         wizard_panel: WizardPanel,
-        look: Callable[[View], None] = lambda _view: None,
+        look: Callable[[WizardView], None] = lambda _view: None,
     ) -> None:
         super().__init__(live)
         self._wizard_panel = wizard_panel
         self._look = look
-        self._view: View | None = None
+        self._view: WizardView | None = None
         self._since_s = self._moved_s = time.monotonic()
         self._moved_at = 0
         self._is_paused = self._is_done = False
         live.polled.connect(self._watch)
 
     def pause(self) -> None:
-        """Press no button until `go_on`."""
+        """Press no button until `resume`."""
         self._is_paused = True
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """Continue after a pause."""
         self._is_paused = False
         self._view = None
@@ -83,7 +83,7 @@ class Autopilot(QObject):
         ):
             self._act(view)
 
-    def _act(self, view: View) -> None:
+    def _act(self, view: WizardView) -> None:
         self._since_s = time.monotonic()
         self._look(view)
         if self._is_paused:
@@ -98,7 +98,7 @@ class Autopilot(QObject):
         tell()
 
     @staticmethod
-    def _complaint(view: View) -> str:
+    def _complaint(view: WizardView) -> str:
         missing = [check.text for check in view.checks if not check.holds]
         why = f": {'; '.join(missing)}" if missing else ""
         return f"no progress at “{view.step.value}” for {_PATIENCE_S:.0f} s{why}"

@@ -14,7 +14,7 @@ from handcal_gui.autopilot.autopilot import Autopilot
 from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.autopilot.tour import Tour
 from handcal_gui.dialogs.export import ExportDialog
-from handcal_gui.pages.wizard.steps import Step, View
+from handcal_gui.pages.wizard.steps import Step, WizardView
 from handcal_gui.program import Program
 
 
@@ -44,11 +44,11 @@ class Demonstration(QObject):
         self._tour = Tour(program, self._screenshots) if self._screenshots else None
         self._has_toured = False
         if self._tour:
-            self._tour.failed.connect(self._give_up)
+            self._tour.failed.connect(self._fail)
         self._autopilot = Autopilot(program.live, program.wizard_panel, self._look)
         self._autopilot.finished.connect(self._export)
-        self._autopilot.stuck.connect(self._give_up)
-        program.live.ended.connect(self._give_up)
+        self._autopilot.stuck.connect(self._fail)
+        program.live.ended.connect(self._fail)
 
     def start(self, settings: StationSettings) -> None:
         """Start the demonstration."""
@@ -62,34 +62,34 @@ class Demonstration(QObject):
         else:
             calibrate()
 
-    def _look(self, view: View) -> None:
+    def _look(self, view: WizardView) -> None:
         if self._screenshots is None or self._tour is None:
             return
         try:
             self._screenshots.save_step(view)
         except FileError as error:
-            self._give_up(str(error))
+            self._fail(str(error))
         if view.step is Step.SAVE and not self._has_toured:
             self._has_toured = True
             self._autopilot.pause()
-            self._tour.begin(self._tour.panels(), self._autopilot.go_on)
+            self._tour.begin(self._tour.panels(), self._autopilot.resume)
 
     def _export(self) -> None:
-        self._program.live.ended.disconnect(self._give_up)  # from now on the engine may end
+        self._program.live.ended.disconnect(self._fail)  # from now on the engine may end
         dialog = self._program.export(self._output)
         if dialog is None:
-            self._give_up("there was nothing to export")
+            self._fail("there was nothing to export")
             return
-        dialog.succeeded.connect(lambda _files: self._look_back(dialog))
-        dialog.failed.connect(self._give_up)
+        dialog.succeeded.connect(lambda _files: self._after_export(dialog))
+        dialog.failed.connect(self._fail)
         if self._tour:
             self._tour.begin(self._tour.export(dialog), lambda: None)
         else:
             dialog.start()
 
-    def _look_back(self, dialog: ExportDialog) -> None:
+    def _after_export(self, dialog: ExportDialog) -> None:
         if self._tour:
-            self._tour.begin(self._tour.afterwards(dialog), self._finish)
+            self._tour.begin(self._tour.after_export(dialog), self._finish)
         else:
             self._finish()
 
@@ -97,6 +97,6 @@ class Demonstration(QObject):
         self.complaint = None
         QApplication.quit()
 
-    def _give_up(self, why: str) -> None:
+    def _fail(self, why: str) -> None:
         self.complaint = why or self.complaint
         QApplication.exit(1)

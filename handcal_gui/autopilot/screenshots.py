@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder
-from handcal_gui.pages.wizard.steps import STEPS, Action, Step, View
+from handcal_gui.pages.wizard.steps import STEPS, Action, Step, WizardView
 
 
 class Screenshots:
@@ -31,7 +31,7 @@ class Screenshots:
         self._folder = make_folder(folder)
         self._seen: dict[Step, set[Action]] = {}
 
-    def save_step(self, view: View) -> None:
+    def save_step(self, view: WizardView) -> None:
         """Save the window the first time that a step shows a main action."""
         seen = self._seen.setdefault(view.step, set())
         action = view.main.action

@@ -91,7 +91,7 @@ class Tour(QObject):
         yield _LOOK_MS // 2
         self._save("export-runs", dialog)
 
-    def afterwards(self, dialog: ExportDialog) -> Walk:
+    def after_export(self, dialog: ExportDialog) -> Walk:
         """Save the completed export, the session opened for review, and the preferences."""
         program = self._program
         self._save("export-done", dialog)

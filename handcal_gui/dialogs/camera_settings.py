@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import beside, choice, named, paragraph, whole_number
+from handcal_gui.widgets.fields import choice, hbox, paragraph, whole_number, with_name
 
 _AS_IT_IS = "Keep the camera's setting"
 _PROFILES: dict[Profile, str] = {
@@ -102,7 +102,7 @@ class CameraSettingsDialog(QDialog):
 
     def _lay_out(self) -> None:
         filters = QWidget()
-        beside(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
+        hbox(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
         form = QFormLayout()
         form.setSpacing(SPACING_PX)
         form.addRow("Image size", self._profile)
@@ -115,7 +115,7 @@ class CameraSettingsDialog(QDialog):
         buttons = QDialogButtonBox(standard.Ok | standard.Cancel | standard.RestoreDefaults)
         for one in buttons.buttons():
             one.setIcon(QIcon())  # like all other buttons
-        restore = named(buttons.button(standard.RestoreDefaults), "restore", "Restore defaults")
+        restore = with_name(buttons.button(standard.RestoreDefaults), "restore", "Restore defaults")
         restore.setText("Restore defaults")
         restore.clicked.connect(lambda: self._show(RealSenseSettings()))
         buttons.accepted.connect(self.accept)
@@ -145,11 +145,11 @@ class _OwnNumber(QWidget):
         super().__init__()
         self._number, self._usual = number, usual
         number.setAccessibleName(label)
-        self._left = named(
+        self._left = with_name(
             QCheckBox(left), f"{number.objectName()}Left", f"{label}: {left}", number.toolTip()
         )
         self._left.toggled.connect(number.setDisabled)
-        beside(self, number, self._left, grows=self._left)
+        hbox(self, number, self._left, grows=self._left)
 
     @property
     def value(self) -> float | None:
@@ -170,4 +170,4 @@ def _number(name: str, low: int, high: int, step: int, unit: str, help_text: str
 
 
 def _filter(name: str, text: str, help_text: str) -> QCheckBox:
-    return named(QCheckBox(text), name, f"{text} filter", help_text)
+    return with_name(QCheckBox(text), name, f"{text} filter", help_text)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QVBox
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, Format
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import named, number
+from handcal_gui.widgets.fields import number, with_name
 from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
@@ -48,7 +48,9 @@ class ExportChoices(QWidget):
     ) -> None:
         super().__init__(parent)
         self._settings, self._name = settings, name
-        self._boxes = {kind: named(QCheckBox(info.title), kind) for kind, info in FORMATS.items()}
+        self._boxes = {
+            kind: with_name(QCheckBox(info.title), kind) for kind, info in FORMATS.items()
+        }
         self._near = number("near", 0.01, 1.0, 0.05, " m", "Anything nearer is not drawn.")
         self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Anything farther is not drawn.")
         self._near.setValue(settings.near_m)

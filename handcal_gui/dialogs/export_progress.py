@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QLabel, QListWidget, QProgressBar, QVBoxLayout, QW
 
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import named
+from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.numbers import counted
+from handcal_gui.widgets.numbers import pluralize
 
 _WHOLE = 1000
 _UNCHANGED = "the session and earlier exports are unchanged"
@@ -24,10 +24,10 @@ class ExportProgress(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._doing = named(QLabel(), "doing")
-        self._bar = named(QProgressBar(maximum=_WHOLE), "progress", "Progress")
+        self._doing = with_name(QLabel(), "doing")
+        self._bar = with_name(QProgressBar(maximum=_WHOLE), "progress", "Progress")
         self._end = FindingLine("exportEnd")
-        self._files = named(QListWidget(), "files", "Files")
+        self._files = with_name(QListWidget(), "files", "Files")
         self._files.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -55,7 +55,7 @@ class ExportProgress(QWidget):
         self._bar.setValue(_WHOLE)
         self._files.addItems([str(path.relative_to(folder)) for path in files])
         self._files.show()
-        count = f"{counted(len(files), 'file')} in {folder}"
+        count = f"{pluralize(len(files), 'file')} in {folder}"
         url = QUrl.fromLocalFile(str(folder))
         self._end.show_finding(
             Finding("", Health.GOOD, count), "Open folder", lambda: QDesktopServices.openUrl(url)

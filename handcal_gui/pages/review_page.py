@@ -11,7 +11,7 @@ from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button, main_button, paragraph
-from handcal_gui.widgets.numbers import counted
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
 
@@ -82,7 +82,7 @@ def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterato
     yield "Started", local_time(record.events[0].time)
     yield "Rig", record.rig.name
     state = "finished" if record.is_finished else "not finished"
-    counts = counted(len(record.alignments), "alignment"), counted(len(record.trials), "trial")
+    counts = pluralize(len(record.alignments), "alignment"), pluralize(len(record.trials), "trial")
     yield "Contents", f"{', '.join(counts)}; {state}"
     yield "Folder", str(record.path)
     for eye, verdict in results.verdicts.items() if results else ():

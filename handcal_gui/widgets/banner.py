@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
-from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.sentence import sentence
 
@@ -36,7 +36,7 @@ class Banner(QWidget):
         layout.addWidget(self._icon)
         layout.addWidget(self._text, 1)
         layout.addWidget(close)
-        self._refresh()
+        follow_theme(self, self._refresh)
 
     @property
     def text(self) -> str:
@@ -58,12 +58,6 @@ class Banner(QWidget):
         """Close the message."""
         self._message = ""
         self._refresh()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._refresh()
 
     def _refresh(self) -> None:
         self._icon.setPixmap(icon("warning").pixmap(2 * SPACING_PX))

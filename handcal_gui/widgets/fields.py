@@ -28,7 +28,7 @@ Option = TypeVar("Option", bound=str)
 _FIXED = QSizePolicy.Policy.Fixed
 
 
-def named(field: Field, name: str, label: str = "", help_text: str = "") -> Field:
+def with_name(field: Field, name: str, label: str = "", help_text: str = "") -> Field:
     """Give a widget its object name, its name for screen readers, and its tooltip."""
     field.setObjectName(name)
     field.setAccessibleName(label)
@@ -40,7 +40,7 @@ def number(
     name: str, low: float, high: float, step: float, unit: str, help_text: str
 ) -> QDoubleSpinBox:
     """Return a field for a number, right-aligned and with its unit."""
-    field = named(QDoubleSpinBox(decimals=1 if step >= 0.1 else 2), name, help_text=help_text)
+    field = with_name(QDoubleSpinBox(decimals=1 if step >= 0.1 else 2), name, help_text=help_text)
     field.setRange(low, high)
     field.setSingleStep(step)
     field.setSuffix(unit)
@@ -49,12 +49,12 @@ def number(
 
 def whole_number(name: str, low: int, high: int, help_text: str) -> QSpinBox:
     """Return a field for a whole number, right-aligned."""
-    return _settle(named(QSpinBox(minimum=low, maximum=high), name, help_text=help_text))
+    return _settle(with_name(QSpinBox(minimum=low, maximum=high), name, help_text=help_text))
 
 
 def choice(name: str, label: str, options: Mapping[Option, str], help_text: str = "") -> QComboBox:
     """Return a field for a choice of options, given their labels."""
-    field = named(QComboBox(), name, label, help_text)
+    field = with_name(QComboBox(), name, label, help_text)
     for option, text in options.items():
         field.addItem(text, option)
     field.setSizePolicy(_FIXED, _FIXED)
@@ -65,7 +65,7 @@ def choice(name: str, label: str, options: Mapping[Option, str], help_text: str 
 
 def button(name: str, text: str = "", label: str = "", help_text: str = "") -> QPushButton:
     """Return a button that Enter also presses while it has the focus."""
-    return named(QPushButton(text, autoDefault=True), name, label or text, help_text)
+    return with_name(QPushButton(text, autoDefault=True), name, label or text, help_text)
 
 
 class MainButton(QPushButton):
@@ -74,7 +74,7 @@ class MainButton(QPushButton):
 
 def main_button(name: str, text: str = "") -> MainButton:
     """Return a page's main button: large, and pressed by Enter."""
-    made = named(MainButton(text, autoDefault=True), name, text)
+    made = with_name(MainButton(text, autoDefault=True), name, text)
     scale_font(made, 1.2, is_bold=True)
     made.setMinimumHeight(5 * SPACING_PX)
     made.setDefault(True)
@@ -101,7 +101,7 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
     return label
 
 
-def beside(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
+def hbox(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
     """Lay out widgets in a row without margins, from the left; one of them may stretch."""
     layout = QHBoxLayout(row)
     layout.setContentsMargins(0, 0, 0, 0)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from handcal.station.doctor import Finding, Health
-from handcal_gui.theme import SPACING_PX, colors, icon
-from handcal_gui.widgets.fields import button, named, paragraph
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.sentence import sentence
 
 _ICONS = {Health.GOOD: "check", Health.LIMITED: "warning", Health.BROKEN: "cross"}
@@ -24,7 +24,7 @@ class FindingLine(QWidget):
         self.setObjectName(f"{name}Finding")
         self._finding: Finding | None = None
         self._mend: Callable[[], object] | None = None
-        self._icon = named(QLabel(), f"{name}Health")
+        self._icon = with_name(QLabel(), f"{name}Health")
         self._icon.setFixedSize(2 * SPACING_PX, 2 * SPACING_PX)
         self._text = paragraph(f"{name}Found")
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -37,6 +37,7 @@ class FindingLine(QWidget):
         layout.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
         layout.addWidget(self._text, 1)
         layout.addWidget(self._button, 0, Qt.AlignmentFlag.AlignTop)
+        follow_theme(self, self._refresh)
 
     def show_finding(
         self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
@@ -49,12 +50,6 @@ class FindingLine(QWidget):
         self._button.setText(fix)
         self._button.setVisible(bool(fix))
         self._refresh()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._refresh()
 
     def _refresh(self) -> None:
         if self._finding is None:

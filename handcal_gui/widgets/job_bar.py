@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLabel, QProgressBar, QWidget
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import beside, button, named
+from handcal_gui.widgets.fields import button, hbox, with_name
 
 _WHOLE = 1000
 
@@ -33,12 +33,12 @@ class JobBar(QWidget):
         super().__init__(parent)
         self._job: Job | None = None
         self._then: Callable[[Any], object] = lambda _: None
-        self._doing: QLabel = named(ElidedLabel(), "doing")
-        self._bar = named(QProgressBar(), "progress", "Progress")
+        self._doing: QLabel = with_name(ElidedLabel(), "doing")
+        self._bar = with_name(QProgressBar(), "progress", "Progress")
         self._bar.setFixedWidth(20 * SPACING_PX)
         self._cancel = button("cancel", "Cancel")
         self._cancel.clicked.connect(self.cancel)
-        beside(self, self._bar, self._doing, self._cancel, grows=self._doing)
+        hbox(self, self._bar, self._doing, self._cancel, grows=self._doing)
         self._refresh()
         self.setMinimumHeight(self._cancel.sizeHint().height())
 

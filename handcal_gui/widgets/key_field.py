@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from handcal_gui.widgets.fields import beside, button, named
+from handcal_gui.widgets.fields import button, hbox, with_name
 
 
 class KeyField(QWidget):
@@ -13,7 +13,7 @@ class KeyField(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._key = named(
+        self._key = with_name(
             QLineEdit(readOnly=True),
             "pairingKey",
             "Pairing key",
@@ -22,7 +22,7 @@ class KeyField(QWidget):
         self._reveal = button("showKey", "Show", "Show the pairing key")
         self._reveal.setCheckable(True)
         copy = button("copyKey", "Copy", "Copy the pairing key")
-        beside(self, self._key, self._reveal, copy, grows=self._key)
+        hbox(self, self._key, self._reveal, copy, grows=self._key)
         self.setFocusProxy(self._key)
         self._reveal.toggled.connect(self._show)
         copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))

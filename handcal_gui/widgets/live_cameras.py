@@ -78,9 +78,9 @@ class LiveCameras(QWidget):
             source.currentIndexChanged.connect(self._refresh)
         self._lay_out()
         self._refresh()
-        self._say("No image yet")
+        self._show_message("No image yet")
 
-    def offer(self, numbers: Iterable[int]) -> None:
+    def add_cameras(self, numbers: Iterable[int]) -> None:
         """Add cameras of this computer to the choices, by their numbers."""
         for place, source in enumerate(self._sources.values()):
             for number in sorted(numbers, reverse=True):
@@ -110,7 +110,7 @@ class LiveCameras(QWidget):
         self._live.failed.connect(self._fail)
         self._live.start()
         self._timer.start()
-        self._say("Opening the camera…")
+        self._show_message("Opening the camera…")
 
     def stop(self) -> None:
         """Close the cameras; safe to call twice."""
@@ -119,7 +119,7 @@ class LiveCameras(QWidget):
             self._live.stop()
             self._live = None
         self.images = None
-        self._say("No image")
+        self._show_message("No image")
         self.images_changed.emit()
 
     def _source(self, title: str) -> str:
@@ -132,7 +132,7 @@ class LiveCameras(QWidget):
         if newest is None or newest is self.images:
             return
         self.images = newest
-        self._say("")
+        self._show_message("")
         for shown, image in zip(self._views.values(), newest, strict=True):
             shown.show_image(image)
         self.images_changed.emit()
@@ -141,7 +141,7 @@ class LiveCameras(QWidget):
         self.stop()
         self.failed.emit(why)
 
-    def _say(self, message: str) -> None:
+    def _show_message(self, message: str) -> None:
         for shown in self._views.values():
             shown.show_text(message=message)
 

@@ -6,7 +6,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.widgets.sentence import sentence
 
 
-def what_is_missing(snapshot: Snapshot) -> str:
+def missing_text(snapshot: Snapshot) -> str:
     """Return in short what is missing and why; empty if the hand is there.
 
     The banner describes problems of the camera in full; the wizard and the camera panel describe

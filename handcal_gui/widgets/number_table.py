@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import number_font, quiet
+from handcal_gui.theme import flat_header, follow_theme, number_font
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class NumberTable(QTableWidget):
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(self.verticalHeader().minimumSectionSize())
         self.verticalHeader().setSectionsClickable(False)
-        self._take_colors()
+        follow_theme(self, self._recolor)
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
 
@@ -83,15 +83,9 @@ class NumberTable(QTableWidget):
         super().resizeEvent(event)
         self._fit_columns()
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Update the headers when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._take_colors()
-
-    def _take_colors(self) -> None:
-        quiet(self.horizontalHeader())
-        quiet(self.verticalHeader())
+    def _recolor(self) -> None:
+        flat_header(self.horizontalHeader())
+        flat_header(self.verticalHeader())
         for corner in self.findChildren(QAbstractButton):
             corner.setStyleSheet(
                 "QTableCornerButton::section { background: palette(base); border: 0; }"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def counted(number: int, what: str) -> str:
+def pluralize(number: int, what: str) -> str:
     """Return a count with its noun: ``1 trial``, ``2 trials``."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 

@@ -7,7 +7,7 @@ from typing import Literal
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
-from handcal_gui.widgets.fields import beside, button
+from handcal_gui.widgets.fields import button, hbox
 
 INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
 """File filter for a camera's intrinsics."""
@@ -54,7 +54,7 @@ class PathField(QWidget):
                 text = f"{one.capitalize()}…" if kind == "either" else "Choose…"
                 buttons.append(button(f"{one}Choice", text, f"Choose {name.lower()}"))
                 buttons[-1].clicked.connect(ask)
-        beside(self, self._line, *buttons, grows=self._line)
+        hbox(self, self._line, *buttons, grows=self._line)
         self.setFocusProxy(self._line)
 
     @property

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.theme import SPACING_PX, colors, follow_theme
 
 pg.setConfigOptions(antialias=True)
 
@@ -55,7 +55,7 @@ class Plot(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._view)
-        self._recolor()
+        follow_theme(self, self._recolor)
 
     def sizeHint(self) -> QSize:
         """Prefer a size with space for the axes."""
@@ -107,12 +107,6 @@ class Plot(QWidget):
             self.item.removeItem(item)
         self._lines.clear()
         self._texts.clear()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Follow a change between light and dark."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._recolor()
 
     def _recolor(self) -> None:
         now, text = colors(), self.palette().windowText().color()

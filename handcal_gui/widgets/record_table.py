@@ -13,10 +13,11 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from handcal_gui.theme import SPACING_PX, colors, number_font, quiet
+from handcal_gui.keys import add_action
+from handcal_gui.theme import SPACING_PX, colors, flat_header, number_font
 
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
 _NO_INDEX = QModelIndex()
@@ -24,7 +25,7 @@ _MEASURED_ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class RecordColumn:
     """A column; numbers are right-aligned."""
 
     title: str
@@ -39,7 +40,7 @@ class RecordTable(QTableView):
     ----------
     name : str
         For screen readers and, in lower case with dashes, as object name.
-    columns : sequence of Column
+    columns : sequence of RecordColumn
     empty_text : str
         Hint shown while the table is empty.
 
@@ -54,7 +55,7 @@ class RecordTable(QTableView):
     def __init__(
         self,
         name: str,
-        columns: Sequence[Column],
+        columns: Sequence[RecordColumn],
         empty_text: str,
         parent: QWidget | None = None,
     ) -> None:
@@ -75,16 +76,18 @@ class RecordTable(QTableView):
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + SPACING_PX // 2)
         across = self.horizontalHeader()
-        quiet(across)
+        flat_header(across)
         across.setHighlightSections(False)
         across.setResizeContentsPrecision(_MEASURED_ROWS)
         across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.delete_action = QAction("Delete", self)
-        self.delete_action.setToolTip("Delete the selected row (Del); can be undone")
-        self.delete_action.setShortcut(Qt.Key.Key_Delete)
-        self.delete_action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        self.delete_action.triggered.connect(self._delete)
-        self.addAction(self.delete_action)
+        self.delete_action = add_action(
+            self,
+            "Delete",
+            "Del",
+            self._delete,
+            tooltip="Delete the selected row (Del); can be undone",
+            context=Qt.ShortcutContext.WidgetShortcut,
+        )
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.selectionModel().selectionChanged.connect(self._refresh)
         self._refresh()
@@ -135,7 +138,7 @@ class RecordTable(QTableView):
 class _Records(QAbstractTableModel):
     """Model of the rows; a QTableWidgetItem per cell would take 0.5 s for a thousand rows."""
 
-    def __init__(self, columns: Sequence[Column]) -> None:
+    def __init__(self, columns: Sequence[RecordColumn]) -> None:
         super().__init__()
         self.numbers: list[int] = []
         self._columns = tuple(columns)
@@ -177,7 +180,7 @@ class _Records(QAbstractTableModel):
         return column.title if role == Qt.ItemDataRole.DisplayRole else _look(column, role)
 
 
-def _look(column: Column, role: int) -> object:
+def _look(column: RecordColumn, role: int) -> object:
     if role == Qt.ItemDataRole.ToolTipRole:
         return column.tooltip
     if role == Qt.ItemDataRole.TextAlignmentRole:

@@ -134,7 +134,7 @@ def eye_distance_text(results: Results) -> str:
     return NOTHING if distance_m is None else f"{1e3 * distance_m:.1f} mm"
 
 
-def alignment_rows(results: Results, rig: Rig) -> list[Row]:
+def single_alignment_rows(results: Results, rig: Rig) -> list[Row]:
     """Return φ from each alignment alone, one row per eye."""
     return [
         Row(f"{number} {eye}", tuple(q.text(shift, rig.eyes[eye]) for q in PHI))

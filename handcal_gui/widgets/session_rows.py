@@ -15,7 +15,7 @@ from handcal.session.trial import ErrorStatistics, TrialStatistics
 from handcal.types import EYES, Eye, EyeShift
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed
-from handcal_gui.widgets.record_table import Column
+from handcal_gui.widgets.record_table import RecordColumn
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
 
@@ -24,22 +24,22 @@ _PHI = (
     "below and in front of the rig's viewpoint, in millimetres"
 )
 ALIGNMENT_COLUMNS = (
-    Column("No.", "Number of the alignment"),
-    Column("Eyes", "Eyes open during the alignment", is_number=False),
-    Column("Rotation °", "Angle between hand and cursor at the confirmation, in degrees"),
-    Column("Left φ mm", _PHI.format("left eye")),
-    Column("Right φ mm", _PHI.format("right eye")),
-    Column("RMS mm", "Distance between hand and cursor after registration, in millimetres"),
-    Column("Inliers %", "Share of the hand's points with a partner on the cursor, in percent"),
-    Column("Time", "Time of the confirmation"),
+    RecordColumn("No.", "Number of the alignment"),
+    RecordColumn("Eyes", "Eyes open during the alignment", is_number=False),
+    RecordColumn("Rotation °", "Angle between hand and cursor at the confirmation, in degrees"),
+    RecordColumn("Left φ mm", _PHI.format("left eye")),
+    RecordColumn("Right φ mm", _PHI.format("right eye")),
+    RecordColumn("RMS mm", "Distance between hand and cursor after registration, in millimetres"),
+    RecordColumn("Inliers %", "Percentage of the hand's points with a partner on the cursor"),
+    RecordColumn("Time", "Time of the confirmation"),
 )
 TRIAL_COLUMNS = (
-    Column("No.", "Number of the trial"),
-    Column("Eye", "Eye that looked at the target", is_number=False),
-    Column("Distance m", "Distance of the target, in metres"),
-    Column("Error px", "Mean over the target's four corners, in pixels of the display"),
-    Column("Error ′", "Mean over the target's four corners, in arcminutes"),
-    Column("Time", "Time of the recording"),
+    RecordColumn("No.", "Number of the trial"),
+    RecordColumn("Eye", "Eye that looked at the target", is_number=False),
+    RecordColumn("Distance m", "Distance of the target, in metres"),
+    RecordColumn("Error px", "Mean over the target's four corners, in pixels of the display"),
+    RecordColumn("Error ′", "Mean over the target's four corners, in arcminutes"),
+    RecordColumn("Time", "Time of the recording"),
 )
 STATISTICS_COLUMNS = ("n", "Mean ± SD ′", "Median ′", "Max ′", "Mean ± SD px")
 

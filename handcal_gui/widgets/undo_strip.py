@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
 
+from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.session_rows import Deletion
@@ -34,12 +34,9 @@ class UndoStrip(QWidget):
         self._deletions: list[Deletion] = []
         self._text = ElidedLabel()
         self._text.setObjectName("undoText")
-        self._undo = QAction("Undo", self)
-        self._undo.setToolTip("Restore the deleted item (Ctrl+Z)")
-        self._undo.setShortcut(QKeySequence.StandardKey.Undo)
-        self._undo.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        self._undo.triggered.connect(self._restore)
-        parent.addAction(self._undo)
+        self._undo = add_action(
+            parent, "Undo", "Ctrl+Z", self._restore, tooltip="Restore the deleted item (Ctrl+Z)"
+        )
         self._button = QToolButton()
         self._button.setDefaultAction(self._undo)
         policy = self._button.sizePolicy()

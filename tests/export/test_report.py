@@ -17,6 +17,7 @@ from matplotlib.transforms import Bbox
 from handcal.errors import CancelledError
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
+from handcal.progress import Progress
 from handcal.register.verdict import expected_error_arcmin
 from handcal.report.pdf import compose, write_pdf
 from handcal.session.session import SessionRecord
@@ -25,13 +26,9 @@ from handcal.session.trial import Trial
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
 
 
-def ignore(_share: float) -> None:
-    """Go on."""
-
-
 @pytest.fixture(scope="module")
 def pages(outcome: SessionOutcome) -> list[Figure]:
-    return compose(session_report(outcome), ignore)
+    return compose(session_report(outcome), Progress())
 
 
 def texts(pages: list[Figure]) -> list[str]:
@@ -95,13 +92,13 @@ def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: SessionO
 def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: str) -> None:
     hostile = replace(empty, wearer=text, notes=text, settings={text: {text: [text]}})
     outcome = replace(load_outcome(empty), record=hostile)
-    write_pdf(tmp_path / "report.pdf", session_report(outcome), ignore)
+    write_pdf(tmp_path / "report.pdf", session_report(outcome), Progress())
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 
 def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
-    found = texts(compose(session_report(load_outcome(empty)), ignore))
+    found = texts(compose(session_report(load_outcome(empty)), Progress()))
     assert "Nothing is solved: the session holds no alignment." in found
     assert "Convergence" not in found
 
@@ -112,7 +109,7 @@ def test_the_file_is_a4_with_its_fonts_and_all_pages(
 ) -> None:
     shares: list[float] = []
     path = tmp_path / "report.pdf"
-    write_pdf(path, session_report(outcome), shares.append)
+    write_pdf(path, session_report(outcome), Progress(lambda _, share: shares.append(share)))
     assert shares == sorted(shares)
     content = path.read_bytes()
     assert len(re.findall(rb"/Type /Page\b", content)) == len(pages)
@@ -132,12 +129,12 @@ def test_giving_up_at_any_time_leaves_no_file(
 ) -> None:
     asked = 0
 
-    def give_up(_share: float) -> None:
+    def give_up(_what: str, _share: float) -> None:
         nonlocal asked
         asked += 1
         if asked > after:
             raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
-        write_pdf(tmp_path / "report.pdf", session_report(outcome), give_up)
+        write_pdf(tmp_path / "report.pdf", session_report(outcome), Progress(give_up))
     assert not list(tmp_path.iterdir())

@@ -125,7 +125,7 @@ def test_a_bad_file_is_kept_beside(file: PreferencesFile, tmp_path: Path, conten
     assert file.load() == (Preferences(), "")
 
 
-def test_what_cannot_be_saved_is_told_and_leaves_the_old(
+def test_what_cannot_be_saved_is_reported_and_leaves_the_old(
     file: PreferencesFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file.save(CHANGED)

@@ -276,7 +276,7 @@ def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> N
     assert live.child(QLabel, "wizardNote").text() == ""
 
 
-def test_a_silent_headset_is_told_and_sending_repeated(live: Technician, studio: Any) -> None:
+def test_a_silent_headset_is_reported_and_sending_repeated(live: Technician, studio: Any) -> None:
     align(live, studio)
     live.press_space_for(Action.SOLVE)
     live.wait(lambda: live.can(Action.APPLY))
@@ -483,7 +483,7 @@ def test_opening_a_station_can_be_cancelled(
     technician.wait_for_page("live")
 
 
-def test_a_session_broken_off_is_offered_and_gone_on_with(
+def test_an_interrupted_session_is_offered_and_resumed(
     open_program: Callable[[], Technician], studio: Any
 ) -> None:
     first = open_program()
@@ -542,7 +542,7 @@ def test_an_unexpected_error_is_logged_and_shown(
     technician: Technician, caplog: pytest.LogCaptureFixture
 ) -> None:
     error = ZeroDivisionError("oh")
-    launch._tell(technician.program, type(error), error, error.__traceback__)
+    launch._report_error(technician.program, type(error), error, error.__traceback__)
     assert "ZeroDivisionError: oh" in technician.banner
     assert "unexpected error" in caplog.text
     technician.program.show_start()

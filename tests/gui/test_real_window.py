@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -18,8 +17,9 @@ import pytest
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.session.session import Session, SessionRecord
-from handcal_gui.pages.start.session_entries import find_offers
-from tests.helpers import ROOT, Patience
+from handcal.types import EYES
+from handcal_gui.pages.start.session_entries import find_sessions
+from tests.helpers import ROOT, Patience, write_small_rig
 
 ARTEFACTS = ROOT / "artefacts"
 PATIENCE_S = 90.0
@@ -117,20 +117,12 @@ def wait_for(what: str, condition: Callable[[], bool], window: Window) -> None:
         time.sleep(0.2)
 
 
-def newest_session(folder: Path) -> SessionRecord | None:
-    """Return the newest session in a folder; None while there is none, or it is being created."""
-    paths = sorted(folder.glob("session-*"))
-    try:
-        return Session.open(paths[-1]) if paths else None
-    except FileError:
-        return None
-
-
 @pytest.fixture
 def preferences(tmp_path: Path) -> Path:
     path = tmp_path / "config" / "preferences.json"
     path.parent.mkdir()
-    station = {"sessions": str(tmp_path / "sessions"), "seed": 1}
+    rig = write_small_rig(tmp_path / "rig.yaml")
+    station = {"sessions": str(tmp_path / "sessions"), "seed": 1, "rig": str(rig)}
     export = {"formats": ["report", "csv"]}
     path.write_text(
         json.dumps({"station": station, "export": export, "export_folder": str(tmp_path / "out")})
@@ -138,155 +130,146 @@ def preferences(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_technician_calibrates_with_the_keyboard_alone(
-    display: str, tmp_path: Path, preferences: Path
-) -> None:
-    sessions = tmp_path / "sessions"
+class Technician:
+    """Works at a window, and reads in the newest session what has happened."""
 
-    def record() -> SessionRecord | None:
-        return newest_session(sessions)
+    def __init__(self, window: Window, sessions: Path, preferences: Path) -> None:
+        self._window, self._sessions, self._preferences = window, sessions, preferences
 
-    def events(name: str) -> int:
-        session = record()
+    def session(self) -> SessionRecord | None:
+        """Return the newest session; None while there is none, or it is being created."""
+        paths = sorted(self._sessions.glob("session-*"))
+        with suppress(FileError):
+            return Session.open(paths[-1]) if paths else None
+        return None
+
+    def count(self, name: str) -> int:
+        """Return how many events of the newest session have a name."""
+        session = self.session()
         return sum(event.name == name for event in session.events) if session else 0
 
-    def has(name: str, count: int) -> bool:
-        return events(name) >= count
+    def start(self, wearer: str) -> None:
+        self._window.type(wearer)
+        self._window.shoot(f"real-1-start-{wearer}")
+        self._window.press("Return")
 
-    def press_space_until(name: str, count: int) -> None:
+        def is_shown() -> bool:
+            session = self.session()
+            known = self._preferences.read_text()  # from when the page is shown
+            return session is not None and session.wearer == wearer and session.path.name in known
+
+        wait_for(f"{wearer}'s session", is_shown, self._window)
+
+    def wait_until(self, name: str, count: int = 1) -> None:
+        wait_for(f"{name} {count}", lambda: self.count(name) >= count, self._window)
+
+    def press_space_until(self, name: str, count: int = 1) -> None:
         """Press the space bar as one who watches the screen: no faster than it changes."""
 
         def tried() -> bool:
-            if not has(name, count):
-                window.press("space")
+            if self.count(name) < count:
+                self._window.press("space")
                 time.sleep(0.8)
-            return has(name, count)
+            return self.count(name) >= count
 
-        wait_for(f"{name} {count}", tried, window)
-
-    def reports() -> list[Path]:
-        return list((tmp_path / "out").glob("*/report.pdf"))
-
-    with Window(display, "--preferences", preferences) as window:
-        window.find()
-        time.sleep(2.0)
-        window.type("Ada")
-        window.shoot("real-1-start")
-        window.press("Return")
-        wait_for("a session", lambda: record() is not None, window)
-        for eye in (1, 2):
-            press_space_until("cursor_made", eye)
-            window.shoot(f"real-2-align-{eye}")
-            # The wearer confirms in the headset.
-            wait_for("an alignment", partial(has, "alignment_saved", eye), window)
-            press_space_until("applied", eye)
-            window.shoot(f"real-3-applied-{eye}")
-        press_space_until("finished", 1)
-        window.press("ctrl+e")
-        time.sleep(1.5)
-        window.shoot("real-4-export")
-        window.press("Return")
-        wait_for("the report", lambda: bool(reports()), window)
-        time.sleep(1.0)
-        window.shoot("real-5-exported")
-        window.press("Escape")
-        time.sleep(0.5)
-        window.find()  # without a window manager, nobody gives the keyboard back
-        session = record()
-        window.press("ctrl+n")
-        time.sleep(2.0)
-        window.type("Bob")
-        window.press("Return")
-        wait_for("the next wearer", lambda: len(list(sessions.glob("*/lock"))) == 2, window)
-        window.press("ctrl+q")
-        window.end_well()
-    assert session is not None
-    assert session.wearer == "Ada"
-    assert session.is_finished
-    assert {eye for alignment in session.alignments.values() for eye in alignment.eyes} == {
-        "left",
-        "right",
-    }
-    (report,) = reports()
-    assert report.read_bytes().startswith(b"%PDF")
-    assert json.loads(preferences.read_text())["wearers"] == ["Bob", "Ada"]
+        wait_for(f"{name} {count}", tried, self._window)
 
 
-def test_the_space_bar_deletes_nothing_and_presses_once(
-    display: str, tmp_path: Path, preferences: Path
-) -> None:
-    def events() -> list[str]:
-        session = newest_session(tmp_path / "sessions")
-        return [event.name for event in session.events] if session else []
-
-    with Window(display, "--preferences", preferences) as window:
-        window.find()
-        time.sleep(2.0)
-        window.type("Ada")
-        window.press("Return")
-        wait_for("a session", lambda: bool(events()), window)
-        time.sleep(2.0)
-        for key in ("alt+y", "Down", "Escape", "Tab"):  # into the list of eyes, and on
-            window.press(key)
-            time.sleep(0.3)
-
-        def has_cursor() -> bool:
-            if "cursor_made" not in events():
-                window.press("space")
-                time.sleep(0.8)
-            return "cursor_made" in events()
-
-        wait_for("a cursor", has_cursor, window)
-        wait_for("an alignment", lambda: "alignment_saved" in events(), window)
-        time.sleep(2.0)  # until the button says so
-        window.hold("space", 3.0)
-        wait_for("a solution", lambda: "solved" in events(), window)
-        time.sleep(2.0)
-        window.shoot("real-7-held")
-        assert "applied" not in events()  # the next that the button offered
-        window.press("space")
-        wait_for("the projections", lambda: "applied" in events(), window)
-        assert "alignment_deleted" not in events()
-        window.press("ctrl+q")
-        window.end_well()
-
-
-def test_a_program_that_is_killed_leaves_a_session_to_go_on_with(
+def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
     display: str, tmp_path: Path, preferences: Path, headset_of: Callable[[int], int]
 ) -> None:
+    """One calibration to its export; in the next the space bar is held, and the program killed."""
     sessions = tmp_path / "sessions"
+    with Window(display, "--preferences", preferences) as window:
+        technician = Technician(window, sessions, preferences)
+        window.find()
+        time.sleep(2.0)
+        ada = calibrated_and_exported(window, technician)
+        (report,) = (tmp_path / "out").glob("*/report.pdf")
+        assert report.read_bytes().startswith(b"%PDF")
+        window.press("ctrl+n")
+        time.sleep(2.0)
+        technician.start("Bob")
+        hold_the_space_bar(window, technician)
+        headset = headset_of(window.process.pid)
+        window.process.kill()
+    assert ada.wearer == "Ada"
+    assert ada.is_finished
+    assert {eye for alignment in ada.alignments.values() for eye in alignment.eyes} == set(EYES)
+    assert json.loads(preferences.read_text())["wearers"] == ["Bob", "Ada"]
 
-    def alignments() -> int:
-        session = newest_session(sessions)
-        return len(session.alignments) if session else 0
+    killed = technician.session()
+    assert killed is not None
+    assert not killed.is_finished
+    assert len(killed.alignments) == 1
+    (unfinished,) = find_sessions(sessions, ()).unfinished
+    assert unfinished.is_enabled
+    resume_and_quit(display, killed.path, preferences)
+    resumed = technician.session()
+    assert resumed is not None
+    assert len(resumed.alignments) == 1
+    patience = Patience(PATIENCE_S)
+    while Path(f"/proc/{headset}").exists():  # the killed program's; it hears no PC any more
+        assert not patience.is_over()
+        time.sleep(0.2)
 
-    with Window(display, "--autopilot", "--output", sessions) as killed:
-        wait_for("an alignment", lambda: alignments() > 0, killed)
-        headset = headset_of(killed.process.pid)
-        killed.process.kill()
-    session = newest_session(sessions)
+
+def calibrated_and_exported(window: Window, technician: Technician) -> SessionRecord:
+    technician.start("Ada")
+    for eye in (1, 2):
+        technician.press_space_until("cursor_made", eye)
+        window.shoot(f"real-2-align-{eye}")
+        technician.wait_until("alignment_saved", eye)  # the wearer confirms in the headset
+        technician.press_space_until("applied", eye)
+        window.shoot(f"real-3-applied-{eye}")
+    technician.press_space_until("finished")
+    session = technician.session()
     assert session is not None
-    assert not session.is_finished
-    (offer,) = find_offers(sessions, ()).unfinished
-    assert offer.is_enabled
-    with Window(display, session.path, "--preferences", preferences) as window:
+    window.press("ctrl+e")
+    time.sleep(1.5)
+    window.shoot("real-4-export")
+    window.press("Return")
+    out = session.path.parents[1] / "out"
+    wait_for("the report", lambda: any(out.glob("*/report.pdf")), window)
+    time.sleep(1.0)
+    window.shoot("real-5-exported")
+    window.press("Escape")
+    time.sleep(0.5)
+    window.find()  # without a window manager, nobody gives the keyboard back
+    return session
+
+
+def hold_the_space_bar(window: Window, technician: Technician) -> None:
+    """Align one eye, and check that a space bar held down presses once and deletes nothing."""
+    for key in ("alt+y", "Down", "Escape", "Tab"):  # into the list of eyes, and on
+        window.press(key)
+        time.sleep(0.3)
+    technician.press_space_until("cursor_made")
+    technician.wait_until("alignment_saved")
+    time.sleep(2.0)  # until the button says so
+    window.hold("space", 3.0)
+    technician.wait_until("solved")
+    time.sleep(2.0)
+    window.shoot("real-6-held")
+    assert not technician.count("applied")  # the next that the button offered
+    technician.press_space_until("applied")
+    assert not technician.count("alignment_deleted")
+
+
+def resume_and_quit(display: str, session: Path, preferences: Path) -> None:
+    with Window(display, session, "--preferences", preferences) as window:
         window.find()
         time.sleep(2.0)
 
         def is_resumed() -> bool:
             window.press("alt+r")
             time.sleep(1.0)
-            return not find_offers(sessions, ()).unfinished[0].is_enabled
+            return not find_sessions(session.parent, ()).unfinished[0].is_enabled
 
         wait_for("the session in use again", is_resumed, window)
-        window.shoot("real-6-resumed")
+        window.shoot("real-7-resumed")
         window.press("ctrl+q")
         window.end_well()
-    assert alignments() == len(session.alignments)
-    patience = Patience(PATIENCE_S)
-    while Path(f"/proc/{headset}").exists():  # the killed program's; it hears no PC any more
-        assert not patience.is_over()
-        time.sleep(0.2)
 
 
 @pytest.mark.slow  # tests/gui/autopilot/test_demonstration.py covers all but the X server

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
+from typing import ClassVar
 
 import pytest
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.theme import colors, icon, is_dark, use_theme
+from handcal_gui.theme import colors, follow_theme, icon, is_dark, use_theme
 
 
 @pytest.fixture
@@ -46,3 +49,28 @@ def test_dark_is_dark_and_gives_way_again() -> None:
 def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:
     red = middle(icon("check", "#ff0000"))
     assert (red.red(), red.green(), red.blue()) == (255, 0, 0)
+
+
+@pytest.mark.usefixtures("themes")
+def test_a_widget_follows_the_theme_while_it_lives(qtbot: QtBot) -> None:
+    class Sign(QWidget):
+        drawn: ClassVar[list[str]] = []
+
+        def redraw(self) -> None:
+            self.drawn.append(colors().good)
+
+    use_theme("light")
+    sign = Sign()
+    follow_theme(sign, sign.redraw)
+    light = colors().good
+    assert Sign.drawn == [light]
+    use_theme("dark")
+    QApplication.processEvents()
+    assert Sign.drawn[-1] == colors().good != light
+    sign_died = weakref.ref(sign)
+    del sign
+    assert sign_died() is None, "following the theme must not keep a widget alive"
+    Sign.drawn.clear()
+    use_theme("light")
+    QApplication.processEvents()
+    assert not Sign.drawn

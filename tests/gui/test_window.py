@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -25,8 +26,9 @@ from pytestqt.qtbot import QtBot
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal_gui.keys import keys_by_group, keys_html
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, View, Wizard
+from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, WizardView
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
@@ -60,7 +62,7 @@ def main_button(window: MainWindow) -> QPushButton:
 def offer_solve(window: MainWindow) -> None:
     bar = window.findChild(ActionBar)
     assert isinstance(bar, ActionBar)
-    bar.show_view(View(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
+    bar.show_view(WizardView(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
 
 
 def shown(window: MainWindow) -> set[str]:
@@ -126,15 +128,32 @@ def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
     assert window.banner.text == ""
 
 
+def test_help_lists_every_key_of_an_action(program: Program) -> None:
+    groups = keys_by_group(program.window)
+    html = keys_html(program.window)
+    listed = [key for rows in groups.values() for keys, _ in rows for key in keys.split(", ")]
+    for action in program.window.findChildren(QAction):
+        for shortcut in action.shortcuts():
+            assert shortcut.toString(QKeySequence.SequenceFormat.NativeText) in listed
+    for group, keys, meaning in (
+        ("File", "Ctrl+N", "Next wearer"),
+        ("Window", "Space", "Press the large button, except from a text field"),
+        ("Camera", "F", "Freeze"),
+        ("Hand cloud", "+, =", "Zoom in"),
+        ("Fine-tune", "1", "Step of 0.1 mm"),
+    ):
+        assert (keys, meaning) in groups[group]
+        assert f"<b>{keys}</b>&nbsp;{meaning}" in html
+
+
 def test_no_key_is_taken_twice(window: MainWindow) -> None:
-    keys = [
-        action.shortcut().toString()
-        for menu in window.menuBar().actions()
-        for action in menu.menu().actions()  # type: ignore[attr-defined]
-        if not action.shortcut().isEmpty()
+    groups = keys_by_group(window)
+    everywhere = [
+        keys for group in ("Window", "File", "Go to", "Help") for keys, _ in groups[group]
     ]
-    assert {"Ctrl+N", "Ctrl+O", "Ctrl+E", "F1"} <= set(keys)
-    assert len(keys) == len(set(keys))
+    assert {"Space", "Ctrl+N", "Ctrl+O", "Ctrl+E", "F1"} <= set(everywhere)
+    for keys in (everywhere, *([keys for keys, _ in rows] for rows in groups.values())):
+        assert len(keys) == len(set(keys))
 
 
 def has_title(window: MainWindow, name: str) -> bool:
@@ -209,13 +228,13 @@ Maker = Callable[..., Snapshot]
 class Saying(Wizard):
     """A wizard that says what it is given."""
 
-    said: View
+    said: WizardView
 
-    def view(self, _snapshot: Snapshot) -> View:
+    def view(self, _snapshot: Snapshot) -> WizardView:
         return self.said
 
 
-def say(program: Program, snapshot: Snapshot, view: View) -> None:
+def say(program: Program, snapshot: Snapshot, view: WizardView) -> None:
     program.wizard_panel.wizard = wizard = Saying()
     wizard.said = view
     program.wizard_panel.show_snapshot(snapshot)
@@ -307,7 +326,7 @@ def focusable(window: MainWindow) -> Iterator[QWidget]:
 TEXT_FIELDS = (QLineEdit, QPlainTextEdit, QAbstractSpinBox)
 
 
-def offer(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[object]:
+def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[object]:
     """Show a page with everything on it, ready for keys; return the list of what will be asked."""
     window = program.window
     window.show_page("live")
@@ -322,7 +341,7 @@ def offer(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> list[obj
         ButtonSpec(Action.BACK, "&Back"),
     )
     main = ButtonSpec(Action.SOLVE, "Solve", is_enabled)
-    say(program, snapshot, View(Step.SOLVE, "", (), main, others))
+    say(program, snapshot, WizardView(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
     program.wizard_panel.asked.connect(asked.append)
     for table in window.findChildren(RecordTable):
@@ -349,7 +368,7 @@ def test_space_presses_only_the_main_button_from_every_focus(
     qtbot: QtBot, program: Program, snapshot: Maker, is_enabled: bool
 ) -> None:
     window = program.window
-    asked = offer(program, snapshot(State.APPLIED), is_enabled=is_enabled)
+    asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=is_enabled)
     qtbot.waitActive(window)
     wrong: list[object] = []
     window.panels.session.delete_requested.connect(wrong.append)
@@ -381,7 +400,7 @@ def test_return_presses_the_button_or_opens_the_list_that_has_the_focus(
     qtbot: QtBot, program: Program, snapshot: Maker
 ) -> None:
     window = program.window
-    asked = offer(program, snapshot(State.APPLIED), is_enabled=True)
+    asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     qtbot.waitActive(window)
     clicked = watch_clicks(window)
     boxes = window.panels.cloud.findChildren(QCheckBox)
@@ -406,7 +425,7 @@ def test_tab_leads_to_nothing_that_discards_or_deletes(
     qtbot: QtBot, program: Program, snapshot: Maker
 ) -> None:
     window = program.window
-    offer(program, snapshot(State.APPLIED), is_enabled=True)
+    show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     qtbot.waitActive(window)
     reached: set[str] = set()
     for name, dock in window.docks.items():
@@ -426,7 +445,7 @@ def test_keys_belong_to_other_pages_and_dialogs_as_usual(
     qtbot: QtBot, program: Program, snapshot: Maker
 ) -> None:
     window = program.window
-    asked = offer(program, snapshot(State.APPLIED), is_enabled=True)
+    asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     dialog = QDialog(window)
     box = QCheckBox("Really", dialog)
     dialog.open()

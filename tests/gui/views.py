@@ -8,10 +8,10 @@ from dataclasses import replace
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal_gui.pages.wizard.steps import PLANS, Action, Step, View, Wizard
+from handcal_gui.pages.wizard.steps import PLANS, Action, Step, Wizard, WizardView
 
 
-def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[View]:
+def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[WizardView]:
     """Return a view of every step, with every main button and every other one."""
     left = replace(next(iter(record.alignments.values())), eyes=("left",))
     one = replace(record, alignments={1: left})

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pytest
 
 from handcal.errors import CancelledError
+from handcal.progress import Progress
 from handcal.report.document import Column, Report, Section, Table
 from handcal.report.html import write_html
 
@@ -45,13 +46,9 @@ class Page(HTMLParser):
         return [value for one, two, value in self.attributes if (one, two) == (tag, name)]
 
 
-def ignore(_share: float) -> None:
-    """Go on."""
-
-
 @pytest.fixture
 def page(tmp_path: Path, report: Report) -> Page:
-    write_html(tmp_path / "report.html", report, ignore)
+    write_html(tmp_path / "report.html", report, Progress())
     return Page(tmp_path / "report.html")
 
 
@@ -105,7 +102,7 @@ def test_it_is_for_dark_screens_and_paper_too(page: Page) -> None:
 
 def test_no_text_is_taken_for_html(tmp_path: Path) -> None:
     section = Section(HOSTILE, [HOSTILE, Table([Column(HOSTILE)], [[HOSTILE]], HOSTILE)])
-    write_html(tmp_path / "x.html", Report(HOSTILE, HOSTILE, HOSTILE, [section]), ignore)
+    write_html(tmp_path / "x.html", Report(HOSTILE, HOSTILE, HOSTILE, [section]), Progress())
     page = Page(tmp_path / "x.html")
     shown = HOSTILE.replace("\x00", "\ufffd").replace("\u202e", "\ufffd")
     assert page.texts.count(shown) == 9  # title, subject, lead; contents, heading, and so on
@@ -114,21 +111,23 @@ def test_no_text_is_taken_for_html(tmp_path: Path) -> None:
 
 def test_lines_and_surrogates_are_kept_or_replaced(tmp_path: Path) -> None:
     report = Report("", "", "", [Section("", ["one\ntwo\u00a0\ud800"])])
-    write_html(tmp_path / "x.html", report, ignore)
+    write_html(tmp_path / "x.html", report, Progress())
     assert "one\ntwo\u00a0\ufffd" in Page(tmp_path / "x.html").texts
 
 
 def test_the_same_report_gives_the_same_bytes(tmp_path: Path, report: Report) -> None:
     for name in ("one", "two"):
-        write_html(tmp_path / name, report, ignore)
+        write_html(tmp_path / name, report, Progress())
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
 def test_giving_up_leaves_no_file(tmp_path: Path, report: Report) -> None:
-    def give_up(_share: float) -> None:
+    def give_up(_what: str, _share: float) -> None:
         raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
-        write_html(tmp_path / "x.html", report, give_up)
+        write_html(tmp_path / "x.html", report, Progress(give_up))
     assert not list(tmp_path.iterdir())
-    write_html(tmp_path / "x.html", replace(report, sections=[]), give_up)  # nothing to draw
+    write_html(
+        tmp_path / "x.html", replace(report, sections=[]), Progress(give_up)
+    )  # nothing to draw

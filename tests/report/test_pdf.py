@@ -6,12 +6,9 @@ from dataclasses import replace
 
 from matplotlib.figure import Figure as Page
 
+from handcal.progress import Progress
 from handcal.report.document import Figure, Report, Section
 from handcal.report.pdf import compose
-
-
-def ignore(_share: float) -> None:
-    """Go on."""
 
 
 def texts(page: Page) -> list[str]:
@@ -19,7 +16,7 @@ def texts(page: Page) -> list[str]:
 
 
 def test_all_is_said_in_order(report: Report) -> None:
-    first, second = compose(report, ignore)
+    first, second = compose(report, Progress())
     assert texts(first)[:-2] == [
         "Noise study",
         "The paper's method stays below 4 mm up to 9°.",
@@ -35,7 +32,7 @@ def test_a_heading_stays_with_its_text_and_figure(report: Report) -> None:
     figure = Figure("big", "", lambda _axes: None, [], height_mm=150.0)
     filler = replace(figure, name="filler", height_mm=100.0)
     sections = [Section("", [filler]), Section("Heading", ["What it shows.", figure])]
-    first, second = compose(replace(report, sections=sections), ignore)
+    first, second = compose(replace(report, sections=sections), Progress())
     assert "Heading" not in texts(first)
     assert texts(second)[:2] == ["Heading", "What it shows."]
     assert len(second.axes) == 1

@@ -16,7 +16,7 @@ def test_settings_are_flat_and_short() -> None:
     assert len(table.rows[2][1]) == 200
 
 
-def test_of_too_many_the_number_is_told() -> None:
+def test_too_many_settings_are_counted() -> None:
     table, more = settings_items({str(number): number for number in range(1500)}, "study.json")
     assert isinstance(table, Table)
     assert len(table.rows) == 120

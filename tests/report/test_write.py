@@ -8,6 +8,7 @@ import cv2
 import pytest
 
 from handcal.errors import CancelledError, FileError
+from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.report.figures import write_figures
 from handcal.report.write import write_report
@@ -15,7 +16,9 @@ from handcal.report.write import write_report
 
 def test_a_report_is_all_its_files(tmp_path: Path, report: Report) -> None:
     shares: list[float] = []
-    written = write_report(tmp_path / "new" / "out", report, shares.append)
+    written = write_report(
+        tmp_path / "new" / "out", report, Progress(lambda _, share: shares.append(share))
+    )
     assert [path.name for path in written] == ["report.pdf", "report.html"]
     names = {
         path.relative_to(tmp_path / "new" / "out").as_posix()
@@ -29,7 +32,7 @@ def test_a_report_is_all_its_files(tmp_path: Path, report: Report) -> None:
 
 
 def test_a_figure_is_as_wide_as_a_page_and_has_its_numbers(tmp_path: Path, report: Report) -> None:
-    write_figures(tmp_path, report, lambda _share: None)
+    write_figures(tmp_path, report, Progress())
     picture = cv2.imread(str(tmp_path / "one.png"))
     assert picture is not None
     assert picture.shape[:2] == (int(50.0 / 25.4 * 200), int(174.0 / 25.4 * 200))
@@ -39,12 +42,12 @@ def test_a_figure_is_as_wide_as_a_page_and_has_its_numbers(tmp_path: Path, repor
 
 
 def test_giving_up_leaves_whole_files_only(tmp_path: Path, report: Report) -> None:
-    def give_up(share: float) -> None:
+    def give_up(_what: str, share: float) -> None:
         if share > 0.5:
             raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
-        write_report(tmp_path, report, give_up)
+        write_report(tmp_path, report, Progress(give_up))
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 

@@ -7,6 +7,7 @@ import pytest
 from handcal.errors import CancelledError, FileError
 from handcal.io.files import read_json
 from handcal.lab.evaluate.cube_test import judge_captures
+from handcal.progress import Progress
 from handcal.rig.cube import Cube, CubeError
 from handcal.rig.cube_file import read_cube
 from handcal.rig.example import example_rig
@@ -32,7 +33,7 @@ def small_rig() -> Rig:
 
 
 def test_a_calibrated_display_draws_the_cube_where_it_is(tmp_path: Path) -> None:
-    write_captures(tmp_path, small_rig(), SETTINGS, lambda _what, _share: None)
+    write_captures(tmp_path, small_rig(), SETTINGS, Progress())
     names = {path.name for path in (tmp_path / "left" / "pose-1").iterdir()}
     virtual = {f"virtual-{drawn}.png" for drawn in ("offline", "solved", "true")}
     assert names == {"real.png"} | virtual
@@ -58,7 +59,7 @@ def test_a_calibrated_display_draws_the_cube_where_it_is(tmp_path: Path) -> None
 def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:
     (tmp_path / "note.txt").touch()
     with pytest.raises(FileError, match="not empty"):
-        write_captures(tmp_path, small_rig(), SETTINGS, lambda _what, _share: None)
+        write_captures(tmp_path, small_rig(), SETTINGS, Progress())
 
 
 def test_what_is_given_up_leaves_nothing(tmp_path: Path) -> None:
@@ -71,11 +72,11 @@ def test_what_is_given_up_leaves_nothing(tmp_path: Path) -> None:
             raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
-        write_captures(tmp_path, small_rig(), replace(SETTINGS, poses=2), give_up)
+        write_captures(tmp_path, small_rig(), replace(SETTINGS, poses=2), Progress(give_up))
     assert not any(tmp_path.iterdir())
 
 
 def test_a_cube_too_large_for_the_display_is_refused(tmp_path: Path) -> None:
     settings = replace(SETTINGS, cube=Cube(side_m=0.3, marker_m=0.2))
     with pytest.raises(CubeError, match="smaller"):
-        write_captures(tmp_path, small_rig(), settings, lambda _what, _share: None)
+        write_captures(tmp_path, small_rig(), settings, Progress())

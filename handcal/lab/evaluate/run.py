@@ -103,11 +103,7 @@ def render_captures(
         poses=settings.poses,
         alignments=settings.alignments,
     )
-
-    def report(what: str, share: float) -> None:
-        progress.at(share, f"Rendering {what}")
-
-    write_captures(folder, _rig(settings), chosen, report)
+    write_captures(folder, _rig(settings), chosen, progress)
 
 
 def run_user_test(settings: UserTestSettings, progress: Progress = Progress()) -> UserTestRun:
@@ -193,8 +189,7 @@ def _evaluate_captures(
 
 
 def _write(folder: Path, report: Report, progress: Progress) -> tuple[Path, ...]:
-    writing = progress.part(_READING, 1.0)
-    return write_report(folder, report, lambda share: writing.at(share, "Writing the report"))
+    return write_report(folder, report, progress.part(_READING, 1.0, "Writing the report"))
 
 
 def _rig(settings: CubeTestSettings) -> Rig:

@@ -11,7 +11,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import beside, named, number, whole_number
+from handcal_gui.widgets.fields import hbox, number, whole_number, with_name
 
 
 class AdvancedFields(QWidget):
@@ -26,19 +26,19 @@ class AdvancedFields(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._fold = named(QToolButton(autoRaise=True), "advanced")
+        self._fold = with_name(QToolButton(autoRaise=True), "advanced")
         self._fold.setText("Advanced")
         self._fold.setCheckable(True)
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._calibration = CalibrationFields()
-        self._real_time = named(
+        self._real_time = with_name(
             QCheckBox("Real time"),
             "realTime",
             help_text="Plays at the recorded rate; otherwise every frame, as fast as possible.",
         )
-        self._loop = named(QCheckBox("Loop"), "loop", help_text="Starts again at the end.")
+        self._loop = with_name(QCheckBox("Loop"), "loop", help_text="Starts again at the end.")
         playback = QWidget()
-        beside(playback, self._real_time, self._loop, grows=self._loop)
+        hbox(playback, self._real_time, self._loop, grows=self._loop)
         self._calibration.add_row("Recordings", playback)
         self._seed = whole_number(
             "seed", 0, 999_999, "Seed of the simulated wearer, hand and room."
@@ -60,8 +60,8 @@ class AdvancedFields(QWidget):
         layout.setSpacing(SPACING_PX)
         layout.addWidget(self._fold, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self._calibration)
-        self._fold.toggled.connect(self._unfold)
-        self._unfold(False)
+        self._fold.toggled.connect(self._expand)
+        self._expand(False)
 
     def show_settings(self, settings: StationSettings) -> None:
         """Show the settings of a station."""
@@ -83,7 +83,7 @@ class AdvancedFields(QWidget):
             reorder=self._reorder.value() / 100,
         )
 
-    def _unfold(self, is_open: bool) -> None:
+    def _expand(self, is_open: bool) -> None:
         arrow = Qt.ArrowType.DownArrow if is_open else Qt.ArrowType.RightArrow
         self._fold.setArrowType(arrow)
         self._calibration.setVisible(is_open)

@@ -11,7 +11,7 @@ from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
 from handcal.station.settings import Source, StationSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
-from handcal_gui.widgets.fields import beside, button, choice, named
+from handcal_gui.widgets.fields import button, choice, hbox, with_name
 from handcal_gui.widgets.path_field import PathField
 
 _SOURCES: dict[Source, str] = {
@@ -35,7 +35,7 @@ class CameraField(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._source = choice("source", "Camera", _SOURCES)
-        self._serial = named(
+        self._serial = with_name(
             QLineEdit(placeholderText="Serial number; any if empty"), "serial", "Serial number"
         )
         self._realsense = RealSenseSettings()
@@ -46,12 +46,12 @@ class CameraField(QWidget):
             "Image size, preset, exposure, laser power and filters.",
         )
         camera = QWidget()
-        beside(camera, self._serial, edit, grows=self._serial)
+        hbox(camera, self._serial, edit, grows=self._serial)
         self._recording = PathField("Recording", "either", _PATTERN)
         details = QStackedWidget()
         for page in (QWidget(), camera, self._recording):  # in the order of _SOURCES
             details.addWidget(page)
-        beside(self, self._source, details, grows=details)
+        hbox(self, self._source, details, grows=details)
         self._source.currentIndexChanged.connect(details.setCurrentIndex)
         self._source.currentIndexChanged.connect(self.changed)
         self._serial.textChanged.connect(self.changed)
@@ -78,9 +78,9 @@ class CameraField(QWidget):
         """Open the dialog with the settings of the RealSense."""
         dialog = CameraSettingsDialog(self._realsense, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.accepted.connect(lambda: self._take_realsense(dialog.settings()))
+        dialog.accepted.connect(lambda: self._on_realsense_changed(dialog.settings()))
         dialog.open()
 
-    def _take_realsense(self, settings: RealSenseSettings) -> None:
+    def _on_realsense_changed(self, settings: RealSenseSettings) -> None:
         self._realsense = settings
         self.changed.emit()

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QVBoxLayout, QWidget
 
-from handcal_gui.theme import SPACING_PX, icon, scale_font
+from handcal_gui.theme import SPACING_PX, follow_theme, icon, scale_font
 from handcal_gui.widgets.fields import paragraph
 
 
@@ -41,13 +40,7 @@ class Card(QFrame):
         layout.setSpacing(2 * SPACING_PX)
         layout.addLayout(head)
         layout.addLayout(self.body, 1)
-        self._refresh()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._refresh()
+        follow_theme(self, self._refresh)
 
     def _refresh(self) -> None:
         self._icon.setPixmap(icon(self._icon_name).pixmap(3 * SPACING_PX))

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from handcal.station.settings import HeadsetKind, StationSettings
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import beside, choice, named, whole_number
+from handcal_gui.widgets.fields import choice, hbox, whole_number, with_name
 from handcal_gui.widgets.key_field import KeyField
 
 _HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
@@ -33,7 +33,7 @@ class HeadsetField(QWidget):
     def __init__(self, pairing_key: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._headset = choice("headset", "Headset", _HEADSETS)
-        self._host = named(
+        self._host = with_name(
             QLineEdit(),
             "host",
             "Address to listen on",
@@ -42,16 +42,16 @@ class HeadsetField(QWidget):
         self._port = whole_number("port", 1, 65535, "UDP port that the headset connects to.")
         self._address = QWidget()
         address = (QLabel("at"), self._host, QLabel("port"), self._port)
-        beside(self._address, *address, grows=self._host)
+        hbox(self._address, *address, grows=self._host)
         self._key = KeyField()
         self._key.set_key(pairing_key)
         self._pairing = QWidget()
-        beside(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
+        hbox(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
         first = QWidget()
-        beside(first, self._headset, self._address, grows=self._address)
+        hbox(first, self._headset, self._address, grows=self._address)
         layout.addWidget(first)
         layout.addWidget(self._pairing)
         self._headset.currentIndexChanged.connect(self._show_fitting)

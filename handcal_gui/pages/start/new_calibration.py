@@ -17,7 +17,7 @@ from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, main_button, named, paragraph
+from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 
 Check = Callable[[StationSettings, str], Mapping[Part, Finding]]
 
@@ -61,7 +61,7 @@ class NewCalibration(Card):
         self._key = pairing_key
         self._starting: str | None = None
         self._is_opening = False
-        self._wearer = named(QComboBox(), "wearer", "Wearer's name or code")
+        self._wearer = with_name(QComboBox(), "wearer", "Wearer's name or code")
         self._wearer.setLineEdit(
             QLineEdit(placeholderText="Name or code", maxLength=MAX_WEARER_CHARACTERS)
         )
@@ -78,8 +78,8 @@ class NewCalibration(Card):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._lay_out()
         self._check = LatestJob(lambda question: check(*question), self)
-        self._check.answered.connect(self._take_findings)
-        self._check.failed.connect(self._give_up)
+        self._check.answered.connect(self._on_findings)
+        self._check.failed.connect(self._show_problem)
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
         self._again = QTimer(self, interval=_AGAIN_MS)
         self._settle.timeout.connect(self.check)
@@ -88,7 +88,7 @@ class NewCalibration(Card):
         self._form.changed.connect(self.changed)
         self._form.rig_wanted.connect(self.rig_wanted)
         self._button.clicked.connect(self.start)
-        self._cancel.clicked.connect(self._give_up_opening)
+        self._cancel.clicked.connect(self._cancel_opening)
         self.show_preferences(preferences)
 
     @property
@@ -174,7 +174,7 @@ class NewCalibration(Card):
     def _question(self) -> tuple[StationSettings, str]:
         return self._form.settings, self._key
 
-    def _take_findings(self, question: object, findings: Mapping[Part, Finding]) -> None:
+    def _on_findings(self, question: object, findings: Mapping[Part, Finding]) -> None:
         if self._is_opening or question != self._question():
             return  # outdated: an answer to the settings now shown will follow
         self._form.show_findings(findings)
@@ -185,12 +185,12 @@ class NewCalibration(Card):
         if wearer is not None and is_ready(findings):
             self.start_requested.emit(self._form.settings, wearer)
 
-    def _give_up_opening(self) -> None:
+    def _cancel_opening(self) -> None:
         self._cancel.setEnabled(False)
         self._problem.setText("Cancelling once camera and headset are open…")
         self.cancel_requested.emit()
 
-    def _give_up(self, why: str) -> None:
+    def _show_problem(self, why: str) -> None:
         self._starting = None
         self._problem.setText(why)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from handcal.errors import FileError
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
-from handcal_gui.widgets.numbers import counted
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.times import local_time
 
 
@@ -24,20 +24,20 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Offers:
+class KnownSessions:
     """Sessions that can be resumed, and recent sessions that can be opened."""
 
     unfinished: tuple[Entry, ...]
     recent: tuple[Entry, ...]
 
 
-def find_offers(folder: Path, recent: Sequence[Path]) -> Offers:
+def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
     """Return the unfinished sessions in a folder, and the recent ones; may take a while.
 
     Empty sessions are left out.
     """
     offered = (_recent(path) for path in recent if path.exists())
-    return Offers(
+    return KnownSessions(
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished_sessions(folder)
@@ -53,7 +53,7 @@ def _unfinished(session: UnfinishedSession) -> Entry:
         return Entry(session.path, text, is_enabled=False)
     text = _text(session.wearer, session.started, session.alignments, session.trials)
     if session.damaged:
-        text += f" · damaged: {counted(session.damaged, 'part')} left out"
+        text += f" · damaged: {pluralize(session.damaged, 'part')} left out"
     return Entry(session.path, text)
 
 
@@ -72,5 +72,5 @@ def _recent(path: Path) -> Entry | None:
 
 def _text(wearer: str, started: str, alignments: int, trials: int) -> str:
     held = ((alignments, "alignment"), (trials, "trial"))
-    counts = ", ".join(counted(number, what) for number, what in held if number)
+    counts = ", ".join(pluralize(number, what) for number, what in held if number)
     return " · ".join(filter(None, (wearer or "Without a name", local_time(started), counts)))

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.pages.start.session_entries import Entry
 from handcal_gui.theme import SPACING_PX, icon
-from handcal_gui.widgets.fields import button, named, paragraph
+from handcal_gui.widgets.fields import button, paragraph, with_name
 
 
 class SessionList(QWidget):
@@ -43,7 +43,7 @@ class SessionList(QWidget):
         self, name: str, verb: str, empty: str = "", parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self._list = named(QListWidget(), "sessions", name)
+        self._list = with_name(QListWidget(), "sessions", name)
         self._list.setWordWrap(True)
         # As tall as the available space, not as the items need.
         self._list.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)

@@ -13,13 +13,13 @@ from handcal.station.preflight import check_station
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.new_calibration import Check, NewCalibration
-from handcal_gui.pages.start.session_entries import Offers, find_offers
+from handcal_gui.pages.start.session_entries import KnownSessions, find_sessions
 from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button
 
-FindOffers = Callable[[Path, Sequence[Path]], Offers]
+FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
 
 class StartPage(QWidget):
@@ -30,7 +30,7 @@ class StartPage(QWidget):
     preferences : Preferences
     pairing_key : str
         For network headsets.
-    check, find_offers : callable
+    check, find_sessions : callable
         Functions that check a station and find sessions; called in jobs.
 
     Attributes
@@ -60,7 +60,7 @@ class StartPage(QWidget):
         preferences: Preferences,
         pairing_key: str,
         check: Check = check_station,
-        find_offers: FindOffers = find_offers,
+        find_sessions: FindOffers = find_sessions,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -92,8 +92,8 @@ class StartPage(QWidget):
         evaluate = button("evaluate", "Evaluate…", help_text="Measure the accuracy of calibrations")
         self._evaluate.body.addWidget(evaluate, 0, Qt.AlignmentFlag.AlignRight)
         self._lay_out()
-        self._find = LatestJob(lambda question: find_offers(*question), self)
-        self._find.answered.connect(self._take_offers)
+        self._find = LatestJob(lambda question: find_sessions(*question), self)
+        self._find.answered.connect(self._show_sessions)
         self.new.start_requested.connect(self.start_requested)
         self.new.rig_wanted.connect(self.rig_wanted)
         self.new.cancel_requested.connect(self.cancel_requested)
@@ -149,7 +149,7 @@ class StartPage(QWidget):
         self._folder = Path(self.new.settings.sessions)
         self._find.ask((self._folder, self._recent))
 
-    def _take_offers(self, _question: object, offers: Offers) -> None:
+    def _show_sessions(self, _question: object, offers: KnownSessions) -> None:
         self._unfinished.show_entries(offers.unfinished)
         self._resume.setVisible(bool(offers.unfinished))
         self._opened.show_entries(offers.recent)

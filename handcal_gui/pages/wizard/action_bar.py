@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -17,12 +17,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.pages.wizard.steps import ButtonSpec, View
-from handcal_gui.theme import SPACING_PX, colors, scale_font
-from handcal_gui.widgets.fields import main_button, named
+from handcal_gui.keys import add_action
+from handcal_gui.pages.wizard.steps import ButtonSpec, WizardView
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.widgets.fields import main_button, with_name
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
-_KEYS = (_KEY, _TEXT_KEY, "Ctrl+Enter")
+_KEYS = {
+    _KEY: "Press the large button, except from a text field",
+    f"{_TEXT_KEY} Ctrl+Enter": "Press the large button from anywhere",
+}
 _LONGEST_LABEL = "Confirm for the wearer"
 _MOST_OTHERS = 3
 _ARMING_MS = 700
@@ -30,7 +34,7 @@ _ARMING_MS = 700
 
 
 class ActionBar(QWidget):
-    """The buttons of a `View`; its height and the main button's position never change.
+    """The buttons of a `WizardView`; its height and the main button's position never change.
 
     The space bar presses the main button, except while a text field has the focus; Ctrl+Return
     always does. The main button never has the focus, because a disabled button would pass it on.
@@ -47,7 +51,7 @@ class ActionBar(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("actionBar")
-        self._view: View | None = None
+        self._view: WizardView | None = None
         self._is_repeat = False
         self._released = (0, 0)  # key, and time in ms
         self._main = main_button("wizardMain")
@@ -55,22 +59,22 @@ class ActionBar(QWidget):
         self._main.setToolTip(f"{_native(_KEY)}, or {_native(_TEXT_KEY)} from a text field")
         self._key = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
         self._key.setObjectName("wizardMainKey")
-        self._others = [named(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
+        self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
         self._arming = QTimer(self, interval=_ARMING_MS, singleShot=True)
         self._lay_out()
         self._main.clicked.connect(lambda: self._ask(self._view.main if self._view else None))
         for i, other in enumerate(self._others):
             other.clicked.connect(lambda _checked=False, i=i: self._ask(self._spec(i)))
         self._arming.timeout.connect(self._arm)
-        for keys in _KEYS:
-            # Always enabled: the key of a disabled shortcut would go to the focused widget.
-            shortcut = QShortcut(QKeySequence(keys), self, autoRepeat=False)
-            shortcut.activated.connect(self._take_key)
+        for keys, text in _KEYS.items():
+            # Always enabled: the key of a disabled action would go to the focused widget.
+            window = Qt.ShortcutContext.WindowShortcut
+            add_action(self, text, keys, self._on_key, context=window).setAutoRepeat(False)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
 
-    def show_view(self, view: View | None) -> None:
+    def show_view(self, view: WizardView | None) -> None:
         """Show the buttons of a view; if it is None, no button can be pressed."""
         before, self._view = self._view, view
         self._main.setEnabled(view is not None and view.main.is_enabled)
@@ -104,20 +108,16 @@ class ActionBar(QWidget):
         """Press the main button."""
         self._main.click()
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the key when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw_key()
-
     def _lay_out(self) -> None:
         label = self._main.text()
         self._main.setText(_LONGEST_LABEL)
         self._main.setFixedSize(self._main.sizeHint().width() + 4 * SPACING_PX, 5 * SPACING_PX)
         self._main.setText(label)
-        self._draw_key()
+        follow_theme(self, self._draw_key)
         scale_font(self._key, 0.9)
-        widest = max(self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in _KEYS)
+        widest = max(
+            self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in (_KEY, _TEXT_KEY)
+        )
         self._key.setFixedSize(widest + 2 * SPACING_PX, 3 * SPACING_PX)
         self._show_key(None, None)
         layout = QHBoxLayout(self)
@@ -147,7 +147,7 @@ class ActionBar(QWidget):
             button.setToolTip(f"{letter}, or Return while this button has the focus")
             button.setEnabled(spec.is_enabled)
 
-    def _take_key(self) -> None:
+    def _on_key(self) -> None:
         if not self._is_repeat:
             self._main.click()
 

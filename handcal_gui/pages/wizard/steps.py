@@ -11,7 +11,7 @@ import numpy as np
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye, EyePlan
-from handcal_gui.widgets.numbers import counted
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
 PLANS: dict[EyePlan, str] = {
@@ -58,7 +58,7 @@ class Action(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class Precondition:
     """A precondition, and whether it holds."""
 
     text: str
@@ -78,13 +78,13 @@ class ButtonSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class WizardView:
     """Everything that the wizard shows at one moment."""
 
     step: Step
     sentence: str
     """The instruction to the wearer or the technician."""
-    checks: tuple[Check, ...]
+    checks: tuple[Precondition, ...]
     main: ButtonSpec
     """The button that the space bar presses."""
     others: tuple[ButtonSpec, ...] = ()
@@ -155,7 +155,7 @@ class Wizard:
             case _:
                 raise ValueError(f"{action} is an action of the engine")
 
-    def view(self, snapshot: Snapshot) -> View:
+    def view(self, snapshot: Snapshot) -> WizardView:
         """Return the view of a snapshot."""
         return _VIEWS[self.step(snapshot)](self, snapshot)
 
@@ -165,33 +165,33 @@ class Wizard:
             return (self._repeat,)
         return next_eyes(self.plan, snapshot.procedure.alignments.values())
 
-    def _connect(self, snapshot: Snapshot) -> View:
+    def _connect(self, snapshot: Snapshot) -> WizardView:
         camera, link = snapshot.camera, snapshot.link
         checks = (
-            Check(
+            Precondition(
                 "No image from the camera" if camera.problem else f"Camera: {camera.name}",
                 not camera.problem and camera.rate_hz > 0,
             ),
-            Check(sentence(snapshot.link_problem) or "Headset connected", link.connected),
-            Check(
+            Precondition(sentence(snapshot.link_problem) or "Headset connected", link.connected),
+            Precondition(
                 f"Headset pose: {link.pose_rate_hz:.0f} Hz"
                 if link.pose_rate_hz
                 else "No pose from the headset yet",
                 link.pose_rate_hz > 0,
             ),
         )
-        return View(
+        return WizardView(
             Step.CONNECT,
             "Put the headset on the wearer and wait until camera and headset are connected.",
             checks,
             ButtonSpec(Action.NEXT, "Next", all(check.holds for check in checks)),
         )
 
-    def _show_hand(self, snapshot: Snapshot) -> View:
+    def _show_hand(self, snapshot: Snapshot) -> WizardView:
         back = ButtonSpec(Action.BACK, "&Back")
         if snapshot.procedure.state is State.SHOW_HAND and snapshot.procedure.alignments:
             back = ButtonSpec(Action.SOLVE, "Keep the alignments &so far")
-        return View(
+        return WizardView(
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
             (_hand_check(snapshot),),
@@ -199,18 +199,18 @@ class Wizard:
             (back,),
         )
 
-    def _make_cursor(self, snapshot: Snapshot) -> View:
+    def _make_cursor(self, snapshot: Snapshot) -> WizardView:
         seen = snapshot.observation
         is_steady = seen is not None and seen.is_steady
-        return View(
+        return WizardView(
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
-            (_hand_check(snapshot), Check("Hand held still", is_steady)),
+            (_hand_check(snapshot), Precondition("Hand held still", is_steady)),
             ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady),
             (ButtonSpec(Action.BACK, "&Back"),),
         )
 
-    def _align(self, snapshot: Snapshot) -> View:
+    def _align(self, snapshot: Snapshot) -> WizardView:
         procedure, seen = snapshot.procedure, snapshot.observation
         hand = _hand_check(snapshot)
         is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
@@ -221,26 +221,26 @@ class Wizard:
         close = ""
         if len(procedure.eyes) == 1:
             close = f"Close the {'right' if procedure.eyes[0] == 'left' else 'left'} eye. "
-        return View(
+        return WizardView(
             Step.ALIGN,
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
-            (hand, Check(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
+            (hand, Precondition(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
             ButtonSpec(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
             (ButtonSpec(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
             procedure.refusal,
         )
 
-    def _solve(self, snapshot: Snapshot) -> View:
+    def _solve(self, snapshot: Snapshot) -> WizardView:
         procedure = snapshot.procedure
         count = len(snapshot.procedure.alignments)
-        aligned = Check(f"{counted(count, 'alignment')} confirmed", True)
+        aligned = Precondition(f"{pluralize(count, 'alignment')} confirmed", True)
         redo = ButtonSpec(
             Action.REDO,
             "&Discard and repeat",
             discards="Deletes the last alignment; the session panel can restore it",
         )
         if procedure.state is State.ALIGNED or procedure.results is None:
-            return View(
+            return WizardView(
                 Step.SOLVE,
                 "The wearer may lower the hand. Solve for the positions of the eyes.",
                 (aligned,),
@@ -250,10 +250,10 @@ class Wizard:
         verdicts = _verdict_checks(snapshot)
         if procedure.state is State.APPLYING:
             wait = "Waiting for the headset to acknowledge its projections."
-            return View(
+            return WizardView(
                 Step.SOLVE, wait, (aligned, *verdicts), ButtonSpec(Action.APPLY, "Sending…", False)
             )
-        return View(
+        return WizardView(
             Step.SOLVE,
             "Send the corrected projections to the headset.",
             (aligned, *verdicts),
@@ -262,10 +262,10 @@ class Wizard:
             snapshot.problem,
         )
 
-    def _verify(self, snapshot: Snapshot) -> View:
+    def _verify(self, snapshot: Snapshot) -> WizardView:
         checks = _verdict_checks(snapshot)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
-            return View(
+            return WizardView(
                 Step.VERIFY,
                 "The alignments have changed. Solve again.",
                 checks,
@@ -274,14 +274,14 @@ class Wizard:
             )
         if not is_complete(self.plan, snapshot.procedure.alignments.values()):
             eyes = _names(self.eyes(snapshot))
-            return View(
+            return WizardView(
                 Step.VERIFY,
                 f"Now repeat this with {eyes}.",
                 checks,
                 ButtonSpec(Action.ANOTHER, f"Align {eyes}"),
                 (ButtonSpec(Action.NEXT, "Finish with &one eye"),),
             )
-        return View(
+        return WizardView(
             Step.VERIFY,
             "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
             "add an alignment or fine-tune φ.",
@@ -294,21 +294,21 @@ class Wizard:
             ),
         )
 
-    def _save(self, snapshot: Snapshot) -> View:
+    def _save(self, snapshot: Snapshot) -> WizardView:
         where = snapshot.session_path
         others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
         if snapshot.record.is_finished:
-            return View(
+            return WizardView(
                 Step.SAVE,
                 "The session is complete. Take the headset off, or continue with the next wearer.",
-                (Check(f"Saved in {where}", True),),
+                (Precondition(f"Saved in {where}", True),),
                 ButtonSpec(Action.NEXT_WEARER, "Next wearer"),
                 others,
             )
-        return View(
+        return WizardView(
             Step.SAVE,
             "Everything is already saved. Finish the session when you are done.",
-            (Check(f"Saved in {where}", not snapshot.problem),),
+            (Precondition(f"Saved in {where}", not snapshot.problem),),
             ButtonSpec(Action.FINISH, "Finish session"),
             others,
             snapshot.problem,
@@ -329,20 +329,22 @@ _VIEWS = {
 _REPEATS: dict[Action, Eye] = {Action.REPEAT_LEFT: "left", Action.REPEAT_RIGHT: "right"}
 
 
-def _hand_check(snapshot: Snapshot) -> Check:
+def _hand_check(snapshot: Snapshot) -> Precondition:
     seen = snapshot.observation
     if seen is not None and seen.hand is not None:
-        return Check("Hand found", True)
+        return Precondition("Hand found", True)
     problem = seen.problem if seen is not None else ""
-    return Check(sentence(problem or "no hand in view"), False)
+    return Precondition(sentence(problem or "no hand in view"), False)
 
 
-def _verdict_checks(snapshot: Snapshot) -> tuple[Check, ...]:
+def _verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
     results = snapshot.procedure.results
     if results is None:
         return ()
     return tuple(
-        Check(f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}", verdict.name == "accept")
+        Precondition(
+            f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}", verdict.name == "accept"
+        )
         for eye, verdict in results.verdicts.items()
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -15,8 +15,8 @@ from PySide6.QtWidgets import (
 from handcal.station.snapshot import Snapshot
 from handcal.types import EyePlan
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import PLANS, STEPS, Check, Step, View, Wizard
-from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
+from handcal_gui.pages.wizard.steps import PLANS, STEPS, Precondition, Step, Wizard, WizardView
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 
 _MOST_CHECKS = 3
 
@@ -29,7 +29,7 @@ class WizardPanel(QWidget):
     wizard : Wizard
     bar : ActionBar
         Its buttons, for the window's bottom strip.
-    shown : View or None
+    shown : WizardView or None
         The view shown; None before the first snapshot.
     asked : Signal(Action)
         A button was pressed.
@@ -46,7 +46,7 @@ class WizardPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("wizard")
         self.wizard = Wizard()
-        self.shown: View | None = None
+        self.shown: WizardView | None = None
         self._rail = _Rail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True)
@@ -59,6 +59,7 @@ class WizardPanel(QWidget):
         self._lay_out()
         self.bar.asked.connect(self.asked)
         self._plan.currentIndexChanged.connect(self._choose_plan)
+        follow_theme(self, self._refresh)
 
     def start(self, wizard: Wizard) -> None:
         """Switch to another wizard."""
@@ -72,19 +73,13 @@ class WizardPanel(QWidget):
         view = self.wizard.view(snapshot)
         if view != self.shown:
             before, self.shown = self.shown, view
-            self._refresh(view)
+            self._refresh()
             if before is None or before.step is not view.step:
                 self.step_changed.emit(view.step)
 
     def press_main(self) -> None:
         """Press the main button."""
         self.bar.press_main()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and self.shown is not None:
-            self._refresh(self.shown)
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
@@ -120,7 +115,10 @@ class WizardPanel(QWidget):
         layout.addWidget(self._note)
         layout.addStretch()
 
-    def _refresh(self, view: View) -> None:
+    def _refresh(self) -> None:
+        view = self.shown
+        if view is None:
+            return
         self._rail.show_step(view.step)
         self._title.setText(view.step.value)
         self._sentence.setText(view.sentence)
@@ -181,7 +179,7 @@ class _CheckRow(QWidget):
         layout.addWidget(self._text, 1)
         self.setMinimumHeight(3 * SPACING_PX)
 
-    def show_check(self, check: Check | None) -> None:
+    def show_check(self, check: Precondition | None) -> None:
         if check is None:
             self._icon.clear()
             self._text.clear()

@@ -6,7 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QBuffer, QEvent, QIODevice, Qt
+from PySide6.QtCore import QBuffer, QIODevice, Qt
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -29,7 +29,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.types import Frame
 from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
@@ -62,12 +62,9 @@ class CameraPanel(QWidget):
         self._caption = ""
         self._pictures = _Pictures()
         self._status = _Status()
-        self._freeze = tool_button()
-        self._freeze.setText("Freeze")
+        self._freeze = QAction("Freeze", self, checkable=True, autoRepeat=False)
         self._freeze.setToolTip("Freeze the image (F)")
         self._freeze.setShortcut("F")
-        self._freeze.setCheckable(True)
-        self._freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._mode = QComboBox()
         self._mode.setAccessibleName("Displayed image")
         self._mode.setToolTip("Show the colour image, the depth image or both")
@@ -79,7 +76,7 @@ class CameraPanel(QWidget):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._lay_out()
         self._pictures.set_mode(Mode.COLOR)
-        self._draw_icons()
+        follow_theme(self, self._draw_icons)
         self.begin(SegmentSettings())
 
     def begin(self, settings: SegmentSettings) -> None:
@@ -110,17 +107,14 @@ class CameraPanel(QWidget):
         self._pictures.grab().save(buffer, "PNG")
         write_atomic(path, bytes(buffer.data().data()))
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Follow a change between light and dark."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw_icons()
-
     def _lay_out(self) -> None:
         top = QHBoxLayout()
         top.addWidget(self._mode)
         top.addStretch()
-        top.addWidget(self._freeze)
+        freeze = tool_button()
+        freeze.setDefaultAction(self._freeze)
+        freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        top.addWidget(freeze)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(*4 * (SPACING_PX,))
         layout.setSpacing(SPACING_PX)

@@ -12,7 +12,6 @@ import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import (
     QColor,
-    QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -23,6 +22,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.types import Float64, UInt8
+from handcal_gui.keys import add_action
 from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.panels.cloud.orbit import Direction, Orbit
 from handcal_gui.theme import SPACING_PX, colors, number_font
@@ -62,6 +62,7 @@ class CloudView(QWidget):
         self._dragged_from = QPointF()
         self._backdrop_key: object = None
         self._backdrop = QPixmap()
+        self._add_actions()
 
     @property
     def orbit(self) -> Orbit:
@@ -142,31 +143,22 @@ class CloudView(QWidget):
         """Zoom."""
         self._change(self._orbit.zoomed(_ZOOM_PER_NOTCH ** (event.angleDelta().y() / 120)))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
+    def _add_actions(self) -> None:
         """Rotate by arrow keys, zoom by + and −, select a direction by 1, 2, 3 and R."""
-        key, turn = Qt.Key, _KEY_TURN_RAD
-        turns = {
-            key.Key_Left: (turn, 0.0),
-            key.Key_Right: (-turn, 0.0),
-            key.Key_Up: (0.0, -turn),
-            key.Key_Down: (0.0, turn),
-        }
-        directions = {
-            key.Key_1: Direction.FRONT,
-            key.Key_2: Direction.SIDE,
-            key.Key_3: Direction.TOP,
-            key.Key_R: Direction.ASLANT,
-        }
-        if event.key() in turns:
-            self._turn(*turns[Qt.Key(event.key())])
-        elif event.key() in directions:
-            self.look(directions[Qt.Key(event.key())])
-        elif event.key() in (key.Key_Plus, key.Key_Equal):
-            self._change(self._orbit.zoomed(_ZOOM_PER_NOTCH))
-        elif event.key() == key.Key_Minus:
-            self._change(self._orbit.zoomed(1.0 / _ZOOM_PER_NOTCH))
-        else:
-            super().keyPressEvent(event)
+        turn, zoom = _KEY_TURN_RAD, _ZOOM_PER_NOTCH
+        for text, keys, do in (
+            ("Rotate left", "Left", lambda: self._turn(turn, 0.0)),
+            ("Rotate right", "Right", lambda: self._turn(-turn, 0.0)),
+            ("Rotate up", "Up", lambda: self._turn(0.0, -turn)),
+            ("Rotate down", "Down", lambda: self._turn(0.0, turn)),
+            ("Zoom in", "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
+            ("Zoom out", "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
+            ("Front", "1", lambda: self.look(Direction.FRONT)),
+            ("Side", "2", lambda: self.look(Direction.SIDE)),
+            ("Top", "3", lambda: self.look(Direction.TOP)),
+            ("Reset", "R", lambda: self.look(Direction.ASLANT)),
+        ):
+            add_action(self, text, keys, do, context=Qt.ShortcutContext.WidgetShortcut)
 
     def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
         self._orbit = self._orbit.turned(yaw_rad, pitch_rad)

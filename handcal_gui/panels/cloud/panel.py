@@ -6,7 +6,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from handcal.geometry import invert, transform
@@ -16,9 +15,9 @@ from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.orbit import Direction
-from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.widgets.legend import LegendEntry
-from handcal_gui.widgets.missing import what_is_missing
+from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
@@ -99,6 +98,7 @@ class CloudPanel(QWidget):
         self.setFocusProxy(self._view)
         self._lay_out()
         self.clear()
+        follow_theme(self, self._draw)
 
     def clear(self, message: str = _EMPTY) -> None:
         """Clear the panel and show a message."""
@@ -107,7 +107,7 @@ class CloudPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the cursor, if there is one, and the live hand."""
         seen, cursor = snapshot.observation, snapshot.procedure.cursor
-        problem = what_is_missing(snapshot)
+        problem = missing_text(snapshot)
         if seen is None and not problem:
             return
         hand = seen.hand if seen and not problem else None
@@ -141,12 +141,6 @@ class CloudPanel(QWidget):
             _Cloud("Hand", "live", axes.mm(alignment.hand_m), residuals_m),
             axes.name,
         )
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Follow a change between light and dark."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw()
 
     def _lay_out(self) -> None:
         controls, legend = QHBoxLayout(), QHBoxLayout()

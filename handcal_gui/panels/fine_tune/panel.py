@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QKeySequence
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
@@ -24,10 +24,11 @@ from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Rig
+from handcal_gui.keys import add_action
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -44,7 +45,7 @@ _MOVES: dict[int, tuple[int, int]] = {
 _KEYS = (
     "Arrow keys move the eye: ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3. Click here first; E changes the eye."
 )
-_WHY_NOT = {
+_OBSTACLES = {
     State.ALIGN: "Confirm the alignment, solve and apply it first.",
     State.ALIGNED: "Solve and apply the alignment first.",
     State.SOLVED: "Apply the solved projections first.",
@@ -79,7 +80,7 @@ class FineTunePanel(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._rig: Rig | None = None
         self._solved: Shifts = {}
-        self._why_not = "Fine-tuning starts with a session."
+        self._obstacle = "Fine-tuning starts with a session."
         self._history = ShiftHistory(_OFFLINE)
         self._burst: object = None
         self._sign_name = "wait"
@@ -90,9 +91,9 @@ class FineTunePanel(QWidget):
         self._make_actions()
         self._make_depths()
         self._lay_out()
-        self._draw_icons()
+        follow_theme(self, self._draw_icons)
         self._steps.actions()[0].trigger()
-        self._say("wait", self._why_not)
+        self._show_status("wait", self._obstacle)
         self._refresh()
 
     @property
@@ -129,14 +130,14 @@ class FineTunePanel(QWidget):
         """Show the headset's φ, unless it was set here, and whether it has arrived."""
         results = snapshot.procedure.results
         solved = {eye: shift.shift_m for eye, shift in results.eyes.items()} if results else {}
-        why_not = _why_not(snapshot)
+        obstacle = _obstacle(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
             self._begin(snapshot.procedure.applied_shift_m)
-        if is_new or why_not != self._why_not or not same_shifts(solved, self._solved):
-            self._why_not, self._solved = why_not, solved
+        if is_new or obstacle != self._obstacle or not same_shifts(solved, self._solved):
+            self._obstacle, self._solved = obstacle, solved
             self._refresh()
-        self._say(*(("wait", why_not) if why_not else _ARRIVALS[self._stream.arrival]))
+        self._show_status(*(("wait", obstacle) if obstacle else _ARRIVALS[self._stream.arrival]))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Move the selected eye by arrow keys."""
@@ -152,12 +153,6 @@ class FineTunePanel(QWidget):
         """End any comparison, so that the headset keeps φ as set."""
         super().hideEvent(event)
         self.settle()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._draw_icons()
 
     def _draw_icons(self) -> None:
         for action, name in ((self._undo, "undo"), (self._redo, "redo")):
@@ -178,20 +173,20 @@ class FineTunePanel(QWidget):
         burst = (eyes, axis)
         self._history.change(shifts_m, goes_on=burst == self._burst)
         self._burst = burst
-        self._put()
+        self._send_present()
 
     def _reset(self, shifts_m: Shifts) -> None:
         self._burst = None
         self._history.change({**self._history.present, **shifts_m})
-        self._put()
+        self._send_present()
 
     def _go(self, step: Callable[[], None]) -> None:
         self._burst = None
         step()
-        self._put()
+        self._send_present()
 
-    def _put(self) -> None:
-        self._stream.put(self._history.present)
+    def _send_present(self) -> None:
+        self._stream.send(self._history.present)
         self._refresh()
 
     def _end_burst(self) -> None:
@@ -217,10 +212,10 @@ class FineTunePanel(QWidget):
             action.setChecked(False)
 
     def _is_editable(self) -> bool:
-        return not self._why_not and self._shown() is None
+        return not self._obstacle and self._shown() is None
 
     def _refresh(self) -> None:
-        is_editable, is_ready = self._is_editable(), not self._why_not
+        is_editable, is_ready = self._is_editable(), not self._obstacle
         for eye, editor in self._editors.items():
             editor.setEnabled(is_editable)
             editor.show_shift(self._history.present[eye])
@@ -241,7 +236,7 @@ class FineTunePanel(QWidget):
         after_m, depth_m = self._history.present[eye], self._depth.currentData()
         return effect_at(self._rig.eyes[eye], before_m, after_m, depth_m)
 
-    def _say(self, icon_name: str, text: str) -> None:
+    def _show_status(self, icon_name: str, text: str) -> None:
         if (icon_name, text) != (self._sign_name, self._status.text()):
             self._sign_name = icon_name
             self._sign.setPixmap(icon(icon_name).pixmap(2 * SPACING_PX))
@@ -287,18 +282,14 @@ class FineTunePanel(QWidget):
         self._steps.triggered.connect(self._set_step)
         for key, step_mm in enumerate(_STEPS_MM, 1):
             step = add(f"{step_mm:g}", str(key), f"Arrows move by {step_mm:g} mm")
+            step.setWhatsThis(f"Step of {step_mm:g} mm")
             step.setCheckable(True)
             step.setData(1e-3 * step_mm)
             self._steps.addAction(step)
         add("Other eye", "E", "").triggered.connect(self._change_eye)
 
     def _add_action(self, text: str, keys: str, tooltip: str) -> QAction:
-        action = QAction(text, self)
-        action.setShortcut(QKeySequence(keys))
-        action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        action.setToolTip(f"{tooltip} ({keys})" if keys else tooltip)
-        self.addAction(action)
-        return action
+        return add_action(self, text, keys, tooltip=f"{tooltip} ({keys})" if keys else tooltip)
 
     def _set_step(self) -> None:
         for editor in self._editors.values():
@@ -368,8 +359,8 @@ def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
     return row
 
 
-def _why_not(snapshot: Snapshot) -> str:
+def _obstacle(snapshot: Snapshot) -> str:
     """Return the reason why φ cannot be set by hand now; empty if it can."""
     if not snapshot.link.connected:
         return snapshot.link_problem or "The headset is not connected; see Link."
-    return _WHY_NOT.get(snapshot.procedure.state, "")
+    return _OBSTACLES.get(snapshot.procedure.state, "")

@@ -50,7 +50,7 @@ class ShiftStream(QObject):
         self._calm = _timer(self, SETTLE_MS)
         self._calm.timeout.connect(self.settled)
 
-    def put(self, shifts_m: Shifts) -> None:
+    def send(self, shifts_m: Shifts) -> None:
         """Send shifts to be stored, unless others follow soon."""
         self.preview(shifts_m)
         self._calm.start()

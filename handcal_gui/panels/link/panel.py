@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
@@ -21,7 +21,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.link.link_history import LinkHistory
 from handcal_gui.panels.link.link_table import RATES_S, LinkTable
 from handcal_gui.panels.link.pairing_box import PairingBox
-from handcal_gui.theme import SPACING_PX, colors, icon
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.sentence import sentence
 
 _PERIOD_S = 0.25
@@ -63,6 +63,7 @@ class LinkPanel(QWidget):
         self._pairing.hide()
         self._lay_out()
         self._show_state(is_connected=False, problem="Open a session on the start page.")
+        follow_theme(self, self._draw_sign)
 
     def show_pairing(self, address: str, key: str, *, is_virtual: bool = False) -> None:
         """Start with another link.
@@ -96,21 +97,19 @@ class LinkPanel(QWidget):
         self._table.show_link(link, rates)
         self._history.add(t_s, link.latency_ms, rates)
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Follow a change between light and dark."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and self._is_connected is not None:
-            self._draw_sign(self._is_connected)
-
     def _show_state(self, *, is_connected: bool, problem: str) -> None:
         if is_connected is not self._is_connected:
             self._is_connected = is_connected
-            self._draw_sign(is_connected)
+            self._draw_sign()
         word = "Connected" if is_connected else "Not connected"
         self._state.setText(f"{word}. {sentence(problem)}" if problem else word)
 
-    def _draw_sign(self, is_connected: bool) -> None:
-        drawn = icon("link", colors().good) if is_connected else icon("link-off", colors().warning)
+    def _draw_sign(self) -> None:
+        drawn = (
+            icon("link", colors().good)
+            if self._is_connected
+            else icon("link-off", colors().warning)
+        )
         self._sign.setPixmap(drawn.pixmap(QSize(_ICON_PX, _ICON_PX), self.devicePixelRatio()))
 
     def _lay_out(self) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
 
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Rig
+from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
@@ -20,9 +21,9 @@ from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
-    alignment_rows,
     another_text,
     result_rows,
+    single_alignment_rows,
     verdict_rows,
 )
 
@@ -94,7 +95,7 @@ class ResultsPanel(QWidget):
         self._numbers.show_rows(eyes, result_rows(results, rig))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
-        self._alignments.show_rows([q.name for q in PHI], alignment_rows(results, rig))
+        self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results, rig))
         self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
 
@@ -115,11 +116,12 @@ class ResultsPanel(QWidget):
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
     def _add_copy(self) -> None:
-        copy = QAction("Copy as text", self)
-        copy.setShortcut(QKeySequence.StandardKey.Copy)
-        copy.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        copy.triggered.connect(lambda: QGuiApplication.clipboard().setText(self.as_text()))
-        self.addAction(copy)
+        add_action(
+            self,
+            "Copy as text",
+            "Ctrl+C",
+            lambda: QGuiApplication.clipboard().setText(self.as_text()),
+        )
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
 
     def _lay_out(self) -> None:

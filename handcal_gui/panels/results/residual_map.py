@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QWidget
 
 from handcal.types import Float64
-from handcal_gui.theme import colors
+from handcal_gui.theme import colors, follow_theme
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.residual_scale import LARGEST_MM, residual_ramp
 
@@ -40,7 +39,7 @@ class ResidualMap(Plot):
         for scatter in reversed(self.scatters):
             item.addItem(scatter)
         item.layout.addItem(self._bar, 2, 5)
-        self._redraw()
+        follow_theme(self, self._redraw)
 
     def show_residuals(self, places_m: Float64, residuals_m: Float64) -> None:
         """Show points.
@@ -54,12 +53,6 @@ class ResidualMap(Plot):
         """
         self._shown = places_m, residuals_m
         self._redraw()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._redraw()
 
     def _redraw(self) -> None:
         places_m, residuals_m = self._shown

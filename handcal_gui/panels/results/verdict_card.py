@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 
 from handcal.types import Eye, Verdict
-from handcal_gui.theme import SPACING_PX, colors, scale_font
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
@@ -37,6 +37,7 @@ class VerdictCard(QFrame):
         layout.addWidget(self._word)
         layout.addWidget(self._reason, 1)
         self.show_verdict(None)
+        follow_theme(self, self._recolor)
 
     def show_verdict(self, verdict: Verdict | None) -> None:
         """Show a verdict; None if the eye is in no alignment."""
@@ -49,12 +50,6 @@ class VerdictCard(QFrame):
             self._reason.setText(sentence(verdict.reason))
         self._reason.setToolTip(self._reason.text())
         self._recolor()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._recolor()
 
     def _recolor(self) -> None:
         palette = QPalette(self.palette())

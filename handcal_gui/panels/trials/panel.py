@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -23,6 +22,7 @@ from handcal.session.trial import summarise_trials
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
+from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.number_table import NumberTable
@@ -137,7 +137,7 @@ class TrialsPanel(QWidget):
         trials = tuple(self._record.trials.values()) if self._record else ()
         return "right" if trials and trials[-1].eye == "left" else "left"
 
-    def _why_not(self) -> str:
+    def _obstacle(self) -> str:
         """Return the reason why no trial can be recorded now; empty if one can."""
         if self._is_read_only:
             return "This session is open read-only."
@@ -153,18 +153,18 @@ class TrialsPanel(QWidget):
     def _is_zero(self) -> bool:
         """Return whether the next trial would have an error of zero."""
         procedure = self._snapshot.procedure if self._snapshot else None
-        if self._why_not() or procedure is None or procedure.results is None:
+        if self._obstacle() or procedure is None or procedure.results is None:
             return False
         eye = self._next_eye()
         solved_m = procedure.results.eyes[eye].shift_m
         return bool(np.allclose(procedure.applied_shift_m[eye], solved_m, rtol=0.0, atol=1e-6))
 
     def _refresh(self) -> None:
-        why_not = self._why_not()
+        obstacle = self._obstacle()
         self._is_doubtful = self._is_doubtful and self._is_zero()
-        self.record_action.setEnabled(not why_not)
-        self._message.setText(why_not or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
-        can_show = not (why_not or (self._record and self._record.is_finished))
+        self.record_action.setEnabled(not obstacle)
+        self._message.setText(obstacle or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
+        can_show = not (obstacle or (self._record and self._record.is_finished))
         self._shows_target.setEnabled(can_show)
         if not can_show:
             self._shows_target.setChecked(False)
@@ -219,15 +219,15 @@ class TrialsPanel(QWidget):
         self._shows_target.toggled.connect(self._request_target)
 
     def _make_record_action(self) -> None:
-        self.record_action = QAction("Record trial", self)
-        self.record_action.setToolTip(
-            "Record the error of the solved φ relative to the φ set by hand (T)"
+        self.record_action = add_action(
+            self,
+            "Record trial",
+            "T",
+            self._ask,
+            tooltip="Record the error of the solved φ relative to the φ set by hand (T)",
+            # Also from the fine-tune panel, where the study leader works.
+            context=Qt.ShortcutContext.WindowShortcut,
         )
-        self.record_action.setShortcut(Qt.Key.Key_T)
-        # Also available from the fine-tune panel, where the study leader works.
-        self.record_action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        self.record_action.triggered.connect(self._ask)
-        self.addAction(self.record_action)
 
     def _lay_out(self) -> None:
         hint = QLabel(text=_HOW, wordWrap=True)

@@ -10,7 +10,7 @@ from handcal.types import EYES, Eye
 from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.legend import LegendEntry
-from handcal_gui.widgets.missing import what_is_missing
+from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
 _TITLES: dict[Eye, str] = {"left": "Left eye", "right": "Right eye"}
@@ -63,7 +63,7 @@ class WearerViewPanel(QWidget):
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the eyes' views, the closed eye, or a message."""
-        procedure, missing = snapshot.procedure, what_is_missing(snapshot)
+        procedure, missing = snapshot.procedure, missing_text(snapshot)
         for eye, column in self._eyes.items():
             is_closed = procedure.cursor is not None and eye not in procedure.eyes
             message = _CLOSED if is_closed else missing

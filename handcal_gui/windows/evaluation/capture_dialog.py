@@ -21,7 +21,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, main_button, named, paragraph, whole_number
+from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.live_cameras import LiveCameras
@@ -124,7 +124,7 @@ class CaptureDialog(PreparationDialog):
 
     def _begin(self, found: tuple[tuple[Cube, Grid], list[int]]) -> None:
         self._looked_for, numbers = found
-        self._camera.offer(numbers)
+        self._camera.add_cameras(numbers)
         self._refresh()
 
     def _change_plan(self) -> None:
@@ -166,9 +166,9 @@ class CaptureDialog(PreparationDialog):
         self._take.setEnabled(is_ready and is_seen)
         self._take.setText("Take again" if self._list.chosen_is_taken else "Take")
         self._take.setShortcut(Qt.Key.Key_Space)  # setText removes the shortcut
-        self._instruction.setText(self._what_to_do())
+        self._instruction.setText(self._next_instruction())
 
-    def _what_to_do(self) -> str:
+    def _next_instruction(self) -> str:
         if self._plan_problem:
             return f"{sentence(self._plan_problem)}."
         if self._list.is_complete and self._list.chosen is None:
@@ -202,20 +202,20 @@ class CaptureDialog(PreparationDialog):
 
 
 def _plan_form() -> EntriesForm:
-    positions = named(
+    positions = with_name(
         QLineEdit(),
         "positions",
         "Positions",
         "Positions of the camera in the eye box: names of folders, separated by commas.",
     )
     poses = whole_number("poses", 1, MOST_POSES, "Poses of the cube at each position.")
-    drawn = named(
+    drawn = with_name(
         QLineEdit(placeholderText="One", clearButtonEnabled=True),
         "drawn",
         "Renderings",
         "Names of the renderings to compare, such as: before, after.",
     )
-    with_grid = named(
+    with_grid = with_name(
         QCheckBox("At &each position"),
         "withGrid",
         "Display's grid",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.lab.evaluate.cube_folder import PlannedCapture
-from handcal_gui.theme import SPACING_PX, colors, icon, quiet
+from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 
 _IMAGE, _STATE = range(2)
 
@@ -34,7 +34,7 @@ class CaptureList(QTreeWidget):
         self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self.setHeaderLabels(["Image", "State"])
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        quiet(self.header())
+        flat_header(self.header())
         self.header().setStretchLastSection(False)
         self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
         self.header().setSectionResizeMode(_STATE, QHeaderView.ResizeMode.ResizeToContents)
@@ -43,6 +43,7 @@ class CaptureList(QTreeWidget):
         self._captures: tuple[PlannedCapture, ...] = ()
         self._missing: Collection[PlannedCapture] = ()
         self.currentItemChanged.connect(self.chosen_changed)
+        follow_theme(self, self._show_states)
 
     @property
     def chosen(self) -> PlannedCapture | None:
@@ -76,12 +77,6 @@ class CaptureList(QTreeWidget):
         self.setCurrentIndex(self.model().index(following, _IMAGE))
         self.blockSignals(False)
         self.chosen_changed.emit()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._show_states()
 
     def _show_states(self) -> None:
         blank = QPixmap(self.iconSize())  # keeps the sizes of rows and columns constant

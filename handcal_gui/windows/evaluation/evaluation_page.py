@@ -69,13 +69,13 @@ class EvaluationPage(QWidget):
         self._results = ResultsView()
         self._look = LatestJob(self._check, self)
         self._lay_out(spec.question)
-        self.form.changed.connect(self._take_entries)
+        self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
         if self._prepare is not None:
             self._prepare.closed.connect(self._restart)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
-        self._look.answered.connect(self._take_readiness)
+        self._look.answered.connect(self._on_readiness)
         self._look.failed.connect(self._show_failure)
 
     @property
@@ -120,7 +120,7 @@ class EvaluationPage(QWidget):
         super().showEvent(event)
         self._ask()
 
-    def _take_entries(self) -> None:
+    def _on_entries_changed(self) -> None:
         self._restart(self.form.take(self._entries))
 
     def _restart(self, entries: Any) -> None:
@@ -142,7 +142,7 @@ class EvaluationPage(QWidget):
         except HandcalError as error:
             return Readiness(Finding("", Health.BROKEN, str(error)))
 
-    def _take_readiness(self, entries: Any, readiness: Readiness) -> None:
+    def _on_readiness(self, entries: Any, readiness: Readiness) -> None:
         if entries == self._entries and not self.is_busy:
             self._readiness = readiness
             self._refresh()

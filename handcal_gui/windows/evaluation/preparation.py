@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QPushButton, QWidget
 
-from handcal_gui.widgets.fields import named
+from handcal_gui.widgets.fields import with_name
 
 
 class PreparationDialog(QDialog):
@@ -54,7 +54,7 @@ class PreparationButton(QPushButton):
 
     def __init__(self, preparation: Preparation, parent: QWidget | None = None) -> None:
         super().__init__(preparation.button, parent, autoDefault=True)
-        named(self, "prepare", preparation.button, preparation.help_text)
+        with_name(self, "prepare", preparation.button, preparation.help_text)
         self._preparation = preparation
         self._entries: Any = None
         self._dialog: PreparationDialog | None = None

@@ -12,7 +12,7 @@ from handcal.report.document import Figure, Report, Table
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import beside, button, named, paragraph
+from handcal_gui.widgets.fields import button, hbox, paragraph, with_name
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.sentence import sentence
@@ -27,14 +27,14 @@ class ResultsView(QWidget):
         self.setObjectName("results")
         self._folder = Path()
         self._pages: list[QWidget] = []
-        self._empty = named(QLabel("Figures and numbers will be shown here."), "noResults")
+        self._empty = with_name(QLabel("Figures and numbers will be shown here."), "noResults")
         self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._empty.setEnabled(False)
         self._lead = paragraph("lead")
         self._lead.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._tabs = named(QTabWidget(), "figures", "Results")
+        self._tabs = with_name(QTabWidget(), "figures", "Results")
         self._tabs.setElideMode(Qt.TextElideMode.ElideNone)
-        self._path = named(ElidedLabel(), "resultsFolder")
+        self._path = with_name(ElidedLabel(), "resultsFolder")
         self._lay_out()
 
     @property
@@ -82,7 +82,7 @@ class ResultsView(QWidget):
         ):
             buttons.append(button(name, text, help_text=help_text))
             buttons[-1].clicked.connect(lambda _checked=False, file=file: self._open(file))
-        beside(foot, self._path, *buttons, grows=self._path)
+        hbox(foot, self._path, *buttons, grows=self._path)
         shown = QWidget()
         layout = QVBoxLayout(shown)
         layout.setContentsMargins(0, 0, 0, 0)

@@ -18,12 +18,12 @@ from handcal.lab.study.studies import (
 from handcal.types import EYES
 from handcal_gui.evaluation_entries import CubeEntries, UserEntries
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import choice, named, whole_number
+from handcal_gui.widgets.fields import choice, whole_number, with_name
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.evaluation.capture_dialog import MOST_POSES, CaptureDialog
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.preparation import Preparation
-from handcal_gui.windows.evaluation.work import GivenData, SimulatedStudy
+from handcal_gui.windows.evaluation.work import FileEvaluation, StudyEvaluation
 
 _MOST_WEARERS, _MOST_SEED, _MOST_PROCESSES = 10_000, 2**31 - 1, 1024
 _MOST_ALIGNMENTS = 20
@@ -36,21 +36,21 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             "Noise study",
             "How much rotation and noise do the solvers tolerate before their error exceeds the "
             "paper's 4 mm? About ten minutes on two cores; half a minute for a quick run.",
-            SimulatedStudy(noise_cases, run_noise_study),
+            StudyEvaluation(noise_cases, run_noise_study),
             _noise_form,
         ),
         "methods": EvaluationSpec(
             "Method comparison",
             "Which calibration method is most accurate for the same wearers, and how much effort "
             "does it require? 100 wearers take about eleven minutes on two cores.",
-            SimulatedStudy(method_cases, run_method_comparison),
+            StudyEvaluation(method_cases, run_method_comparison),
             _methods_form,
         ),
         "cube": EvaluationSpec(
             "Cube test",
             "How far is a drawn cube from the real one, as seen by a camera at the eye position? "
             "About a minute with rendered captures.",
-            GivenData(_missing_captures, run_cube_test),
+            FileEvaluation(_missing_captures, run_cube_test),
             _cube_form,
             Preparation(
                 "Capture…",
@@ -63,7 +63,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             "User test",
             "How large are the errors that wearers see after calibration, over all trials of their "
             "sessions? A few seconds.",
-            GivenData(
+            FileEvaluation(
                 _missing_sessions,
                 lambda entries, progress: run_user_test(entries.settings, progress),
             ),
@@ -151,7 +151,7 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
         "Number of processes on this computer; more than its cores is not faster.",
     )
     processes.setSpecialValueText("One per core")
-    scheduler = named(
+    scheduler = with_name(
         QLineEdit(placeholderText="None: this computer", clearButtonEnabled=True),
         "scheduler",
         "Dask scheduler",

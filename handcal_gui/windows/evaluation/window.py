@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
-from handcal_gui.widgets.fields import named
+from handcal_gui.widgets.fields import with_name
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
 
 _FIRST_SIZE = QSize(1240, 860)
@@ -60,7 +60,7 @@ class EvaluationWindow(QDialog):
         self._entries = entries
         self._specs = specs
         self._is_closing = False
-        self._rail = named(QListWidget(), "evaluationRail", "Evaluations")
+        self._rail = with_name(QListWidget(), "evaluationRail", "Evaluations")
         self._title = QLabel()
         self._stack = QStackedWidget()
         self._pages: dict[str, EvaluationPage] = {}

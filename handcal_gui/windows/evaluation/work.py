@@ -46,7 +46,7 @@ class Outcome:
     """The report's figures as written to file, each (h, w, 3), RGB."""
 
 
-class Reported(Protocol):
+class HasReport(Protocol):
     """Result of an evaluation whose report was written to the entered folder."""
 
     @property
@@ -65,12 +65,12 @@ class Evaluation(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SimulatedStudy:
+class StudyEvaluation:
     """A study on simulated wearers; entries are its settings."""
 
     study: Callable[[Any], Study]
     """Returns the cases for given settings."""
-    order: Callable[[Any, Progress], Reported]
+    order: Callable[[Any, Progress], HasReport]
     """Runs or resumes the study and writes its report."""
 
     def readiness(self, entries: Any) -> Readiness:
@@ -78,7 +78,7 @@ class SimulatedStudy:
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
-            return Readiness(_note(f"{folder} holds all of this study"), "Show results")
+            return Readiness(_note(f"{folder} contains the complete study"), "Show results")
         if share:
             advice = "completed trials are kept"
             return Readiness(
@@ -103,12 +103,12 @@ class SimulatedStudy:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GivenData:
+class FileEvaluation:
     """An evaluation of data in files."""
 
     missing: Callable[[Any], str]
     """Returns a request for missing entries; empty if there are none."""
-    order: Callable[[Any, Progress], Reported]
+    order: Callable[[Any, Progress], HasReport]
     """Evaluates the files and writes the report."""
 
     def readiness(self, entries: Any) -> Readiness:
@@ -125,7 +125,7 @@ class GivenData:
         return _outcome(output_folder(entries.output), self.order(entries, progress))
 
 
-def _outcome(folder: Path, reported: Reported) -> Outcome:
+def _outcome(folder: Path, reported: HasReport) -> Outcome:
     figures = reported.report.figures
     files = [folder / "figures" / f"{figure.name}.png" for figure in figures]
     return Outcome(folder, reported.report, [_read(file) for file in files])

@@ -28,13 +28,13 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (
-    beside,
     button,
     choice,
-    named,
+    hbox,
     number,
     paragraph,
     whole_number,
+    with_name,
 )
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
@@ -67,7 +67,7 @@ class BoardPage(QWidget):
             {name: name for name in DICTIONARIES},
             "Dictionary of the markers.",
         )
-        self._legacy = named(
+        self._legacy = with_name(
             QCheckBox("Printed by OpenCV before 4.6"),
             "legacy",
             help_text="Boards with an even number of rows started with a white square.",
@@ -165,14 +165,14 @@ class BoardPage(QWidget):
         path, _ = QFileDialog.getOpenFileName(
             self, "Choose an initial rig", "", "Rig files (*.yaml *.yml)"
         )
-        if not path or not self._may_give_up():
+        if not path or not self._confirm_discard():
             return
         try:
-            self._project.begin_from(Path(path))
+            self._project.start_from(Path(path))
         except HandcalError as error:
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
 
-    def _may_give_up(self) -> bool:
+    def _confirm_discard(self) -> bool:
         """Ask before calibrated parts are discarded."""
         if not self._project.rig.origins:
             return True
@@ -189,9 +189,9 @@ class BoardPage(QWidget):
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()
-        beside(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
-        beside(paper, self._paper, self._pdf, self._picture, grows=self._picture)
-        beside(rig, self._rig, self._begin, grows=self._rig)
+        hbox(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
+        hbox(paper, self._paper, self._pdf, self._picture, grows=self._picture)
+        hbox(rig, self._rig, self._begin, grows=self._rig)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)

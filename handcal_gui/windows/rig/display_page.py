@@ -164,7 +164,7 @@ class DisplayPage(StepPage):
 
     def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
         display, place = solved
-        self.box.show_solved(display, self.project.take_part(display))
+        self.box.show_solved(display, self.project.add_part(display))
         self._grid.show_solved(display)
         self._board.show_solved(place)
 

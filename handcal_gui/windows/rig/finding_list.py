@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.rig.report import RigFinding
-from handcal_gui.theme import colors, icon, quiet
+from handcal_gui.theme import colors, flat_header, follow_theme, icon
 
 
 class FindingList(QTreeWidget):
@@ -27,22 +26,17 @@ class FindingList(QTreeWidget):
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
         self.setHeaderLabels(["Item", "Found", "Expected"])
-        quiet(self.header())
+        flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.header().setStretchLastSection(False)
         self._findings: tuple[RigFinding, ...] = ()
+        follow_theme(self, self._refresh)
 
     def show_findings(self, findings: Sequence[RigFinding]) -> None:
         """Replace the list; doubtful findings come first."""
         self._findings = tuple(sorted(findings, key=lambda one: one.is_fine))
         self._refresh()
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._refresh()
 
     def _refresh(self) -> None:
         self.clear()

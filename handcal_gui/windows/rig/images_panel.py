@@ -62,7 +62,7 @@ class ImagesPanel(QWidget):
         self._take = button(
             "take", "Take images…", help_text="Take images with cameras of this computer"
         )
-        self._again.clicked.connect(self._look_again)
+        self._again.clicked.connect(self._search_again)
         self._take.clicked.connect(self.take_requested)
         self.bar = JobBar()
         self.bar.failed.connect(self.show_trouble)
@@ -124,7 +124,7 @@ class ImagesPanel(QWidget):
         self._refresh()
         self.dropped_changed.emit()
 
-    def _look_again(self) -> None:
+    def _search_again(self) -> None:
         self.forget()
         self.again_requested.emit()
 

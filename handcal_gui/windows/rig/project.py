@@ -86,16 +86,16 @@ class RigProject(QObject):
             self.inputs = inputs
             self._settle.start()
 
-    def begin_from(self, path: Path) -> None:
+    def start_from(self, path: Path) -> None:
         """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""
-        self.take_rig(read_rig(path))
+        self.use_rig(read_rig(path))
 
-    def take_part(self, solved: SolvedPart) -> str:
+    def add_part(self, solved: SolvedPart) -> str:
         """Add a calibrated part to the rig; return the outcome as a message."""
-        if solved.put is None:
+        if solved.add_to is None:
             return "it was not added to the rig"
         try:
-            self.take_rig(solved.put(self.rig))
+            self.use_rig(solved.add_to(self.rig))
         except HandcalError as error:
             return f"it was not added to the rig: {error}"
         return "it was added to the rig"
@@ -104,7 +104,7 @@ class RigProject(QObject):
         """Announce that the viewpoint camera's intrinsics may have changed."""
         self.rig_changed.emit()
 
-    def take_rig(self, rig: Rig) -> None:
+    def use_rig(self, rig: Rig) -> None:
         """Replace the rig, or raise HandcalError if it is implausible or cannot be stored."""
         try:
             self.folder.save_rig(rig)

@@ -24,7 +24,7 @@ from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, main_button, named
+from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
@@ -51,7 +51,7 @@ class ResultPage(QWidget):
         self.setObjectName("resultPage")
         self._project = project
         self._saved: Path | None = None
-        self._name = named(QLineEdit(maxLength=MAX_TEXT), "rigName", "Name of the rig")
+        self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", "Name of the rig")
         self._findings = FindingList("Check of the rig")
         self._numbers = NumberTable("Numbers of the rig")
         self._other = PathField("Rig file to compare with", "file", _RIG_FILES)
@@ -63,7 +63,7 @@ class ResultPage(QWidget):
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
-        self._name.editingFinished.connect(self._take_name)
+        self._name.editingFinished.connect(self._on_name_edited)
         self._save.clicked.connect(self.save)
         self._use.clicked.connect(self._ask_to_use)
         project.rig_changed.connect(self.enter)
@@ -85,7 +85,7 @@ class ResultPage(QWidget):
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Store the typed name: clicking a button may leave the focus in the field."""
-        self._take_name()
+        self._on_name_edited()
         super().hideEvent(event)
 
     def save(self) -> None:
@@ -98,7 +98,7 @@ class ResultPage(QWidget):
 
     def save_as(self, path: Path) -> None:
         """Save the rig file."""
-        self._take_name()
+        self._on_name_edited()
         try:
             write_rig(path, self._project.rig)
         except FileError as error:
@@ -111,12 +111,12 @@ class ResultPage(QWidget):
     def stop(self) -> None:
         """Do nothing: the page has no background work."""
 
-    def _take_name(self) -> None:
+    def _on_name_edited(self) -> None:
         name = self._name.text().strip()
         if name == self._project.rig.name:
             return
         try:
-            self._project.take_rig(replace(self._project.rig, name=name))
+            self._project.use_rig(replace(self._project.rig, name=name))
         except HandcalError as error:
             self._name.setText(self._project.rig.name)
             self._end.show_finding(Finding("", Health.BROKEN, str(error)))

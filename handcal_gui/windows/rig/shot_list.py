@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QImage, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.types import UInt8
-from handcal_gui.theme import SPACING_PX, icon, number_font, quiet
+from handcal_gui.theme import SPACING_PX, flat_header, follow_theme, icon, number_font
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.rig.shots import Shot
@@ -54,13 +54,14 @@ class ShotList(QTreeWidget):
             self.headerItem().setToolTip(column, tooltip)
             if column != _IMAGE:
                 self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
-        quiet(self.header())
+        flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
         self.header().setStretchLastSection(False)
         self.setMinimumSize(50 * SPACING_PX, 12 * SPACING_PX)
         self.currentItemChanged.connect(self._choose)
-        self.itemChanged.connect(self._take_change)
+        self.itemChanged.connect(self._on_item_changed)
+        follow_theme(self, self._mark_all)
 
     @property
     def dropped(self) -> tuple[str, ...]:
@@ -100,19 +101,16 @@ class ShotList(QTreeWidget):
             _note(item, item.data(_IMAGE, _PROBLEM) or note)
         self.blockSignals(False)
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            for item in self._items():
-                _mark(item)
-
     def _choose(self, item: QTreeWidgetItem | None) -> None:
         self.chosen.emit(-1 if item is None else self.indexOfTopLevelItem(item))
 
-    def _take_change(self, _item: QTreeWidgetItem, column: int) -> None:
+    def _on_item_changed(self, _item: QTreeWidgetItem, column: int) -> None:
         if column == _IMAGE:
             self.dropped_changed.emit()
+
+    def _mark_all(self) -> None:
+        for item in self._items():
+            _mark(item)
 
     def _items(self) -> list[QTreeWidgetItem]:
         items = (self.topLevelItem(row) for row in range(self.topLevelItemCount()))

@@ -67,7 +67,7 @@ class ShotView(QWidget):
             shown.show_image(image)
             found = view.found
             shown.show_overlay(None if found is None else partial(_draw_corners, found))
-            shown.show_text(caption=f"{title}: {_what(view)}")
+            shown.show_text(caption=f"{title}: {_caption(view)}")
 
     def _show_failure(self, why: str) -> None:
         for shown in self._images:
@@ -80,7 +80,7 @@ def _read(files: tuple[Path, ...]) -> tuple[UInt8, ...]:
     return tuple(read_color(file) for file in files)
 
 
-def _what(view: BoardImage) -> str:
+def _caption(view: BoardImage) -> str:
     if view.found is None:
         return view.problem
     blur_px = view.found.blur_px

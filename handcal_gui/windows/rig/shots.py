@@ -56,11 +56,11 @@ def look(
     files: dict[tuple[int, str], Path] = {}
     for number, folder in enumerate(folders):
 
-        def told(name: str, share: float, number: int = number) -> None:
+        def report(name: str, share: float, number: int = number) -> None:
             progress.at((number + share) / len(folders), f"Looking for the board in {name}")
 
         paths = image_files([folder])
-        views = read_views(paths, board, Progress(told))
+        views = read_views(paths, board, Progress(report))
         files |= {(number, path.name): path for path in paths}
         of_camera.append(views)
     together = pair_views(*of_camera) if len(of_camera) == 2 else [(one,) for one in of_camera[0]]
@@ -71,7 +71,7 @@ def look(
     return tuple(shots)
 
 
-def without(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[BoardImage, ...]]:
+def excluding(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[BoardImage, ...]]:
     """Return the views; those of the named shots are marked as excluded."""
     return [
         tuple(replace(view, dropped=shot.name in names) for view in shot.views) for shot in shots

@@ -32,7 +32,7 @@ from handcal_gui.windows.rig.project_folder import (
     entered_path,
 )
 from handcal_gui.windows.rig.rows import camera_rows, display_rows, stereo_rows
-from handcal_gui.windows.rig.shots import Shot, without
+from handcal_gui.windows.rig.shots import Shot, excluding
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +46,20 @@ class SolvedPart:
     tilts_rad: Mapping[str, float] = field(default_factory=dict)
     """By image; the tilt is the angle between the board's normal and the line of sight."""
     worst: WorstView | None = None
-    put: Callable[[Rig], Rig] | None = None
+    add_to: Callable[[Rig], Rig] | None = None
     """Returns a rig with this part added; None if it is bad or not part of a rig."""
 
 
 def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
     """Solve the pose of the depth camera, like ``handcal rig stereo`` and ``make``."""
-    pairs = [(first, second) for first, second in without(shots, entries.dropped)]
+    pairs = [(first, second) for first, second in excluding(shots, entries.dropped)]
     result = calibrate_depth_camera(
         pairs,
         entries.lens,
         entered_path(entries.depth_intrinsics),
         entered_path(entries.headset_intrinsics),
     )
-    put = partial(
+    add_to = partial(
         with_stereo,
         stereo=result,
         depth_intrinsics=intrinsics_in(entered_path(entries.imager_intrinsics)),
@@ -72,13 +72,13 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
         result.residuals_px,
         _tilts([first for first, _ in pairs], result.depth),
         result.worst,
-        None if result.verdict.name == "bad" else put,
+        None if result.verdict.name == "bad" else add_to,
     )
 
 
 def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Path) -> SolvedPart:
     """Solve the viewpoint camera's intrinsics, and write them to a file unless bad."""
-    views = [view for (view,) in without(shots, entries.dropped)]
+    views = [view for (view,) in excluding(shots, entries.dropped)]
     result = calibrate_camera(views, CameraSettings(lens=entries.lens))
     if result.verdict.name != "bad":
         write_json(output, camera_json(result))
@@ -104,17 +104,17 @@ def solve_display(
         raise HandcalError("the viewpoint camera's intrinsics are missing: solve its step first")
     camera = read_intrinsics(camera_file)
     stereo, tracked = entered_path(entries.stereo), entered_path(entries.tracked)
-    boards = [] if stereo else [view for (view,) in without(board_shots, entries.dropped_board)]
+    boards = [] if stereo else [view for (view,) in excluding(board_shots, entries.dropped_board)]
     pose = calibrate_viewpoint(boards, camera, stereo, tracked)
     of_pose = SolvedPart(pose.verdict, (), pose.residuals_px, _tilts(boards, camera))
-    grids = [view for (view,) in without(grid_shots, entries.dropped_grid)]
+    grids = [view for (view,) in excluding(grid_shots, entries.dropped_grid)]
     result = calibrate_eye_display(rig, eye, grids, camera, pose, entries.inputs)
-    put = partial(with_display, eye=eye, calibration=result)
+    add_to = partial(with_display, eye=eye, calibration=result)
     solved = SolvedPart(
         result.verdict,
         display_rows(result),
         result.homography.residuals_px,
-        put=None if result.verdict.name == "bad" else put,
+        add_to=None if result.verdict.name == "bad" else add_to,
     )
     return solved, of_pose
 

@@ -79,7 +79,7 @@ class StereoPage(StepPage):
         self.box.show_origin(self.project.rig.origins.get("T_H_D"))
 
     def _show_solved(self, solved: SolvedPart) -> None:
-        self.box.show_solved(solved, self.project.take_part(solved))
+        self.box.show_solved(solved, self.project.add_part(solved))
         self.panel.show_solved(solved)
 
     def _take(self) -> None:

@@ -19,7 +19,7 @@ from handcal.rig.views import BoardImage, board_image
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, main_button, named
+from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.live_cameras import LiveCameras
@@ -60,7 +60,7 @@ class TakeDialog(QDialog):
         self._folders, self._board, self._choose = dict(folders), board, choose
         self._selector = ViewSelector(choose)
         self._kept = 0
-        self._is_looking = False
+        self._is_searching = False
         self._cameras = LiveCameras(
             tuple(folders),
             realsense,
@@ -73,28 +73,28 @@ class TakeDialog(QDialog):
         self._take = main_button("takeImage", "Take")
         self._take.setShortcut(Qt.Key.Key_Space)
         self._take.setToolTip("Space bar")
-        self._by_itself = named(
+        self._by_itself = with_name(
             QCheckBox("Automatically"),
             "byItself",
             help_text="Take an image whenever the board is at rest, sharp, and at a position not "
             "covered by earlier images.",
         )
         self._close = button("close", "Close")
-        self._looker = LatestJob(self._take_if_new, self)
-        self._looker.answered.connect(self._show_looked)
-        self._looker.failed.connect(self._show_failure)
+        self._search = LatestJob(self._keep_if_new, self)
+        self._search.answered.connect(self._on_searched)
+        self._search.failed.connect(self._show_failure)
         self._cameras.images_changed.connect(self._follow)
         self._cameras.failed.connect(self._show_failure)
         self._start.clicked.connect(self.start)
         self._take.clicked.connect(self.take)
-        self._by_itself.toggled.connect(self._begin_anew)
+        self._by_itself.toggled.connect(self._reset)
         self._close.clicked.connect(self.accept)
         self._bar.busy_changed.connect(self._refresh)
         self._bar.failed.connect(self._show_failure)
         self._lay_out()
         self._refresh()
         self._found.show_finding(Finding("", Health.LIMITED, "choose the cameras, and press Show"))
-        self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._cameras.offer)
+        self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._cameras.add_cameras)
 
     @property
     def shown_images(self) -> Images | None:
@@ -103,7 +103,7 @@ class TakeDialog(QDialog):
 
     def start(self) -> None:
         """Show the images of the chosen cameras."""
-        self._stop_looking()
+        self._stop_search()
         self._cameras.start()
 
     def take(self) -> None:
@@ -122,28 +122,28 @@ class TakeDialog(QDialog):
 
     def done(self, result: int) -> None:
         """Close the cameras and the dialog."""
-        self._stop_looking()
+        self._stop_search()
         self._cameras.stop()
         self._bar.stop()
         super().done(result)
 
-    def _begin_anew(self) -> None:
-        self._stop_looking()
+    def _reset(self) -> None:
+        self._stop_search()
         self._selector, self._kept = ViewSelector(self._choose), 0
 
-    def _stop_looking(self) -> None:
-        self._looker.stop()
-        self._is_looking = False
+    def _stop_search(self) -> None:
+        self._search.stop()
+        self._is_searching = False
 
-    def _take_if_new(self, images: Images) -> str:
+    def _keep_if_new(self, images: Images) -> str:
         """Save images if useful, otherwise return why not; runs in the job's thread."""
         why_not = self._selector.consider(see_board(images, self._board))
         if not why_not:
             keep_images(images, tuple(self._folders.values()))
         return why_not
 
-    def _show_looked(self, _images: Images, why_not: str) -> None:
-        self._is_looking = False
+    def _on_searched(self, _images: Images, why_not: str) -> None:
+        self._is_searching = False
         self._kept += not why_not
         if self._selector.is_done:
             self._by_itself.setChecked(False)
@@ -156,13 +156,13 @@ class TakeDialog(QDialog):
 
     def _follow(self) -> None:
         images = self.shown_images
-        if images is not None and self._by_itself.isChecked() and not self._is_looking:
-            self._is_looking = True
-            self._looker.ask(images)
+        if images is not None and self._by_itself.isChecked() and not self._is_searching:
+            self._is_searching = True
+            self._search.ask(images)
         self._refresh()
 
     def _show_failure(self, why: str) -> None:
-        self._stop_looking()
+        self._stop_search()
         self._cameras.stop()
         self._found.show_finding(Finding("", Health.BROKEN, why))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QDialog,
@@ -19,9 +19,9 @@ from PySide6.QtWidgets import (
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.types import RIG_PARTS, RigPart
-from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.fields import button, named
+from handcal_gui.widgets.fields import button, with_name
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
 from handcal_gui.windows.rig.project import RigProject
@@ -84,7 +84,7 @@ class RigWizard(QDialog):
         self.setWindowTitle("Calibrate a rig")
         self.project = RigProject(folder, realsense or RealSenseSettings(), self)
         self._banner = Banner()
-        self._rail = named(QListWidget(), "rigRail", "Steps")
+        self._rail = with_name(QListWidget(), "rigRail", "Steps")
         self._title, self._purpose = QLabel(), QLabel()
         self._stack = QStackedWidget()
         result = ResultPage(self.project)
@@ -115,7 +115,7 @@ class RigWizard(QDialog):
         self._banner.show_message(self.project.complaint)
         screen = QGuiApplication.primaryScreen().availableSize()
         self.resize(screen.boundedTo(_FIRST_SIZE))
-        self._refresh()
+        follow_theme(self, self._refresh)
         self.show_step(0)
 
     @property
@@ -143,12 +143,6 @@ class RigWizard(QDialog):
         """Let Enter press only the button that has the focus."""
         if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             super().keyPressEvent(event)
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Redraw the icons when the colours change."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._refresh()
 
     def _go_to(self, step: int) -> None:
         title = list(_STEPS)[step]

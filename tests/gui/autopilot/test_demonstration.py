@@ -16,7 +16,7 @@ from handcal_gui.autopilot import autopilot, demonstration, tour
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
-from tests.helpers import Patience
+from tests.helpers import Patience, write_small_rig
 
 PATIENCE_S = 60.0
 # A busy computer gives few frames a second, and the wearer's answer lies between two.
@@ -39,7 +39,8 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     qtbot.addWidget(program.window)
     program.window.show()
     shown = Demonstration(program, tmp_path / "result", tmp_path / "pictures")
-    shown.start(StationSettings(seed=1, calibration=CALIBRATION))
+    rig = write_small_rig(tmp_path / "rig.yaml")
+    shown.start(StationSettings(seed=1, rig=str(rig), calibration=CALIBRATION))
     patience = Patience(PATIENCE_S)
     qtbot.waitUntil(lambda: bool(codes) or patience.is_over(), timeout=round(1e4 * PATIENCE_S))
     program.window.close()

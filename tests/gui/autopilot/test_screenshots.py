@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
-from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, View
+from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, WizardView
 
 
 @pytest.fixture
@@ -22,8 +22,8 @@ def label(qtbot: QtBot) -> QLabel:
     return label
 
 
-def view(step: Step, action: Action) -> View:
-    return View(step, "Do it.", (), ButtonSpec(action, "Go"))
+def view(step: Step, action: Action) -> WizardView:
+    return WizardView(step, "Do it.", (), ButtonSpec(action, "Go"))
 
 
 def test_each_offer_of_a_step_is_pictured_once(label: QLabel, tmp_path: Path) -> None:

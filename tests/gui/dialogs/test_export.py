@@ -139,7 +139,7 @@ def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog)
     assert not press(dialog, "export").isEnabled()
 
 
-def test_a_failure_is_told_and_can_be_tried_again(
+def test_a_failure_is_reported_and_can_be_tried_again(
     qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
 ) -> None:
     exporter.failure = "cannot write /x: No space left on device"

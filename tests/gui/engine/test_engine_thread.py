@@ -92,7 +92,7 @@ def test_commands_run_in_the_engine_s_thread_and_answer_in_the_window_s(qtbot: Q
 
 
 @pytest.mark.parametrize("error", [ProcedureError("solve first"), ValueError("solve first")])
-def test_a_command_that_fails_is_told_and_the_engine_goes_on(
+def test_a_command_that_fails_is_reported_and_the_engine_goes_on(
     qtbot: QtBot, error: Exception
 ) -> None:
     def fail(_station: Station) -> None:

@@ -49,7 +49,7 @@ def test_cancel_stops_the_work(qtbot: QtBot) -> None:
         (KeyError("x"), "handcal hit an unexpected error (KeyError: 'x')"),
     ],
 )
-def test_failure_is_told_in_words(qtbot: QtBot, error: Exception, text: str) -> None:
+def test_failure_is_reported_in_words(qtbot: QtBot, error: Exception, text: str) -> None:
     def work(_progress: Progress) -> None:
         raise error
 

@@ -33,7 +33,7 @@ def test_only_the_last_question_is_answered(qtbot: QtBot) -> None:
     job.stop()
 
 
-def test_a_failure_is_told_and_the_next_question_answered(qtbot: QtBot) -> None:
+def test_a_failure_is_reported_and_the_next_question_answered(qtbot: QtBot) -> None:
     def work(question: str) -> str:
         if question == "bad":
             raise FileError("it is damaged")

@@ -61,7 +61,7 @@ def test_a_job_is_cancelled(qtbot: QtBot, bar: JobBar) -> None:
     assert not taken
 
 
-def test_a_failure_is_told(qtbot: QtBot, bar: JobBar) -> None:
+def test_a_failure_is_reported(qtbot: QtBot, bar: JobBar) -> None:
     def work(_progress: Progress) -> object:
         raise FileError("no such folder")
 

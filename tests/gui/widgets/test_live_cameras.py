@@ -32,7 +32,7 @@ class Pair:
         )
         self.said: list[str] = []
         self.widget.failed.connect(self.said.append)
-        self.widget.offer([0, 1])
+        self.widget.add_cameras([0, 1])
 
     @property
     def levels(self) -> list[int]:

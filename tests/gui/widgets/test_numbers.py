@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from handcal_gui.widgets.numbers import counted, signed
+from handcal_gui.widgets.numbers import pluralize, signed
 
 
 @pytest.mark.parametrize(
@@ -14,4 +14,8 @@ def test_sign(value: float, decimals: int, text: str) -> None:
 
 
 def test_more_than_one_is_many() -> None:
-    assert [counted(number, "trial") for number in (0, 1, 2)] == ["0 trials", "1 trial", "2 trials"]
+    assert [pluralize(number, "trial") for number in (0, 1, 2)] == [
+        "0 trials",
+        "1 trial",
+        "2 trials",
+    ]

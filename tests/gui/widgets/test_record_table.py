@@ -5,9 +5,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.widgets.record_table import Column, RecordTable
+from handcal_gui.widgets.record_table import RecordColumn, RecordTable
 
-COLUMNS = (Column("No.", "Number"), Column("What", "Anything", is_number=False))
+COLUMNS = (RecordColumn("No.", "Number"), RecordColumn("What", "Anything", is_number=False))
 
 
 def rows_of(*numbers: int) -> dict[int, tuple[str, ...]]:

@@ -13,10 +13,10 @@ from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
-    alignment_rows,
     another_text,
     comparison_rows,
     result_rows,
+    single_alignment_rows,
     verdict_rows,
 )
 
@@ -30,7 +30,7 @@ def left_only(rig: Rig, alignments: Sequence[Alignment]) -> Results:
     return solve_session([replace(alignments[0], eyes=("left",))], rig, SolveSettings())
 
 
-def test_a_shift_is_told_in_millimetres_with_its_sigma(rig: Rig) -> None:
+def test_a_shift_is_shown_in_millimetres_with_its_sigma(rig: Rig) -> None:
     shift = EyeShift(
         shift_m=np.array([0.0012345, -0.0032, 0.0]),
         covariance_m2=np.diag([0.0005, 0.001, 0.02]) ** 2,
@@ -74,12 +74,12 @@ def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -
         assert left != NOTHING
         assert right == NOTHING
     assert cells(rows, "Eye distance") == (NOTHING,)
-    assert [row.label for row in alignment_rows(left_only, rig)] == ["1 left"]
+    assert [row.label for row in single_alignment_rows(left_only, rig)] == ["1 left"]
     assert "right" not in another_text(left_only, rig)
 
 
-def test_each_alignment_is_told_alone(results: Results, rig: Rig) -> None:
-    rows = alignment_rows(results, rig)
+def test_each_alignment_is_shown_alone(results: Results, rig: Rig) -> None:
+    rows = single_alignment_rows(results, rig)
     assert [row.label for row in rows] == ["1 left", "1 right", "2 left", "2 right"]
     expected = PHI[2].text(results.alignments[2]["left"], rig.eyes["left"])
     assert rows[2].cells[2] == expected

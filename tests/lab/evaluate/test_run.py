@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -98,12 +97,10 @@ def test_a_cube_test_without_captures_renders_them(
     told: list[tuple[str, float]] = []
     asked: list[CaptureSettings] = []
 
-    def render(
-        folder: Path, rig: Rig, settings: CaptureSettings, report: Callable[[str, float], None]
-    ) -> None:
+    def render(folder: Path, rig: Rig, settings: CaptureSettings, progress: Progress) -> None:
         assert not any(folder.iterdir())
         asked.append(settings)
-        report("centre, pose 1", 0.5)
+        progress.at(0.5, "Rendering centre, pose 1")
         raise FileError("no space left")
 
     monkeypatch.setattr("handcal.lab.evaluate.run.write_captures", render)

@@ -134,7 +134,7 @@ def test_rows_come_in_the_order_of_the_cases(tmp_path: Path) -> None:
     assert first == f"1,{rows[0]['value']},False,"
 
 
-def test_the_same_bytes_whoever_does_the_work(tmp_path: Path, cluster: str) -> None:
+def test_the_same_bytes_on_any_number_of_workers(tmp_path: Path, cluster: str) -> None:
     study = make_study()
     alone = run_study(study, tmp_path / "alone", workers=1)
     two = run_study(study, tmp_path / "two", workers=2)
@@ -168,7 +168,7 @@ def test_cancelling_gives_up_what_other_processes_are_at(tmp_path: Path) -> None
     assert set(multiprocessing.active_children()) == before
 
 
-def test_how_much_of_a_study_is_done_is_told_without_a_trace(tmp_path: Path) -> None:
+def test_how_much_of_a_study_is_done_is_reported_without_a_trace(tmp_path: Path) -> None:
     study, folder = make_study(), tmp_path / "study"
     assert share_done(study, folder) == 0.0
     assert not folder.exists()
@@ -216,7 +216,7 @@ def test_a_killed_study_goes_on_and_leaves_no_process(tmp_path: Path) -> None:
 
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-def test_a_worker_that_dies_is_told_of_and_the_study_goes_on(tmp_path: Path) -> None:
+def test_a_worker_that_dies_is_reported_and_the_study_continues(tmp_path: Path) -> None:
     study = make_study(Settings(kills="self", folder=str(tmp_path)))
     with pytest.raises(HandcalError, match="a process of the study died"):
         run_study(study, tmp_path, workers=2)
@@ -224,7 +224,7 @@ def test_a_worker_that_dies_is_told_of_and_the_study_goes_on(tmp_path: Path) -> 
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
 
 
-def test_how_much_is_done_is_told_without_reading_it(tmp_path: Path) -> None:
+def test_how_much_is_done_is_reported_without_reading_it(tmp_path: Path) -> None:
     study = make_study()
     run_study(study, tmp_path, workers=1)
     chunks = sorted((tmp_path / "chunks").iterdir())

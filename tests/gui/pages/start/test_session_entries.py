@@ -9,7 +9,7 @@ from pathlib import Path
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.types import Alignment
-from handcal_gui.pages.start.session_entries import find_offers
+from handcal_gui.pages.start.session_entries import find_sessions
 
 
 def make(folder: Path, wearer: str, alignments: Sequence[Alignment], *, is_done: bool) -> Path:
@@ -27,21 +27,23 @@ def test_unfinished_sessions_are_told_by_wearer_time_and_alignments(
     path = make(tmp_path, "Ada", [alignment], is_done=False)
     make(tmp_path, "Bea", [alignment], is_done=True)
     make(tmp_path, "Cid", [], is_done=False)
-    (entry,) = find_offers(tmp_path, ()).unfinished
+    (entry,) = find_sessions(tmp_path, ()).unfinished
     assert entry.path == path
     assert entry.is_enabled
     assert entry.text.startswith(f"Ada · {datetime.now().astimezone():%d %b %Y}")
     assert entry.text.endswith(" · 1 alignment")
 
 
-def test_a_damaged_session_is_told_with_the_reason(tmp_path: Path, alignment: Alignment) -> None:
+def test_a_damaged_session_is_reported_with_the_reason(
+    tmp_path: Path, alignment: Alignment
+) -> None:
     path = make(tmp_path, "Ada", [alignment, alignment], is_done=False)
     (path / "rig.yaml").write_text("nonsense")
-    (entry,) = find_offers(tmp_path, ()).unfinished
+    (entry,) = find_sessions(tmp_path, ()).unfinished
     assert entry.is_enabled  # the rest can be resumed
     assert entry.text.endswith(" · 2 alignments · damaged: 1 part left out")
     (path / "journal.jsonl").write_text("nonsense\n")
-    (entry,) = find_offers(tmp_path, ()).unfinished
+    (entry,) = find_sessions(tmp_path, ()).unfinished
     assert not entry.is_enabled
     assert "does not begin as the journal" in entry.text
 
@@ -56,7 +58,7 @@ def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(
     damaged = tmp_path / "damaged"
     damaged.mkdir()
     paths = [tmp_path / "gone", nameless, unused, damaged]
-    recent = find_offers(tmp_path / "nowhere", paths).recent
+    recent = find_sessions(tmp_path / "nowhere", paths).recent
     assert [(entry.path, entry.is_enabled) for entry in recent] == [
         (nameless, True),
         (damaged, False),

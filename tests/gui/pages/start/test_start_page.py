@@ -32,7 +32,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
-from handcal_gui.pages.start.session_entries import Entry, Offers
+from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
 from handcal_gui.widgets.path_field import PathField
@@ -47,7 +47,7 @@ class Inspector:
         self.healths: dict[Part, Health] = dict.fromkeys(PARTS, Health.GOOD)
         self.asked: list[tuple[StationSettings, str]] = []
         self.threads: set[threading.Thread] = set()
-        self.offers = Offers((), ())
+        self.offers = KnownSessions((), ())
         self.folders: list[Path] = []
 
     def check(self, settings: StationSettings, pairing_key: str) -> Mapping[Part, Finding]:
@@ -58,7 +58,7 @@ class Inspector:
             for part, health in self.healths.items()
         }
 
-    def find(self, folder: Path, recent: Sequence[Path]) -> Offers:
+    def find(self, folder: Path, recent: Sequence[Path]) -> KnownSessions:
         self.folders.append(folder)
         return self.offers
 
@@ -311,7 +311,7 @@ def test_unfinished_and_recent_sessions_are_offered(
     resume, opened = (find(page, QWidget, name) for name in ("resume", "open"))
     assert not resume.isVisible()
     assert not button(opened, "choose").isEnabled()
-    inspector.offers = Offers(
+    inspector.offers = KnownSessions(
         (Entry(tmp_path / "bad", "damaged", is_enabled=False), Entry(tmp_path / "a", "Ada")),
         (Entry(tmp_path / "b", "Bea"),),
     )
@@ -354,7 +354,7 @@ def test_a_hidden_page_leaves_the_station_alone(
     assert len(inspector.asked) == asked
 
 
-def test_a_check_that_breaks_down_is_told_and_starts_nothing(
+def test_a_check_that_breaks_down_is_reported_and_starts_nothing(
     qtbot: QtBot,
     inspector: Inspector,
     open_page: Callable[..., StartPage],

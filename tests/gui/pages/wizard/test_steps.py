@@ -15,8 +15,8 @@ from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
     Step,
-    View,
     Wizard,
+    WizardView,
     is_complete,
     next_eyes,
 )
@@ -29,7 +29,7 @@ def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
         wizard.move(Action.NEXT, snapshot)
 
 
-def actions(view: View) -> list[Action]:
+def actions(view: WizardView) -> list[Action]:
     return [offer.action for offer in view.others]
 
 
@@ -186,7 +186,7 @@ def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> 
     assert wizard.eyes(applied) == EYES  # the plan again
 
 
-def test_a_resumed_calibration_goes_on_where_it_was_broken_off(
+def test_a_resumed_calibration_continues_where_it_was_interrupted(
     snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
 ) -> None:
     wizard = Wizard("each")
@@ -253,7 +253,7 @@ def test_a_plan_of_one_eye_is_complete_with_it(
     assert wizard.view(snapshot(State.APPLIED, record=one)).main.label == "It fits"
 
 
-def test_a_full_disk_is_told_where_one_saves(snapshot: Maker) -> None:
+def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
     wizard = Wizard()
     wizard.view(snapshot(State.SOLVED))
     full = snapshot(State.APPLIED, problem=str(FileError("the disk is full")))

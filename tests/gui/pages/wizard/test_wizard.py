@@ -50,7 +50,7 @@ def test_the_main_button_asks_for_what_it_says(
     assert asked.args == [Action.SOLVE]
 
 
-def test_another_step_is_told_once(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
+def test_another_step_is_reported_once(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
     with qtbot.waitSignal(panel.step_changed) as told:
         panel.show_snapshot(snapshot(State.ALIGN))
     assert told.args == [Step.ALIGN]

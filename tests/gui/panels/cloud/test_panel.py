@@ -31,6 +31,7 @@ def panel(qtbot: QtBot) -> CloudPanel:
 def _view(panel: CloudPanel) -> CloudView:
     view = panel.findChild(CloudView)
     assert view is not None
+    view.setFocus()
     return view
 
 

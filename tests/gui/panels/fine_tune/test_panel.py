@@ -117,7 +117,7 @@ def test_shows_what_the_headset_renders_with(
         (State.APPLYING, "receiving"),
     ],
 )
-def test_cannot_be_used_amid_an_alignment(
+def test_cannot_be_used_during_an_alignment(
     panel: FineTunePanel, show: Show, sent: list[Shifts], state: State, why: str, qtbot: QtBot
 ) -> None:
     show(state)
@@ -210,7 +210,7 @@ def test_takes_the_nearest_step(panel: FineTunePanel) -> None:
     assert action(panel, "0.5").isChecked()
 
 
-def test_begins_anew_with_another_wearer(panel: FineTunePanel, show: Show, rig: Rig) -> None:
+def test_starts_again_with_another_wearer(panel: FineTunePanel, show: Show, rig: Rig) -> None:
     show()
     field(panel, "left", 1).setValue(4.0)
     panel.set_rig(rig)
@@ -346,7 +346,7 @@ def test_a_hidden_panel_leaves_the_headset_with_what_was_set(
     assert not action(panel, "Show offline").isChecked()
 
 
-def test_new_projections_begin_anew(panel: FineTunePanel, show: Show) -> None:
+def test_new_projections_start_again(panel: FineTunePanel, show: Show) -> None:
     show()
     field(panel, "left", 1).setValue(4.0)
     panel.hide()
@@ -390,7 +390,7 @@ def test_the_wheel_scrolls_the_panel_and_changes_nothing(panel: FineTunePanel, s
     assert fields_mm(panel, "left") == before_mm
 
 
-def test_a_silent_headset_is_told(
+def test_a_silent_headset_is_reported(
     panel: FineTunePanel, snapshot: Callable[..., Snapshot], show: Show
 ) -> None:
     show()

@@ -46,7 +46,7 @@ def test_many_changes_are_sent_as_few(qtbot: QtBot, stream: ShiftStream) -> None
     stream.sent.connect(sent.append)
     started_s = time.monotonic()
     for step in range(200):
-        stream.put(shifts_of(1e-5 * step))
+        stream.send(shifts_of(1e-5 * step))
         qtbot.wait(1)
     stream.flush()
     periods = (time.monotonic() - started_s) / (1e-3 * PERIOD_MS)
@@ -58,10 +58,10 @@ def test_settles_once_after_the_last_change(qtbot: QtBot, stream: ShiftStream) -
     events: list[str] = []
     stream.sent.connect(lambda _: events.append("sent"))
     stream.settled.connect(lambda: events.append("settled"))
-    stream.put(shifts_of(0.001))
+    stream.send(shifts_of(0.001))
     qtbot.wait(2 * PERIOD_MS)
     assert events == ["sent"]
-    stream.put(shifts_of(0.002))
+    stream.send(shifts_of(0.002))
     with qtbot.waitSignal(stream.settled, timeout=5 * SETTLE_MS):
         pass
     assert events == ["sent", "sent", "settled"]
@@ -73,7 +73,7 @@ def test_flush_sends_before_it_settles(stream: ShiftStream) -> None:
     stream.settled.connect(lambda: events.append("settled"))
     stream.flush()
     assert events == []
-    stream.put(shifts_of(0.001))
+    stream.send(shifts_of(0.001))
     stream.flush()
     stream.flush()
     assert events == ["sent", "settled"]
@@ -89,7 +89,7 @@ def test_own_shifts_are_told_from_others(stream: ShiftStream, see: Callable[...,
     see(shifts_of(0.0))
     assert see(shifts_of(0.0))  # where it begins is news once
     assert not see(shifts_of(0.0))
-    stream.put(shifts_of(0.001))
+    stream.send(shifts_of(0.001))
     assert not see(shifts_of(0.0)), "not even sent"
     stream.flush()
     assert not see(shifts_of(0.0)), "maybe taken before the engine obeyed"
@@ -100,7 +100,7 @@ def test_own_shifts_are_told_from_others(stream: ShiftStream, see: Callable[...,
 
 
 def test_others_do_not_settle(qtbot: QtBot, stream: ShiftStream, see: Callable[..., bool]) -> None:
-    stream.put(shifts_of(0.001))
+    stream.send(shifts_of(0.001))
     qtbot.wait(2 * PERIOD_MS)
     see(shifts_of(0.001))
     assert see(shifts_of(0.002))
@@ -108,10 +108,10 @@ def test_others_do_not_settle(qtbot: QtBot, stream: ShiftStream, see: Callable[.
         pass
 
 
-def test_a_silent_headset_is_told_from_a_slow_one(
+def test_a_silent_headset_is_distinguished_from_a_slow_one(
     stream: ShiftStream, see: Callable[..., bool]
 ) -> None:
-    stream.put(shifts_of(0.001))
+    stream.send(shifts_of(0.001))
     stream.flush()
     for _ in range(2):
         see(shifts_of(0.001), is_applied=False, after_s=0.1)

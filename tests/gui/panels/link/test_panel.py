@@ -41,7 +41,7 @@ def test_an_empty_panel_says_how_to_begin(panel: LinkPanel) -> None:
     assert not button(panel, QPushButton, "Show").isVisible()
 
 
-def test_it_tells_whether_the_headset_is_there_and_why_not(
+def test_it_shows_if_the_headset_is_connected_and_the_problem(
     panel: LinkPanel, snapshot: Maker
 ) -> None:
     panel.show_snapshot(snapshot())
@@ -154,7 +154,7 @@ def test_only_a_virtual_headset_can_be_restarted(panel: LinkPanel, qtbot: QtBot)
         restart.click()
 
 
-def test_another_link_begins_anew(panel: LinkPanel, snapshot: Maker) -> None:
+def test_another_link_starts_again(panel: LinkPanel, snapshot: Maker) -> None:
     panel.show_snapshot(later(snapshot, 0.0, sent=1000, bytes_sent=1_000_000))
     panel.show_pairing("127.0.0.1:50123", KEY)
     panel.show_snapshot(later(snapshot, 0.1, sent=10, bytes_sent=100))

@@ -67,7 +67,7 @@ def test_the_word_says_whether_it_may_be_confirmed(
     assert child(panel, RotationDial).is_over == expected.startswith("▲")
 
 
-def test_a_strict_limit_is_told_however_small(panel: RotationPanel, snapshot: Make) -> None:
+def test_a_strict_limit_is_reported_however_small(panel: RotationPanel, snapshot: Make) -> None:
     seen = {"rotation_rad": np.radians([0.0, 1.5, 0.0]), "is_over_limit": True}
     limit = {"guard_limit_rad": float(np.radians(1.0))}
     panel.show_snapshot(snapshot(observation=seen, procedure=limit))
@@ -82,7 +82,7 @@ def test_it_says_which_way_to_turn_and_how_far(panel: RotationPanel, snapshot: M
     assert text(panel, "advice") == f"{turn_advice(np.radians(-rotation_deg)).text} by 11°."
 
 
-def test_a_lost_hand_is_told_and_leaves_a_gap(panel: RotationPanel, snapshot: Make) -> None:
+def test_a_lost_hand_is_reported_and_leaves_a_gap(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(turned(snapshot, (0, 0, 12), 1.0))
     lost = {"hand": None, "rotation_rad": None, "problem": "no hand; raise it"}
     panel.show_snapshot(snapshot(observation=lost, t_host_ns=2_000_000_000))

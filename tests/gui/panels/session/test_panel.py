@@ -52,7 +52,7 @@ def test_shows_the_session_of_a_snapshot(
     assert cell(alignments, 0, 3) == "–", "the results are gone"
 
 
-def test_an_unchanged_session_is_not_shown_anew(
+def test_an_unchanged_session_is_not_shown_again(
     panel: SessionPanel, snapshot: Callable[..., Snapshot], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     panel.show_snapshot(snapshot(State.SOLVED))

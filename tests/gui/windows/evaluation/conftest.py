@@ -23,7 +23,7 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import whole_number
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
-from handcal_gui.windows.evaluation.work import SimulatedStudy
+from handcal_gui.windows.evaluation.work import StudyEvaluation
 
 CASES = 10
 
@@ -43,8 +43,8 @@ class Numbers:
     may_go_on: threading.Event = field(default_factory=threading.Event)
 
     @property
-    def work(self) -> SimulatedStudy:
-        return SimulatedStudy(self.study, self._order)
+    def work(self) -> StudyEvaluation:
+        return StudyEvaluation(self.study, self._order)
 
     @property
     def spec(self) -> EvaluationSpec:

@@ -208,7 +208,7 @@ def test_without_the_cube_none_can_be_taken(
     assert not technician.told
 
 
-def test_a_camera_that_fails_is_told_and_can_be_shown_again(
+def test_a_failing_camera_is_reported_and_can_be_shown_again(
     make: Callable[[CubeEntries], Technician], entries: CubeEntries
 ) -> None:
     technician = make(entries)

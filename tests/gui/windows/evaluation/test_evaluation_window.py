@@ -118,7 +118,7 @@ def test_a_study_is_cancelled_and_goes_on(numbers: Any, student: Student) -> Non
     assert set(numbers.squared) == set(range(10))
 
 
-def test_a_folder_of_another_study_is_told(
+def test_a_folder_of_another_study_is_reported(
     numbers: Any, student: Student, entries: NoiseStudySettings
 ) -> None:
     run_study(numbers.work.study(entries), Path(entries.output), workers=1)
@@ -131,7 +131,7 @@ def test_a_folder_of_another_study_is_told(
     student.wait_for_button("Run")
 
 
-def test_a_failing_study_is_told(numbers: Any, student: Student) -> None:
+def test_a_failing_study_is_reported(numbers: Any, student: Student) -> None:
     numbers.fails = True
     student.press("Run")
     student.wait_for_text("Numbers are out of stock")

@@ -57,7 +57,7 @@ def test_it_is_offered_where_the_entries_suffice(window: EvaluationWindow) -> No
     assert button(window).isEnabled()
 
 
-def test_what_was_prepared_is_looked_at_anew(
+def test_prepared_data_is_checked_again(
     qtbot: QtBot, window: EvaluationWindow, entries: NoiseStudySettings, tmp_path: Path
 ) -> None:
     run = window.findChild(QPushButton, "run")

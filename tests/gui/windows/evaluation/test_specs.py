@@ -17,7 +17,7 @@ from handcal.lab.study.studies import run_method_comparison, run_noise_study
 from handcal.progress import Progress
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
 from handcal_gui.windows.evaluation.specs import make_specs
-from handcal_gui.windows.evaluation.work import SimulatedStudy
+from handcal_gui.windows.evaluation.work import StudyEvaluation
 
 
 def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
@@ -41,9 +41,9 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
 def test_studies_are_those_of_the_commands() -> None:
     specs = make_specs()
     noise, methods = specs["noise"].evaluation, specs["methods"].evaluation
-    assert isinstance(noise, SimulatedStudy)
+    assert isinstance(noise, StudyEvaluation)
     assert noise.study(NoiseStudySettings("quick", seed=3)).settings == replace(QUICK_NOISE, seed=3)
-    assert isinstance(methods, SimulatedStudy)
+    assert isinstance(methods, StudyEvaluation)
     study = methods.study(MethodComparisonSettings(wearers=7, seed=3))
     assert study.settings == MethodSettings(wearers=7, seed=3)
     quick = methods.study(MethodComparisonSettings(wearers=3, size="quick"))

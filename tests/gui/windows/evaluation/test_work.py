@@ -17,7 +17,7 @@ from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.station.doctor import Health
 from handcal_gui.evaluation_entries import UserEntries
-from handcal_gui.windows.evaluation.work import GivenData
+from handcal_gui.windows.evaluation.work import FileEvaluation
 
 
 def test_a_study_is_done_and_told(numbers: Any, entries: NoiseStudySettings) -> None:
@@ -60,7 +60,7 @@ def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySet
         files = write_report(Path(given.output), report)
         return UserTestRun(None, report, files)  # type: ignore[arg-type]
 
-    data = GivenData(lambda given: "" if given.sessions else "no sessions", order)
+    data = FileEvaluation(lambda given: "" if given.sessions else "no sessions", order)
     given = UserEntries(sessions="here", output=f"{entries.output}-data")
     assert data.readiness(replace(given, sessions="")).finding.health is Health.BROKEN
     assert data.readiness(given).can_run

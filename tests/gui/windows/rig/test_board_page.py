@@ -68,7 +68,9 @@ def test_the_board_shown_is_the_one_entered(
     qtbot.waitUntil(lambda: preview.has_image)
 
 
-def test_an_impossible_board_is_told_and_not_taken(page: BoardPage, project: RigProject) -> None:
+def test_an_impossible_board_is_reported_and_not_taken(
+    page: BoardPage, project: RigProject
+) -> None:
     marker = page.findChild(QDoubleSpinBox, "marker")
     assert isinstance(marker, QDoubleSpinBox)
     marker.setValue(25.0)

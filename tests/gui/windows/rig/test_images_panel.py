@@ -109,7 +109,7 @@ def test_without_images_what_was_left_out_stays(panel: ImagesPanel) -> None:
     assert text(panel, "count") == "No images yet"
 
 
-def test_why_there_are_none_is_told(
+def test_the_reason_for_no_images_is_reported(
     qtbot: QtBot, panel: ImagesPanel, photographs: Any, tmp_path: Path
 ) -> None:
     panel.look((str(tmp_path), str(tmp_path)), photographs.work.board, ())

@@ -57,7 +57,7 @@ def test_a_broken_rig_is_set_aside(tmp_path: Path) -> None:
     assert "rig.yaml.bad" in complaint
 
 
-def test_no_folder_is_told(tmp_path: Path) -> None:
+def test_no_folder_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileError, match="file"):
         ProjectFolder(tmp_path / "file")

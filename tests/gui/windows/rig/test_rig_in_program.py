@@ -44,7 +44,7 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
     assert (tmp_path / "config" / "rig" / "work.json").exists()
 
 
-def test_without_a_folder_it_is_told_why(program: Program, tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported_with_the_reason(program: Program, tmp_path: Path) -> None:
     (tmp_path / "config" / "rig").touch()
     assert program.calibrate_rig() is None
     assert "cannot create the folder" in program.window.banner.text

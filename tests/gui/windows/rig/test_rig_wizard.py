@@ -117,7 +117,7 @@ def test_an_image_is_dropped_and_taken_in_again(
     assert "8 pairs" in solve(qtbot, wizard, STEREO)
 
 
-def test_what_cannot_be_solved_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
+def test_what_cannot_be_solved_is_reported(qtbot: QtBot, wizard: RigWizard) -> None:
     assert "intrinsics are missing" in solve(qtbot, wizard, LEFT)
     assert "intrinsics are missing" in solve(qtbot, wizard, RIGHT)
     assert not wizard.project.rig.origins
@@ -140,7 +140,7 @@ def test_what_is_wrong_with_images_is_named(
     assert not wizard.project.rig.origins
 
 
-def test_another_board_is_looked_for_anew(qtbot: QtBot, wizard: RigWizard) -> None:
+def test_another_board_is_searched_for_again(qtbot: QtBot, wizard: RigWizard) -> None:
     wizard.show_step(VIEWPOINT)
     wait(qtbot, wizard)
     page = wizard.page
@@ -190,7 +190,7 @@ def test_a_name_being_typed_is_kept_when_another_step_is_shown(wizard: RigWizard
     assert wizard.project.rig.name == "Our headset"
 
 
-def test_a_grid_that_has_no_room_is_told(qtbot: QtBot, wizard: RigWizard) -> None:
+def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) -> None:
     wizard.show_step(LEFT)
     square = child(wizard, QSpinBox, "gridSquare")
     square.setValue(700)

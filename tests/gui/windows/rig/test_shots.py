@@ -8,7 +8,7 @@ from handcal.camera.take_board import keep_images
 from handcal.errors import CancelledError, FileError
 from handcal.progress import Progress
 from handcal.rig.views import ViewsError
-from handcal_gui.windows.rig.shots import look, without
+from handcal_gui.windows.rig.shots import excluding, look
 
 
 def test_pairs_are_looked_through(photographs: Any) -> None:
@@ -27,7 +27,7 @@ def test_pairs_are_looked_through(photographs: Any) -> None:
 
 def test_what_is_left_out_is_marked(photographs: Any) -> None:
     shots = look([photographs.folder / "grid-left"], photographs.work.board)
-    views = without(shots, ["grid-left-002.png"])
+    views = excluding(shots, ["grid-left-002.png"])
     assert [[view.dropped for view in one] for one in views] == [[False], [True]]
 
 
@@ -47,6 +47,6 @@ def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path:
         look([tmp_path / "a", tmp_path / "b"], photographs.work.board)
 
 
-def test_an_empty_folder_is_told(photographs: Any, tmp_path: Path) -> None:
+def test_an_empty_folder_is_reported(photographs: Any, tmp_path: Path) -> None:
     with pytest.raises(FileError, match="no PNG"):
         look([tmp_path], photographs.work.board)

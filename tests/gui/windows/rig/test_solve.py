@@ -56,8 +56,8 @@ def test_the_depth_camera_is_where_it_was(photographs: Any) -> None:
     shots = shots_of(photographs, "depth", "headset")
     solved = solve_stereo(shots, replace(photographs.work.stereo, dropped=("depth-003.png",)))
     assert solved.verdict.name != "bad"
-    assert solved.put is not None
-    rig = solved.put(RIG)
+    assert solved.add_to is not None
+    rig = solved.add_to(RIG)
     assert np.linalg.norm(rig.T_H_D[:3, 3] - RIG.T_H_D[:3, 3]) < 0.0005
     assert rig.origins["T_H_D"].views == 7
     assert set(solved.residuals_px) == {f"depth-{n:03}.png" for n in range(1, 9) if n != 3}
@@ -70,7 +70,7 @@ def test_the_viewpoint_camera_is_kept_in_a_file(photographs: Any, tmp_path: Path
     entries = photographs.work.viewpoint
     solved = solve_viewpoint(shots_of(photographs, "viewpoint"), entries, output)
     assert solved.verdict.name != "bad"
-    assert solved.put is None
+    assert solved.add_to is None
     assert read_intrinsics(output).fx == pytest.approx(photographs.viewpoint.fx, rel=0.003)
     assert solved.rows[1].label == "fx"
 
@@ -95,8 +95,8 @@ def solve_left(
 def test_the_display_is_where_it_was(photographs: Any, display_shots: Any, tmp_path: Path) -> None:
     display, place = solve_left(photographs, display_shots, tmp_path)
     assert (display.verdict.name, place.verdict.name) == ("good", "good")
-    assert display.put is not None
-    found, truth = display.put(RIG).eyes["left"], RIG.eyes["left"]
+    assert display.add_to is not None
+    found, truth = display.add_to(RIG).eyes["left"], RIG.eyes["left"]
     assert np.linalg.norm(found.t_C0_V_m - truth.t_C0_V_m) < 0.001
     np.testing.assert_allclose(found.K[0, 0], truth.K[0, 0], rtol=0.003)
     assert set(display.residuals_px) == {"grid-left-001.png", "grid-left-002.png"}
@@ -108,8 +108,8 @@ def test_the_distance_can_be_solved(photographs: Any, display_shots: Any, tmp_pa
     arcmin = 60 * np.degrees(2 * np.arctan(40 / truth.K[0, 0]))
     entries = replace(photographs.work.left, distance="solved", square_arcmin=float(arcmin))
     display, _ = solve_left(photographs, display_shots, tmp_path, entries)
-    assert display.put is not None
-    assert display.put(RIG).eyes["left"].z_C0_S_m == pytest.approx(truth.z_C0_S_m, rel=0.01)
+    assert display.add_to is not None
+    assert display.add_to(RIG).eyes["left"].z_C0_S_m == pytest.approx(truth.z_C0_S_m, rel=0.01)
 
 
 def test_what_is_missing_is_named(photographs: Any, display_shots: Any, tmp_path: Path) -> None:
@@ -146,8 +146,8 @@ def test_a_stereo_calibration_tells_the_place_instead(
     write_json(file, stereo_json(stereo))
     entries = replace(photographs.work.left, stereo=str(file), tracked="")
     display, place = solve_left(photographs, (display_shots[0], ()), tmp_path, entries)
-    assert display.put is not None
-    np.testing.assert_allclose(display.put(RIG).eyes["left"].t_C0_V_m, left.t_C0_V_m, atol=1e-9)
+    assert display.add_to is not None
+    np.testing.assert_allclose(display.add_to(RIG).eyes["left"].t_C0_V_m, left.t_C0_V_m, atol=1e-9)
     assert place.residuals_px == {"a.png": 0.1}
 
 
@@ -190,9 +190,9 @@ def test_command_and_wizard_write_the_same_bytes(
     )
     shots = shots_of(photographs, "depth", "headset")
     depth = solve_stereo(shots, replace(photographs.work.stereo, dropped=("depth-003.png",)))
-    assert depth.put is not None
-    assert display.put is not None
-    write_rig(entered, display.put(depth.put(read_rig(rig))))
+    assert depth.add_to is not None
+    assert display.add_to is not None
+    write_rig(entered, display.add_to(depth.add_to(read_rig(rig))))
     assert entered.read_bytes() == commanded.read_bytes()
     assert entered.read_bytes() != rig.read_bytes()
 
@@ -203,6 +203,6 @@ def command(*words: object) -> None:
     arguments.command(arguments)
 
 
-def test_a_grid_without_room_is_told() -> None:
+def test_a_grid_without_room_is_reported() -> None:
     with pytest.raises(HandcalError, match="no room"):
         grid_on(1268, 720, square_px=700)

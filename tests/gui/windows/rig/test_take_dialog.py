@@ -92,7 +92,7 @@ def test_both_cameras_images_are_taken(
     assert not any(camera.is_open for camera in cameras.values())
 
 
-def test_a_camera_that_fails_is_told_and_can_be_shown_again(
+def test_a_failing_camera_is_reported_and_can_be_shown_again(
     qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any]
 ) -> None:
     start(qtbot, dialog)
