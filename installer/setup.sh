@@ -1,9 +1,8 @@
-# Brings .venv up to date with a lock; sourced by run.sh and test.sh, which may choose the lock.
+# Brings .venv up to date with $lock; sourced by run.sh and test.sh.
 # shellcheck shell=bash
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root=$PWD
-: "${lock:=installer/requirements-run.lock}"
 
 fail() {
     echo "handcal: $*" >&2
