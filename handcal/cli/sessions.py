@@ -1,4 +1,4 @@
-"""``handcal solve, export``: stored sessions."""
+"""``handcal solve, export, inspect``: stored sessions."""
 
 from __future__ import annotations
 
@@ -94,3 +94,30 @@ def export(arguments: argparse.Namespace) -> None:
         files = export_session(record, folder, settings, progress)
     for file in files:
         console.print(str(file))
+
+
+@command(
+    arg("session", type=Path, help="session folder"),
+    arg(
+        "--alignment",
+        type=number(int, 1, 1000),
+        metavar="N",
+        help="the alignment to begin with (default: the last)",
+    ),
+    arg(
+        "--picture",
+        type=Path,
+        metavar="FILE",
+        help="write a .png file instead of opening a window; needs no display",
+    ),
+)
+def inspect(arguments: argparse.Namespace) -> None:
+    """Show a session's clouds, residuals, eyes and displays in a 3D window."""
+    from handcal.export.outcome import load_outcome
+    from handcal.export.window_3d import KEYS, inspect_session
+    from handcal.session.session import Session
+
+    outcome = load_outcome(Session.open(arguments.session))
+    if arguments.picture is None:
+        console.print(f"Keys: {KEYS}")
+    inspect_session(outcome, arguments.alignment, arguments.picture)
