@@ -34,6 +34,8 @@ _SIZE_PX = 1200, 800
 _POLL_S = 0.1
 _NO_WINDOW = 3
 """Exit status of the process if OpenGL opens no window."""
+_NO_CACHE = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
+"""Keeps Mesa and NVIDIA's driver from writing compiled shaders into the user's folder."""
 _LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
 _COLORS: Mapping[Eye, tuple[float, float, float]] = {
     "left": (0.0, 0.45, 0.70),
@@ -113,6 +115,7 @@ def _run(order: _Order, progress: Progress) -> None:
             stdin=orders,
             stdout=messages,
             stderr=messages,
+            env=os.environ | _NO_CACHE,
         )
         try:
             while True:
