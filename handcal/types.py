@@ -29,8 +29,9 @@ EYES: tuple[Eye, Eye] = ("left", "right")
 EyePlan: TypeAlias = Literal["both", "each", "left", "right"]
 RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
-Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]
-METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
+Method: TypeAlias = Literal["paper", "linear", "consistent", "icp", "icp-open3d"]
+METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open3d")
+"""The last needs the extra ``3d``; studies leave it out unless it is requested."""
 VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
 
 _FEW = 6  # items that `brief` shows
