@@ -112,7 +112,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
         ) from error
     try:
         with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
-            cloud = open3d.t.io.read_point_cloud(str(path))
+            cloud = open3d.t.io.read_point_cloud(path)
     except RuntimeError as error:
         raise FileError(f"{path} is damaged, or not a cloud of its format") from error
     if "positions" not in cloud.point or not len(cloud.point.positions):

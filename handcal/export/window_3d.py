@@ -101,7 +101,7 @@ def _has_display() -> bool:
     """Return whether a window would be seen: without a display, Open3D draws one in memory."""
     if not sys.platform.startswith("linux") or os.environ.get("WAYLAND_DISPLAY"):
         return True
-    display = os.environ.get("DISPLAY")
+    display = os.environ.get("DISPLAY", "")
     return bool(display) and x_server_answers(display)
 
 

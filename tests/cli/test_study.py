@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -118,3 +119,15 @@ def test_wrong_arguments(
 ) -> None:
     assert fails(study, *arguments) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.process
+def test_a_cluster_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    words = "study", "noise", "--quick", "--scheduler", "nowhere", "--output", str(tmp_path)
+    run = subprocess.run(
+        [sys.executable, "-m", "handcal", *words], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    assert run.stderr.startswith("handcal: no Dask scheduler answers at 'nowhere'")
+    assert run.stderr.count("\n") == 1
