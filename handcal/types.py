@@ -296,7 +296,8 @@ class EyeShift:
     converged: bool
     stop_reason: str
     history_m2: Float64
-    """(iterations,); mean squared pair distance at each iteration."""
+    """(iterations,); mean squared pair distance at each iteration. ``consistent`` measures it first
+    along normals and outlines, while it registers, and last, while it fits φ, in full."""
     method: str
     """One of `METHODS`, or ``"fused"``."""
 
