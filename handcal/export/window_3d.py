@@ -23,7 +23,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.export.outcome import SessionOutcome
 from handcal.export.scene_3d import Scene3d, make_scenes
 from handcal.geometry import rigid
-from handcal.io.files import require_suffix
+from handcal.io.files import make_folder, read_limited, require_suffix, write_atomic
 from handcal.io.x_display import x_server_answers
 from handcal.progress import Progress
 from handcal.register.verdict import VerdictSettings
@@ -31,6 +31,7 @@ from handcal.types import Eye, Float64
 
 KEYS = "N, P: next, previous alignment; E: other eye; V: view from the eye; O: oblique view"
 _SIZE_PX = 1200, 800
+_MAX_PICTURE_BYTES = 2**24
 _POLL_S = 0.1
 _NO_WINDOW = 3
 """Exit status of the process if OpenGL opens no window."""
@@ -42,7 +43,7 @@ _COLORS: Mapping[Eye, tuple[float, float, float]] = {
     "right": (0.84, 0.37, 0.0),
 }
 _CURSOR, _OFFLINE, _TEXT, _OUTLIER = (0.45,) * 3, (0.6,) * 3, (0.1,) * 3, (0.9, 0.1, 0.1)
-_EYE_RADIUS_M, _OFFLINE_RADIUS_M = 0.012, 0.004
+_EYE_RADIUS_M, _OFFLINE_RADIUS_M = 0.006, 0.004
 _CURSOR_POINTS = 800
 _LETTER_M, _LETTER_HEIGHT = 0.018, 14.0
 """Height of a letter in the scene, and in Open3D's units of text."""
@@ -90,11 +91,17 @@ def inspect_session(
         raise FileError(f"{outcome.record.path} has no alignment {number}; it has {known}")
     if find_spec("open3d") is None:
         raise HandcalError("Open3D is not installed: pip install 'handcal[3d]'")
-    if picture is not None:
-        require_suffix(picture, ".png")
-    elif not _has_display():
-        raise HandcalError("no display found for the 3D window; --picture FILE needs none")
-    _run(_Order(outcome.name, scenes, number, picture), progress)
+    if picture is None:
+        if not _has_display():
+            raise HandcalError("no display found for the 3D window; --picture FILE needs none")
+        _run(_Order(outcome.name, scenes, number, None), progress)
+        return
+    require_suffix(picture, ".png")
+    make_folder(picture.parent)
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = Path(folder) / "view.png"
+        _run(_Order(outcome.name, scenes, number, drawn), progress)
+        write_atomic(picture, read_limited(drawn, _MAX_PICTURE_BYTES))
 
 
 def _has_display() -> bool:

@@ -51,6 +51,8 @@ def test_a_picture_shows_hand_cursor_and_both_eyes(outcome: SessionOutcome, tmp_
     path = tmp_path / "view.png"
     try:
         inspect_session(outcome, 1, path)
+        with pytest.raises(FileError, match="cannot create the folder"):
+            inspect_session(outcome, 1, path / "inside.png")
     except HandcalError as error:
         if "OpenGL" not in str(error):
             raise
