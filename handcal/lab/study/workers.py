@@ -58,7 +58,7 @@ def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executo
 def _cluster(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client, KilledWorker
-        from distributed.comm import connect
+        from distributed.comm.core import connect
     except ImportError as error:
         raise HandcalError(
             "studies on a cluster need Dask: install it with pip install handcal[cluster]"
