@@ -114,10 +114,8 @@ def export(arguments: argparse.Namespace) -> None:
 def inspect(arguments: argparse.Namespace) -> None:
     """Show a session's clouds, residuals, eyes and displays in a 3D window."""
     from handcal.export.outcome import load_outcome
-    from handcal.export.window_3d import KEYS, inspect_session
+    from handcal.export.window_3d import inspect_session
     from handcal.session.session import Session
 
     outcome = load_outcome(Session.open(arguments.session))
-    if arguments.picture is None:
-        console.print(f"Keys: {KEYS}")
     inspect_session(outcome, arguments.alignment, arguments.picture)

@@ -29,7 +29,7 @@ from handcal.progress import Progress
 from handcal.register.verdict import VerdictSettings
 from handcal.types import Eye, Float64
 
-KEYS = "N, P: next, previous alignment; E: other eye; V: view from the eye; O: oblique view"
+_KEYS = "N, P: next, previous alignment; E: other eye; V: view from the eye; O: oblique view"
 _SIZE_PX = 1200, 800
 _MAX_PICTURE_BYTES = 2**24
 _POLL_S = 0.1
@@ -173,7 +173,7 @@ class _Window:
     def show(self) -> int:
         """Show the window until it is closed, or write its picture; return the exit status."""
         window, is_seen = self._window, self._picture is None
-        title = f"handcal: {self._name} ({KEYS})"
+        title = f"handcal: {self._name} ({_KEYS})"
         if not window.create_window(title, *_SIZE_PX, visible=is_seen):
             return _NO_WINDOW
         options = window.get_render_option()

@@ -131,3 +131,24 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     assert run.returncode == 1
     assert run.stderr.startswith("handcal: no Dask scheduler answers at 'nowhere'")
     assert run.stderr.count("\n") == 1
+
+
+def test_open3d_solves_too_where_it_is_requested(
+    study: Callable[..., None], tmp_path: Path
+) -> None:
+    pytest.importorskip("open3d")
+    study("--open3d")
+    rows = (tmp_path / "study/rows.csv").read_text()
+    assert rows.count(",icp-open3d,") == rows.count(",icp,") > 0
+
+
+def test_open3d_that_is_missing_is_one_line(
+    study: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    assert fails(study, "--open3d") == 1
+    error = capsys.readouterr().err
+    assert "pip install 'handcal[3d]'" in error
+    assert error.count("\n") == 1
