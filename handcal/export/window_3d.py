@@ -142,9 +142,13 @@ def _run(order: _Order, progress: Progress) -> None:
             "Open3D opened no window: it needs OpenGL 3.3 and a display; "
             "update the graphics driver, or on Debian install libgl1-mesa-dri"
         )
-    if status:
+    if status == 1:
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-        raise HandcalError(f"the 3D window ended with status {status}. {last}".strip())
+        raise HandcalError(f"the 3D window failed: {last}")
+    if status:
+        raise HandcalError(
+            f"the 3D window crashed (status {status}), perhaps in the graphics driver; update it"
+        )
 
 
 def main() -> int:
