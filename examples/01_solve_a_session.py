@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import handcal
+from handcal.cli.terminal import errors_in_one_line
 from handcal.types import METHODS
 
 EXAMPLE = Path(__file__).parents[1] / "resources/example_session"
@@ -44,4 +45,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

@@ -16,6 +16,7 @@ from pathlib import Path
 import handcal
 from handcal.camera.images import write_frame
 from handcal.cli.segmentation_file import write_segmentation
+from handcal.cli.terminal import errors_in_one_line
 from handcal.sim.camera import simulated_frame
 
 
@@ -47,4 +48,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

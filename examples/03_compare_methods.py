@@ -15,8 +15,11 @@ from pathlib import Path
 import numpy as np
 
 import handcal
-from handcal.types import EYES, METHODS
+from handcal.cli.terminal import errors_in_one_line
+from handcal.types import EYES, Method
 
+# icp-open3d would be a fifth, if Open3D is installed.
+METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
 EXAMPLE = Path(__file__).parents[1] / "resources/example_session"
 
 
@@ -48,4 +51,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

@@ -9,6 +9,7 @@ import argparse
 
 import numpy as np
 
+from handcal.cli.terminal import errors_in_one_line
 from handcal.display import reprojection_arcmin
 from handcal.lab.study.wearers import align_hand, draw_wearer
 from handcal.register.results import SolveSettings, solve_session
@@ -60,4 +61,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

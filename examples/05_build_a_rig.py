@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import handcal
+from handcal.cli.terminal import errors_in_one_line
 from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.camera import calibrate_camera
 from handcal.rig.compare import compare_rigs
@@ -69,4 +70,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

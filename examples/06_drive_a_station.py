@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import handcal
+from handcal.cli.terminal import errors_in_one_line
 from handcal.station.procedure import Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
@@ -62,4 +63,5 @@ def step_until(station: Station, is_done: Callable[[Observation], bool], awaited
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

@@ -11,6 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import handcal
+from handcal.cli.terminal import errors_in_one_line
 from handcal.export.figures import draw_convergence, draw_ellipses
 
 EXAMPLE = Path(__file__).parents[1] / "resources/example_session"
@@ -41,4 +42,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

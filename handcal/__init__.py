@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from handcal.conventions import to_opengl, to_openxr, to_unity
     from handcal.display import projections, update_matrix
     from handcal.errors import HandcalError, HandError
+    from handcal.export.clouds import read_cloud
     from handcal.hand.shipped import segment
     from handcal.register.guard import rotation_between
     from handcal.register.results import Results
@@ -40,6 +41,7 @@ __all__ = [
     "__version__",
     "open_session",
     "projections",
+    "read_cloud",
     "read_frame",
     "read_rig",
     "rotation_between",
@@ -58,6 +60,7 @@ _HOMES = {
     "conventions": ("to_opengl", "to_openxr", "to_unity"),
     "display": ("projections", "update_matrix"),
     "errors": ("HandError", "HandcalError"),
+    "export.clouds": ("read_cloud",),
     "hand.shipped": ("segment",),
     "register.guard": ("rotation_between",),
     "register.results": ("Results",),

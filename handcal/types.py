@@ -29,8 +29,9 @@ EYES: tuple[Eye, Eye] = ("left", "right")
 EyePlan: TypeAlias = Literal["both", "each", "left", "right"]
 RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
-Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]
-METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
+Method: TypeAlias = Literal["paper", "linear", "consistent", "icp", "icp-open3d"]
+METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open3d")
+"""The last needs the extra ``3d``; studies leave it out unless it is requested."""
 VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
 
 _FEW = 6  # items that `brief` shows
@@ -295,7 +296,8 @@ class EyeShift:
     converged: bool
     stop_reason: str
     history_m2: Float64
-    """(iterations,); mean squared pair distance at each iteration."""
+    """(iterations,); mean squared pair distance at each iteration. ``consistent`` measures it first
+    along normals and outlines, while it registers, and last, while it fits φ, in full."""
     method: str
     """One of `METHODS`, or ``"fused"``."""
 

@@ -6,7 +6,6 @@ Heavy imports follow while that window is shown; the main window then replaces i
 from __future__ import annotations
 
 import argparse
-import ctypes
 import os
 import re
 import sys
@@ -17,6 +16,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
 from handcal.io.configuration import keep_font_list_in_configuration
+from handcal.io.x_display import x_server_answers
 from handcal_gui import FIRST_SIZE_PX
 
 
@@ -125,25 +125,12 @@ def _require_display() -> None:
     display = os.environ.get("DISPLAY")
     if not display:
         _fail("no display found; `handcal demo` runs the same calibration without one", 1)
-    if not _answers(display):
+    if not x_server_answers(display):
         _fail(
             f"cannot connect to the X server at DISPLAY={display}; start it, or set DISPLAY to "
             "a server that accepts connections from you, or use `handcal demo`, which needs none",
             1,
         )
-
-
-def _answers(display: str) -> bool:
-    """Return whether an X server accepts a connection by this user, made as Qt will make it."""
-    try:
-        xcb = ctypes.CDLL("libxcb.so.1")
-    except OSError:
-        return True  # Qt names the library that is missing
-    xcb.xcb_connect.restype = ctypes.c_void_p
-    connection = ctypes.c_void_p(xcb.xcb_connect(display.encode(), None))
-    has_error = bool(xcb.xcb_connection_has_error(connection))
-    xcb.xcb_disconnect(connection)
-    return not has_error
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -19,6 +19,7 @@ from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX
 from handcal_gui.control.compare import Comparison
+from handcal_gui.control.inspection import Inspection
 from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
 from handcal_gui.dialogs.export import ExportDialog
@@ -62,6 +63,7 @@ class Program(QObject):
     wizard_panel : WizardPanel
     live : CalibrationController
     review : ReviewController
+    inspection : Inspection
     start : StartPage
     """
 
@@ -95,6 +97,7 @@ class Program(QObject):
         comparison = Comparison(panels.results)
         self.live = CalibrationController(self.window, self.wizard_panel, comparison)
         self.review = ReviewController(self.window, review_page, comparison)
+        self.inspection = Inspection(self.window)
         self._connect(review_page)
         self._make_menus()
         self._restore()
@@ -156,6 +159,15 @@ class Program(QObject):
         dialog.open()
         return dialog
 
+    def inspect(self) -> None:
+        """Show the alignments of the session shown in a 3D window."""
+        record = self._record()
+        if record is None or not record.alignments:
+            self.window.banner.show_message("There is no alignment to inspect yet.")
+            return
+        self.window.banner.show_message("The 3D window opens in a few seconds.")
+        self.inspection.start(record)
+
     def calibrate_rig(self) -> RigWizard | None:
         """Open the wizard of the offline calibration; return None if its folder cannot be used."""
         try:
@@ -204,6 +216,7 @@ class Program(QObject):
             wizard.accept()
         for evaluation in self.window.findChildren(EvaluationWindow):
             evaluation.stop()
+        self.inspection.close()
         self.live.stop()
         self.review.close()
         self.start.stop()
@@ -232,6 +245,8 @@ class Program(QObject):
         )
         panels = self.window.panels
         panels.session.export_requested.connect(lambda: self.export())
+        panels.session.inspect_requested.connect(self.inspect)
+        self.inspection.failed.connect(self.window.banner.show_message)
         panels.link.new_key_requested.connect(self._renew_key)
         self.window.closing.connect(self.close)
 
@@ -240,6 +255,7 @@ class Program(QObject):
         add("File", "&Next wearer", "Ctrl+N", self.show_start)
         add("File", "&Open session…", "Ctrl+O", self._browse)
         add("File", "&Export…", "Ctrl+E", self.export)
+        add("File", "&Inspect in 3D", "", self.inspect)
         add("File", "&Calibrate a rig…", "", self.calibrate_rig)
         add("File", "E&valuate…", "", self.evaluate)
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)

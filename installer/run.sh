@@ -2,6 +2,7 @@
 # Installs what is missing and calibrates a simulated headset, with no hardware: in a window that
 # operates itself, or without one where there is no display.
 set -euo pipefail
+lock=installer/requirements-run.lock
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 export OMP_NUM_THREADS=1 # two threads on two busy cores are slower than one

@@ -1,4 +1,4 @@
-# Brings .venv up to date with installer/requirements.lock; sourced by run.sh and test.sh.
+# Brings .venv up to date with $lock; sourced by run.sh and test.sh.
 # shellcheck shell=bash
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -56,21 +56,22 @@ sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; then
 }
 
 install_python_packages() {
-    local stamp=.venv/handcal.stamp wanted python
-    wanted=$(cat installer/requirements.lock pyproject.toml | sha256sum)
+    local stamp=.venv/handcal.stamp state python
+    state=$(cat installer/*.lock pyproject.toml | sha256sum)
     # A virtual environment names its folder and does not survive a move.
     if ! .venv/bin/python -c '' 2>/dev/null || ! grep -q " $root/.venv$" .venv/pyvenv.cfg; then
         python=$(find_python)
         "$python" -m venv --clear .venv
-    elif [[ -f $stamp && $(<"$stamp") == "$wanted" ]]; then
+    # The development lock holds all of the other.
+    elif grep -qxF -e "$state $lock" -e "$state installer/requirements.lock" "$stamp" 2>/dev/null; then
         return
     fi
-    echo "Installing Python packages into .venv (about 400 MB the first time)"
+    echo "Installing Python packages into .venv (a few hundred MB the first time)"
     local pip=(.venv/bin/python -m pip --disable-pip-version-check --quiet)
-    "${pip[@]}" install --require-hashes -r installer/requirements.lock ||
+    "${pip[@]}" install --require-hashes -r "$lock" ||
         fail "the packages could not be installed; is this computer online?"
     "${pip[@]}" install --no-deps --no-build-isolation -e . || fail "handcal itself could not be installed"
-    echo "$wanted" >"$stamp"
+    echo "$state $lock" >"$stamp"
 }
 
 install_system_packages

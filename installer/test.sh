@@ -2,6 +2,7 @@
 # Installs what is missing, then runs every check and all tests but those marked slow or campaign.
 # Arguments go to pytest: -m quick for a check within two minutes, -m "" for every test.
 set -euo pipefail
+lock=installer/requirements.lock # everything, also what the checks and the extras need
 test_packages=(xvfb xauth xdotool poppler-utils) # real windows on a virtual screen, and PDF pages
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 

@@ -39,7 +39,8 @@ rig = handcal.read_rig("resources/example_rig.yaml")
 U = handcal.to_unity(rig, results)
 """
 PUBLIC = {
-    "open_session", "solve", "projections", "read_frame", "segment", "read_rig", "write_rig",
+    "open_session", "solve", "projections", "read_cloud", "read_frame", "segment", "read_rig",
+    "write_rig",
     "HandcalError", "HandError", "Frame", "HandCloud", "Alignment", "EyeShift", "Rig", "Results",
     "to_unity", "to_opengl", "to_openxr", "__version__",
     "solve_eye_shift", "update_matrix", "rotation_between",

@@ -10,11 +10,13 @@ import pytest
 
 from tests.helpers import ROOT
 
-ROWS = [
-    [cell.strip() for cell in line.strip("|").split("|")]
-    for line in (ROOT / "THIRD-PARTY.md").read_text().splitlines()
-    if line.startswith("|")
-][2:]
+
+def read_table(text: str) -> list[list[str]]:
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+DIRECT, IN_TURN = map(read_table, (ROOT / "THIRD-PARTY.md").read_text().split("\n## "))
 
 
 def test_every_dependency_is_listed_with_its_versions() -> None:
@@ -24,10 +26,27 @@ def test_every_dependency_is_listed_with_its_versions() -> None:
         match = re.match(r"([\w.-]+)\s*([^;]*)", requirement)
         assert match is not None
         wanted.append([match[1], match[2].strip()])
-    assert [row[:2] for row in ROWS] == wanted
+    assert [row[:2] for row in DIRECT] == wanted
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
+def test_what_these_need_in_turn_is_listed_as_in_the_lock() -> None:
+    lock = (ROOT / "installer/requirements-run.lock").read_text()
+    versions: dict[str, list[str]] = {}
+    needed_by: dict[str, str] = {}
+    for block in re.split(r"^(?=\S)", lock, flags=re.MULTILINE):
+        if match := re.match(r"([\w.-]+)==(\S+)", block):
+            versions.setdefault(match[1], []).append(match[2])
+            users = re.findall(r"^    #(?: via|  ) +(\S.*)$", block, re.MULTILINE)
+            needed_by[match[1]] = ", ".join(users)
+    direct = {row[0].lower() for row in DIRECT}
+    assert [[row[0], row[1], row[3]] for row in IN_TURN] == [
+        [name, ", ".join(found), re.sub(r"handcal \(.*?\)", "the set-up", needed_by[name])]
+        for name, found in versions.items()
+        if name not in direct
+    ]
+
+
+@pytest.mark.parametrize("row", DIRECT + IN_TURN, ids=lambda row: row[0])
 def test_the_licence_is_that_of_the_metadata(row: list[str]) -> None:
     try:
         metadata = importlib.metadata.metadata(row[0])

@@ -127,6 +127,9 @@ COMMANDS: Mapping[str, Entry] = {
         "sessions",
     ),
     "session": Entry("Check and repair stored sessions.", _SESSION),
+    "inspect": Entry(
+        "Show a session's clouds, residuals, eyes and displays in a 3D window.", "sessions"
+    ),
     "rig": Entry("Calibrate the rig offline: boards, cameras, displays, and the rig file.", _RIG),
     "evaluate": Entry("Evaluate handcal on given images and sessions.", _EVALUATE),
     "study": Entry("Run a study on simulated wearers, in many processes, with a report.", _STUDY),

@@ -1,4 +1,4 @@
-"""``handcal solve, export, session``: stored sessions."""
+"""``handcal solve, export, inspect, session``: stored sessions."""
 
 from __future__ import annotations
 
@@ -137,3 +137,28 @@ def _say_what_is_left_out(record: SessionRecord) -> None:
         console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
     if record.left_out:
         console.print(f"Left out: {record.left_out}.", markup=False)
+
+
+@command(
+    arg("session", type=Path, help="session folder"),
+    arg(
+        "--alignment",
+        type=number(int, 1, 1000),
+        metavar="N",
+        help="the alignment to begin with (default: the last)",
+    ),
+    arg(
+        "--picture",
+        type=Path,
+        metavar="FILE",
+        help="write a .png file instead of opening a window; needs no display",
+    ),
+)
+def inspect(arguments: argparse.Namespace) -> None:
+    """Show a session's clouds, residuals, eyes and displays in a 3D window."""
+    from handcal.export.outcome import load_outcome
+    from handcal.export.window_3d import inspect_session
+    from handcal.session.session import Session
+
+    outcome = load_outcome(Session.open(arguments.session))
+    inspect_session(outcome, arguments.alignment, arguments.picture)

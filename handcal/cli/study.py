@@ -49,7 +49,13 @@ def _study_options(name: str) -> tuple[Option, ...]:
     )
 
 
-@command(*_study_options("noise"), json=True)
+@command(
+    arg(
+        "--open3d", action="store_true", help="solve by Open3D's ICP too (pip install handcal[3d])"
+    ),
+    *_study_options("noise"),
+    json=True,
+)
 def noise(arguments: argparse.Namespace) -> None:
     """Repeat the paper's simulation, and add disturbances that it left out."""
     from handcal.lab.settings import NoiseStudySettings
@@ -61,6 +67,7 @@ def noise(arguments: argparse.Namespace) -> None:
         processes=arguments.workers or 0,
         scheduler=arguments.scheduler or "",
         output=str(arguments.output),
+        open3d=arguments.open3d,
     )
     _run(arguments, partial(run_noise_study, settings))
 

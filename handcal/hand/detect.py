@@ -101,7 +101,7 @@ class HandDetector:
         self.model = model
         self._settings = settings or DetectSettings()
         try:
-            onnxruntime = _without_telemetry()
+            onnxruntime = import_onnxruntime()
             options = onnxruntime.SessionOptions()
             options.intra_op_num_threads = 1
             options.log_severity_level = 3
@@ -147,8 +147,12 @@ class HandDetector:
         return Detections(boxes / scale, scores)
 
 
-def _without_telemetry() -> Any:
-    """Return onnxruntime, which then keeps no device id in the user's folder and sends nothing."""
+def import_onnxruntime() -> Any:
+    """Return onnxruntime, imported with its telemetry off.
+
+    It then keeps no device id in the user's folder and sends nothing. Call it before anything else
+    imports onnxruntime.
+    """
     # Both are read when the library is loaded; the second is the first's former name.
     for variable in ("ORT_DISABLE_TELEMETRY", "ORT_TELEMETRY_DISABLED"):
         os.environ[variable] = "1"

@@ -29,6 +29,8 @@ class NoiseStudySettings:
     """Address of a Dask scheduler that does the work instead, ``tcp://HOST:PORT``."""
     output: str = "results/study-noise"
     """Folder for this study only; an unfinished study in it is resumed."""
+    open3d: bool = False
+    """Solve by Open3D's ICP, too."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial import cKDTree
 
+from handcal.errors import HandcalError
 from handcal.geometry import rigid, transform
 from handcal.register.model import fit_shift, predict
 from handcal.register.surface import nearest
@@ -26,6 +27,7 @@ PAPER_RATIO = 0.9999
 _EXACT_M2 = 1e-18
 # The three-row form and ICP stop when no pair changes any more.
 TOLERANCE_M = 1e-7
+_ANY_DISTANCE_M = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +128,50 @@ def solve_icp(
             return _ended(-T[:3, 3], moved, partner, history, "step below 0.1 µm")
         if len(history) == MAX_ITERATIONS:
             return _ended(-T[:3, 3], moved, partner, history, None)
+
+
+def solve_icp_open3d(
+    cursor_m: Float64, hand_m: Float64, checkpoint: Checkpoint = lambda: None
+) -> Iterated:
+    """Solve as `solve_icp`, with Open3D's point-to-point registration.
+
+    Start and stop rule are the same, and no pair is too far apart, so that only the implementation
+    differs. Parameters as in `solve_paper`.
+
+    Raises
+    ------
+    HandcalError
+        If Open3D is not installed.
+    """
+    try:
+        import open3d
+    except ImportError as error:
+        raise HandcalError(
+            "the method icp-open3d needs Open3D: pip install 'handcal[3d]'; icp needs nothing"
+        ) from error
+    registration = open3d.pipelines.registration
+    cursor, hand = (
+        open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.array(cloud_m)))
+        for cloud_m in (cursor_m, hand_m)
+    )
+    estimation = registration.TransformationEstimationPointToPoint()
+    once = registration.ICPConvergenceCriteria(max_iteration=1)
+    T = rigid(translation_m=cursor_m.mean(axis=0) - hand_m.mean(axis=0))
+    moved = transform(T, hand_m)
+    history: list[float] = []
+    while True:
+        checkpoint()
+        found = registration.registration_icp(hand, cursor, _ANY_DISTANCE_M, T, estimation, once)
+        T, before = np.array(found.transformation), moved
+        moved = transform(T, hand_m)
+        history.append(found.inlier_rmse**2)
+        is_still = np.abs(moved - before).max() < TOLERANCE_M
+        if is_still or len(history) == MAX_ITERATIONS:
+            partner = np.empty_like(hand_m)
+            pairs = np.asarray(found.correspondence_set)
+            partner[pairs[:, 0]] = cursor_m[pairs[:, 1]]
+            reason = "step below 0.1 µm" if is_still else None
+            return _ended(-T[:3, 3], moved, partner, history, reason)
 
 
 def best_rigid(source_m: Float64, target_m: Float64) -> Float64:

@@ -11,7 +11,13 @@ from handcal.geometry import is_rigid, transform
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.fuse import with_eye_box
 from handcal.register.model import cursor_displacement, design
-from handcal.register.rcicp import Checkpoint, solve_icp, solve_linear, solve_paper
+from handcal.register.rcicp import (
+    Checkpoint,
+    solve_icp,
+    solve_icp_open3d,
+    solve_linear,
+    solve_paper,
+)
 from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
 
 MIN_POINTS = 100
@@ -40,11 +46,12 @@ def solve_eye_shift(
         z(C0→S), from C0 to the display's focal plane.
     T_E_W : (4, 4) array_like, optional
         World to E at t_b.
-    method : {"consistent", "paper", "linear", "icp"}
+    method : {"consistent", "paper", "linear", "icp", "icp-open3d"}
         ``paper``: Hu et al. 2021 as published. ``linear``: its model, all three rows of each
         pair. ``consistent``: exact factor, robust to cuts, sampling and a rotated hand.
-        ``icp``: rigid, the paper's baseline. ``consistent`` also has the eye box as a wide
-        prior, which matters only for weak alignments, as with a strongly rotated hand.
+        ``icp``: rigid, the paper's baseline. ``icp-open3d``: the same by Open3D. ``consistent``
+        also has the eye box as a wide prior, which matters only for weak alignments, as with a
+        strongly rotated hand.
     cursor_cut, hand_cut : (N,), (M,) array_like of bool, optional
         Points beside a cut edge, where the hand or arm continues beyond the cloud. Used only by
         ``consistent``.
@@ -60,6 +67,8 @@ def solve_eye_shift(
         one line, or a distance that is not positive.
     HandError
         If nearly all points lie beside cut edges.
+    HandcalError
+        If ``icp-open3d`` is chosen and Open3D is not installed.
 
     Examples
     --------
@@ -176,8 +185,9 @@ def _solve_baseline(
     The covariance is that of least squares with independent pairs, which is optimistic for every
     ICP (Censi 2007); only ``consistent`` does better.
     """
-    if method == "icp":
-        ended = solve_icp(cursor_m, hand_m, checkpoint)
+    if method in ("icp", "icp-open3d"):
+        register = solve_icp if method == "icp" else solve_icp_open3d
+        ended = register(cursor_m, hand_m, checkpoint)
     else:
         solver = solve_paper if method == "paper" else solve_linear
         ended = solver(cursor_m, hand_m, distance_m, checkpoint)

@@ -20,7 +20,7 @@ def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
     ----------
     session : SessionRecord
         From `handcal.open_session`; it stays as it is.
-    method : {"consistent", "paper", "linear", "icp"}, optional
+    method : {"consistent", "paper", "linear", "icp", "icp-open3d"}, optional
         Solver of each alignment, the session's own if not given. ``paper``: Hu et al. 2021 as
         published. ``linear``: its model with all three rows of each pair. ``consistent``: exact
         factor, and robust to cuts, sampling and a turned hand. ``icp``: rigid, the paper's

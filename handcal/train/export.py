@@ -14,21 +14,23 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
-from onnxruntime.quantization import (
+from torch import Tensor, nn
+
+from handcal.cli.terminal import Parser, errors_in_one_line
+from handcal.hand.detect import DetectSettings, import_onnxruntime, letterbox
+from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
+from handcal.lab.evaluate.annotations import Photo, read_annotations
+from handcal.train.loop import read_average
+from handcal.train.model import HandNet
+
+import_onnxruntime()
+from onnxruntime.quantization import (  # noqa: E402 (after its telemetry is off)
     CalibrationDataReader,
     QuantFormat,
     QuantType,
     quantize_static,
 )
-from onnxruntime.quantization.shape_inference import quant_pre_process
-from torch import Tensor, nn
-
-from handcal.cli.terminal import Parser, errors_in_one_line
-from handcal.hand.detect import DetectSettings, letterbox
-from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
-from handcal.lab.evaluate.annotations import Photo, read_annotations
-from handcal.train.loop import read_average
-from handcal.train.model import HandNet
+from onnxruntime.quantization.shape_inference import quant_pre_process  # noqa: E402
 
 _OPSET = 17
 _CALIBRATED = 200

@@ -19,13 +19,14 @@ _METHODS: dict[Method, str] = {
     "linear": "Linear",
     "paper": "As in the paper",
     "icp": "Rigid ICP",
+    "icp-open3d": "Rigid ICP by Open3D",
 }
 _METHOD_HELP = (
     "Solver of the eye shift φ from an alignment.\n"
     "Consistent: exact model; robust to cut edges and a rotated hand.\n"
     "Linear: assumes a scale of 1, which underestimates φ3.\n"
     "As in the paper: Hu et al. 2021; slow.\n"
-    "Rigid ICP: the paper's baseline."
+    "Rigid ICP: the paper's baseline; by Open3D the same, if it is installed."
 )
 _ROIS: dict[Roi, str] = {
     "detector": "Colour and depth",

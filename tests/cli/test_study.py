@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -118,3 +119,36 @@ def test_wrong_arguments(
 ) -> None:
     assert fails(study, *arguments) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.process
+def test_a_cluster_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    words = "study", "noise", "--quick", "--scheduler", "nowhere", "--output", str(tmp_path)
+    run = subprocess.run(
+        [sys.executable, "-m", "handcal", *words], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    assert run.stderr.startswith("handcal: no Dask scheduler answers at 'nowhere'")
+    assert run.stderr.count("\n") == 1
+
+
+def test_open3d_solves_too_where_it_is_requested(
+    study: Callable[..., None], tmp_path: Path
+) -> None:
+    pytest.importorskip("open3d")
+    study("--open3d")
+    rows = (tmp_path / "study/rows.csv").read_text()
+    assert rows.count(",icp-open3d,") == rows.count(",icp,") > 0
+
+
+def test_open3d_that_is_missing_is_one_line(
+    study: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    assert fails(study, "--open3d") == 1
+    error = capsys.readouterr().err
+    assert "pip install 'handcal[3d]'" in error
+    assert error.count("\n") == 1

@@ -105,11 +105,25 @@ def test_a_figure_is_plotted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["01_solve_a_session.py", "03_compare_methods.py", "07_plot_a_report_figure.py"]
+    ("name", "words", "message"),
+    [
+        ("01_solve_a_session.py", ("--session", "MISSING"), "is not a session; choose the folder"),
+        ("02_segment_a_frame.py", ("--frame", *3 * ["MISSING"]), "cannot read"),
+        ("03_compare_methods.py", ("--session", "MISSING"), "is not a session; choose the folder"),
+        ("05_build_a_rig.py", ("--output", "FILE"), "cannot create the folder"),
+        ("06_drive_a_station.py", ("--output", "FILE"), "cannot create the folder"),
+        ("07_plot_a_report_figure.py", ("--session", "MISSING"), "is not a session; choose the"),
+        ("07_plot_a_report_figure.py", ("--output", "FILE/figure.png"), "cannot write"),
+    ],
 )
-def test_a_session_that_is_missing_is_named(name: str, tmp_path: Path) -> None:
-    error = run(name, "--session", tmp_path / "missing", code=1)
-    assert "missing is not a session; choose the folder that contains journal.jsonl" in error
+def test_a_wrong_path_is_one_line(
+    name: str, words: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    (tmp_path / "FILE").write_text("no folder")
+    places = [str(tmp_path / word) if word[:2] != "--" else word for word in words]
+    error = run(name, *places, code=1)
+    assert message in error
+    assert error.count("\n") == 1
 
 
 def test_every_example_is_run_and_has_a_docstring_and_a_main() -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from handcal.export.clouds import write_clouds
+from handcal.errors import FileError, HandcalError
+from handcal.export.clouds import read_cloud, write_clouds
 from handcal.export.outcome import SessionOutcome
 from handcal.progress import Progress
 
@@ -42,3 +45,85 @@ def test_clouds_and_residuals_come_back(tmp_path: Path, outcome: SessionOutcome)
         for eye, shift in shifts.items():
             residuals_m = hand[f"residual_{eye}_m"]
             assert np.array_equal(residuals_m, shift.residuals_m, equal_nan=True)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "pcd"])
+def test_a_cloud_written_by_open3d_comes_back(
+    suffix: str, tmp_path: Path, outcome: SessionOutcome
+) -> None:
+    open3d = pytest.importorskip("open3d")
+    write_clouds(tmp_path, outcome)
+    cloud = open3d.t.io.read_point_cloud(str(tmp_path / "alignment-1-hand.ply"))
+    path = tmp_path / f"edited.{suffix}"
+    assert open3d.t.io.write_point_cloud(str(path), cloud)
+    points_m, is_cut = read_cloud(path)
+    alignment = outcome.record.alignments[1]
+    assert np.array_equal(points_m, alignment.hand_m)
+    assert is_cut is not None
+    assert np.array_equal(is_cut, alignment.hand_is_cut)
+
+
+def test_a_text_of_numbers_is_a_cloud_without_cuts(tmp_path: Path) -> None:
+    pytest.importorskip("open3d")
+    expected_m = np.random.default_rng(0).normal(size=(50, 3))
+    np.savetxt(tmp_path / "cloud.xyz", expected_m)
+    points_m, is_cut = read_cloud(tmp_path / "cloud.xyz")
+    assert points_m == pytest.approx(expected_m, rel=1e-6)  # Open3D reads texts as float32
+    assert is_cut is None
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.ply", None, "cannot read"),
+        ("cloud.stl", b"", "must end in"),
+        ("text.ply", b"garbage", "damaged"),
+        ("text.pcd", b"x" * 100, "damaged"),
+        ("text.xyz", b"hello", "damaged"),
+        ("nan.xyz", b"1 2 nan\n3 4 5\n", "without a position"),
+        (
+            "large.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\n"
+            b"property double x\nproperty double y\nproperty double z\nend_header\n",
+            "announces more than 2,000,000 points",
+        ),
+        (
+            "large.pcd",
+            b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\n"
+            b"HEIGHT 1\nPOINTS 4000000000\nDATA binary\n",
+            "announces more than 2,000,000 points",
+        ),
+    ],
+)
+def test_what_is_no_cloud_is_refused_in_one_line(
+    name: str, content: bytes | None, message: str, tmp_path: Path
+) -> None:
+    pytest.importorskip("open3d")
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(FileError, match=message) as raised:
+        read_cloud(tmp_path / name)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "pcd"])
+@pytest.mark.parametrize("is_text", [False, True])
+def test_a_file_that_ends_early_is_refused(suffix: str, is_text: bool, tmp_path: Path) -> None:
+    open3d = pytest.importorskip("open3d")
+    points_m = np.random.default_rng(0).normal(size=(40, 3))
+    whole, short = tmp_path / f"whole.{suffix}", tmp_path / f"short.{suffix}"
+    cloud = open3d.t.geometry.PointCloud(open3d.core.Tensor(points_m))
+    assert open3d.t.io.write_point_cloud(str(whole), cloud, write_ascii=is_text)
+    assert read_cloud(whole)[0] == pytest.approx(points_m, abs=1e-5)  # texts are rounded
+    data = whole.read_bytes()
+    for share in (0.3, 0.5, 0.9):
+        short.write_bytes(data[: int(share * len(data))])
+        with pytest.raises(FileError, match="damaged"):
+            read_cloud(short)
+
+
+def test_without_open3d_reading_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    (tmp_path / "cloud.xyz").write_text("0 0 0\n")
+    with pytest.raises(HandcalError, match=r"pip install 'handcal\[3d\]'"):
+        read_cloud(tmp_path / "cloud.xyz")

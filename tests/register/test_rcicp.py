@@ -1,8 +1,11 @@
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handcal.errors import HandcalError
 from handcal.geometry import rigid, transform
 from handcal.lab.bench.trials import trial_alignment
 from handcal.register.rcicp import (
@@ -12,6 +15,7 @@ from handcal.register.rcicp import (
     best_rigid,
     best_rotation,
     solve_icp,
+    solve_icp_open3d,
     solve_linear,
     solve_paper,
 )
@@ -89,3 +93,33 @@ def test_best_rotation_never_mirrors() -> None:
     R = best_rotation(POINTS_M, POINTS_M * [1, 1, -1])
     assert np.linalg.det(R) == pytest.approx(1.0)
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("trial", range(4))
+def test_open3d_ends_where_icp_does(trial: int) -> None:
+    pytest.importorskip("open3d")
+    making = AlignmentSettings(count=500, resample=True, depth_sigma_m=0.001)
+    clouds = _clouds(trial_alignment(trial, 2.0, making))
+    ours, theirs = solve_icp(*clouds), solve_icp_open3d(*clouds)
+    np.testing.assert_allclose(theirs.shift_m, ours.shift_m, atol=1e-4)
+    assert theirs.history_m2[-1] == pytest.approx(ours.history_m2[-1], rel=1e-3)
+    assert (np.diff(theirs.history_m2) <= 1e-12).all()
+    assert theirs.converged
+    gap_m2 = np.sum((theirs.moved_m - theirs.partner_m) ** 2, axis=1)
+    assert gap_m2.mean() == pytest.approx(theirs.history_m2[-1])
+
+
+def test_open3d_recovers_a_known_motion() -> None:
+    pytest.importorskip("open3d")
+    cloud_m = np.random.default_rng(1).normal(0.0, 0.05, (300, 3)) + np.array([0.0, 0.0, 0.5])
+    T = rigid([0.02, -0.01, 0.03], [0.003, -0.002, 0.004])
+    ended = solve_icp_open3d(transform(T, cloud_m), cloud_m)
+    np.testing.assert_allclose(ended.shift_m, -T[:3, 3], atol=1e-6)
+
+
+def test_without_open3d_the_method_says_so(
+    straight: SimulatedAlignment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(HandcalError, match=r"pip install 'handcal\[3d\]'"):
+        solve_icp_open3d(*_clouds(straight))

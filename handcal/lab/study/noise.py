@@ -49,6 +49,8 @@ class NoiseSettings:
     paper_trials: int = 8
     """Number of these that are also solved by ``linear``, and by ``paper``, which is slow; not in
     the section of hand shapes."""
+    open3d: bool = False
+    """Solve all of them by ``icp-open3d`` too."""
     hands: int = 20
     """Number of people, each with several alignments; the errors of one person are correlated."""
     points: int = 1000
@@ -199,6 +201,8 @@ def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
     first = {"linear": settings.linear_trials, "paper": settings.paper_trials}
     if section.name == HANDS:
         first = dict.fromkeys(first, 0)
+    if not settings.open3d:
+        first["icp-open3d"] = 0
     methods = [method for method in METHODS if trial < first.get(method, settings.trials)]
     rng = np.random.default_rng([settings.seed, trial])
     solved = (

@@ -28,6 +28,7 @@ _COLORS = {
     "paper": "#d55e00",
     "linear": "#e69f00",
     "icp": "#7f7f7f",
+    "icp-open3d": "#56b4e9",
     FLOOR: "#009e73",
 }
 _INTERVALS = (
@@ -37,9 +38,9 @@ _INTERVALS = (
 )
 _METHODS = (
     "consistent: handcal's default. paper: rotation-constrained ICP as published. linear: its "
-    "model, all three rows of each pair. icp: rigid, point to point, the paper's baseline. known "
-    "pairs: least squares with the true pairs of noise-free points, which only a turned hand "
-    "disturbs: what any solver of φ alone is left with."
+    "model, all three rows of each pair. icp: rigid, point to point, the paper's baseline. "
+    "icp-open3d: the same by Open3D. known pairs: least squares with the true pairs of noise-free "
+    "points, which only a turned hand disturbs: what any solver of φ alone is left with."
 )
 _TEXTS: Mapping[str, str] = {
     "rotation": (
@@ -97,7 +98,7 @@ def _counts(settings: NoiseSettings, rows: Sequence[StudyRow]) -> dict[str, str]
     solved = {
         method: f"{sum(row['method'] == method for row in rows):,}"
         for method in _COLORS
-        if method != FLOOR
+        if method != FLOOR and (settings.open3d or method != "icp-open3d")
     }
     return {
         "Alignments solved": ", ".join(f"{count} by {name}" for name, count in solved.items()),
@@ -217,7 +218,7 @@ def _shown(
     settings: NoiseSettings, name: str, points: Sequence[_Point]
 ) -> tuple[Sequence[_Point], Sequence[_Point]]:
     """Return the curves of the figure's left and right axes."""
-    right = [point for point in points if point.method != "icp"]
+    right = [point for point in points if not point.method.startswith("icp")]
     if name != "rotation":
         return points, right
     left = [point for point in points if point.value in settings.coarse_deg]

@@ -58,7 +58,7 @@ def run_method_comparison(settings: MethodComparisonSettings, progress: Progress
 def noise_cases(settings: NoiseStudySettings) -> Study:
     """Return the noise study that the settings describe."""
     chosen = QUICK_NOISE if settings.size == "quick" else NoiseSettings()
-    return noise_study(replace(chosen, seed=settings.seed))
+    return noise_study(replace(chosen, seed=settings.seed, open3d=settings.open3d))
 
 
 def method_cases(settings: MethodComparisonSettings) -> Study:

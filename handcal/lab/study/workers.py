@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
 import os
 import signal
@@ -57,11 +58,18 @@ def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executo
 def _cluster(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client, KilledWorker
+        from distributed.comm.core import connect
     except ImportError as error:
         raise HandcalError(
             "studies on a cluster need Dask: install it with pip install handcal[cluster]"
         ) from error
+
+    async def reach() -> None:
+        # A client that cannot connect prints a traceback when Python ends.
+        (await connect(address, timeout=_CONNECT_S)).abort()  # type: ignore[no-untyped-call]
+
     try:
+        asyncio.run(reach())
         client = Client(  # type: ignore[no-untyped-call]
             address, timeout=_CONNECT_S, set_as_default=False
         )

@@ -27,6 +27,7 @@ _MEANINGS: Mapping[Method, str] = {
     "linear": "the paper's model, solved with all three rows of each pair.",
     "consistent": "exact model; robust to cut edges and a rotated hand; the default.",
     "icp": "rigid registration, the paper's baseline.",
+    "icp-open3d": "the same by Open3D, which must be installed.",
 }
 
 

@@ -44,13 +44,14 @@ class SessionPanel(QWidget):
         Kind and number of the alignment or trial.
     notes_changed : Signal(str)
         The complete notes, 0.8 s after the last key.
-    export_requested : Signal()
+    export_requested, inspect_requested : Signal()
     """
 
     delete_requested = Signal(str, int)
     restore_requested = Signal(str, int)
     notes_changed = Signal(str)
     export_requested = Signal()
+    inspect_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -76,6 +77,7 @@ class SessionPanel(QWidget):
         )
         self._tabs = RecordTabs()
         self._open_folder = QPushButton("Open folder")
+        self._inspect = QPushButton("Inspect in 3D")
         self._export = QPushButton("Export…")
         self._lay_out()
         self._refresh()
@@ -116,6 +118,7 @@ class SessionPanel(QWidget):
     def _refresh(self) -> None:
         record = self._record
         self._open_folder.setEnabled(record is not None)
+        self._inspect.setEnabled(record is not None and bool(record.alignments))
         self._export.setEnabled(record is not None)
         if record is None:
             self._wearer.setText("–")
@@ -137,6 +140,10 @@ class SessionPanel(QWidget):
     def _lay_out(self) -> None:
         self._open_folder.setToolTip("Show the session's folder in the file manager")
         self._open_folder.clicked.connect(self._show_folder)
+        self._inspect.setToolTip(
+            "Show clouds, residuals, eyes and displays in a 3D window of their own (needs Open3D)"
+        )
+        self._inspect.clicked.connect(self.inspect_requested)
         self._export.setToolTip("Write a report, tables and calibration files")
         self._export.clicked.connect(self.export_requested)
         form = QFormLayout()
@@ -151,6 +158,7 @@ class SessionPanel(QWidget):
         buttons.setSpacing(SPACING_PX)
         buttons.addWidget(self._strip, 1)
         buttons.addWidget(self._open_folder)
+        buttons.addWidget(self._inspect)
         buttons.addWidget(self._export)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)

@@ -100,8 +100,9 @@ def test_slow_methods_solve_the_first_trials_and_no_hand_shapes() -> None:
     settings = replace(SETTINGS, trials=3, linear_trials=2, paper_trials=1)
     case: Case = {"section": "rotation", "value": 0.0}
     by_trial = [methods_of(noise_trial(settings, {**case, "trial": n})) for n in range(3)]
-    assert by_trial[0] == {FLOOR, *METHODS}
-    assert by_trial[1] == {FLOOR, *METHODS} - {"paper"}
+    usual = {FLOOR, *METHODS} - {"icp-open3d"}
+    assert by_trial[0] == usual
+    assert by_trial[1] == usual - {"paper"}
     assert by_trial[2] == {FLOOR, "consistent", "icp"}
     shapes = noise_trial(settings, {"section": HANDS, "value": 1, "trial": 0})
     assert methods_of(shapes) == {FLOOR, "consistent", "icp"}

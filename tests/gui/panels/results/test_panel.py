@@ -162,7 +162,7 @@ def test_a_comparison_is_asked_for_and_shown(
 ) -> None:
     methods = child(solved, QComboBox, "comparison-method")
     offered = [methods.itemText(i) for i in range(methods.count())]
-    assert offered == ["paper", "linear", "icp"]
+    assert offered == ["paper", "linear", "icp", "icp-open3d"]
     methods.setCurrentText("icp")
     assert status(solved).startswith("icp: rigid")
     with qtbot.waitSignal(solved.compare_requested) as asked:

@@ -133,6 +133,8 @@ def test_a_finished_session_is_only_looked_at(
     assert text(panel, "undoText") == ""
     with qtbot.waitSignal(panel.export_requested):
         button(panel, QPushButton, "Export…").click()
+    with qtbot.waitSignal(panel.inspect_requested):
+        button(panel, QPushButton, "Inspect in 3D").click()
 
 
 def test_opens_the_folder(
