@@ -31,7 +31,7 @@ RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp"]
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")
-VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
+VerdictName: TypeAlias = Literal["accept", "repeat", "keep", "implausible", "contradicted"]
 
 _FEW = 6  # items that `brief` shows
 
