@@ -19,8 +19,8 @@ from handcal.export.figure_rows import (
 from handcal.export.figures import ResidualCells
 from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.export.tables import corner_rows, parameter_rows
-from handcal.register.results import Results
 from handcal.register.benefit import expected_error_arcmin
+from handcal.register.results import Results
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items

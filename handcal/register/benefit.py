@@ -3,8 +3,8 @@
 The error of an eye is the mean distance, in arcminutes, between the corners of the user test's
 target as they are drawn and as they should be, at its three distances. Around the offline
 calibration it is linear in φ: with the Jacobian J of the drawn corners, drawing with φ for an eye
-at φ' errs by J (φ - φ') at each corner. Its expectation over a Gaussian has no closed form, so it is
-averaged over a fixed set of samples: equal input gives equal output.
+at φ' errs by J (φ - φ') at each corner. Its expectation over a Gaussian has no closed form, so it
+is averaged over a fixed set of samples: equal input gives equal output.
 """
 
 from __future__ import annotations

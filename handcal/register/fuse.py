@@ -33,6 +33,8 @@ from handcal.types import EYES, Alignment, Bool, Eye, EyeDisplay, EyeShift, Floa
 _OUTLINE_FROM_POINTS = 1500
 # Far less than that of one point; it keeps the weights defined for a cursor outside the display.
 _NORMAL_FLOOR = 1e-3
+# Of a single solved eye: the eye box is about 2 cm wide (paper).
+_WIDE_EYE_BOX_M = 0.010
 # Of adults, with room to spare (ANSUR II: 52 to 78 mm).
 _EYE_DISTANCES_M = 0.045, 0.085
 
@@ -47,9 +49,9 @@ class FuseSettings:
     depth_sigma: float = 0.004
     """Relative standard deviation of the depth, by matching the size. These are the errors with
     which the paper's method errs as in the paper's user test."""
-    wearer_scales: tuple[float, ...] = (1.0, 2.0, 3.0)
+    wearer_scales: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0)
     """Errors of a wearer's overlay, in those of a usual wearer."""
-    wearer_weights: tuple[float, ...] = (0.8, 0.15, 0.05)
+    wearer_weights: tuple[float, ...] = (0.8, 0.14, 0.05, 0.01)
     """Probability of each of `wearer_scales`."""
 
     def __post_init__(self) -> None:
@@ -122,9 +124,9 @@ class Observation:
         return self.H, self.seen_m, self.registration_m2 + scale**2 * self.wearer_m2
 
 
-def with_eye_box(shift: EyeShift, settings: PriorSettings = PriorSettings()) -> EyeShift:
-    """Return the estimate with the eye box as prior: uncertain components shrink towards C0."""
-    prior = np.eye(3) / settings.eye_box_sigma_m**2
+def with_eye_box(shift: EyeShift) -> EyeShift:
+    """Return the estimate with a wide eye box as prior: uncertain components shrink towards C0."""
+    prior = np.eye(3) / _WIDE_EYE_BOX_M**2
     covariance_m2 = np.asarray(np.linalg.inv(np.linalg.inv(shift.covariance_m2) + prior))
     return replace(
         shift,
@@ -201,9 +203,7 @@ def _with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | No
     """Return the prior with a measured eye distance, which is nearly linear in φ."""
     if eye_distance is None:
         return prior
-    left_m, right_m = (
-        eye_position_m(rig.eyes[eye], prior.mean_m[eye_slice(eye)]) for eye in EYES
-    )
+    left_m, right_m = (eye_position_m(rig.eyes[eye], prior.mean_m[eye_slice(eye)]) for eye in EYES)
     between_m = right_m - left_m
     distance_m = float(np.linalg.norm(between_m))
     H = np.zeros((1, 6))

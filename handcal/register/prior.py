@@ -4,9 +4,9 @@
 eyes differ little. A lab's finished sessions with one rig tell more: how far its headset sits from
 the viewpoint on average, and how much wearers differ. Mean and covariance are estimated by
 expectation maximisation, as every session measures φ with an error of its own, and a single
-alignment with both eyes open measures three of the six numbers. The default prior takes part as if
-it were `_DEFAULT_WEIGHT` sessions (an inverse Wishart prior of the covariance), so that few sessions
-change little (empirical Bayes: Efron & Morris 1975; Dempster, Laird & Rubin 1977).
+alignment with both eyes open measures three of the six numbers. The default prior takes part as
+if it were `_DEFAULT_WEIGHT` sessions (an inverse Wishart prior of the covariance), so that few
+sessions change little (empirical Bayes: Efron & Morris 1975; Dempster, Laird & Rubin 1977).
 """
 
 from __future__ import annotations

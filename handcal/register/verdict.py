@@ -17,6 +17,8 @@ from handcal.register.fuse import Fused, eye_position_m, eye_slice
 from handcal.types import EYES, Eye, EyeShift, Rig, Verdict
 
 _MOST_ALIGNMENTS = 10
+# More than this are not worth it where the offline calibration is within the target.
+_FEW_ALIGNMENTS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +137,7 @@ def judge(
     }
 
 
-def _fault(
-    shift: EyeShift, apart_m: float | None, settings: VerdictSettings
-) -> Verdict | None:
+def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict | None:
     """Return the verdict on a result that is wrong in itself, else None."""
     length_m = float(np.linalg.norm(shift.shift_m))
     if length_m > settings.eye_box_m:
@@ -181,8 +181,9 @@ def _judge_benefit(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) 
             f"better than none with {percent}",
         )
     advice = advise(rig, fused, eye, settings)
+    is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
     if gain.without_arcmin <= gain.after_arcmin or (
-        gain.without_arcmin <= settings.target_arcmin and not advice.is_accepted
+        gain.without_arcmin <= settings.target_arcmin and not is_soon_accepted
     ):
         return Verdict(
             "keep",
@@ -198,9 +199,5 @@ def _judge_benefit(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) 
     return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
 
 
-def _is_enough(
-    after_arcmin: float, probability_better: float, settings: VerdictSettings
-) -> bool:
-    return (
-        probability_better >= settings.probability_min and after_arcmin <= settings.target_arcmin
-    )
+def _is_enough(after_arcmin: float, probability_better: float, settings: VerdictSettings) -> bool:
+    return probability_better >= settings.probability_min and after_arcmin <= settings.target_arcmin

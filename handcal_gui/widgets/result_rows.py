@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from handcal.register.results import Results
 from handcal.register.benefit import expected_error_arcmin
+from handcal.register.results import Results
 from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed

@@ -23,9 +23,7 @@ def test_without_uncertainty_it_is_the_reprojection_error() -> None:
     true_m: dict[Eye, Float64] = dict.fromkeys(EYES, shift_m)
     offline: dict[Eye, Float64] = dict.fromkeys(EYES, np.zeros(3))
     exact_arcmin = reprojection_arcmin(RIG, offline, true_m)
-    expected = np.mean(
-        [expected_arcmin(RIG.eyes[eye], shift_m, np.zeros((3, 3))) for eye in EYES]
-    )
+    expected = np.mean([expected_arcmin(RIG.eyes[eye], shift_m, np.zeros((3, 3))) for eye in EYES])
     assert expected == pytest.approx(exact_arcmin, rel=0.02)
 
 
@@ -63,7 +61,8 @@ def test_more_uncertainty_means_more_error_and_less_certain_benefit(
 def test_a_known_eye_gains_all_and_an_unmoved_one_nothing() -> None:
     tiny_m2 = 1e-12 * np.eye(3)
     moved = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.004, 0.0, 0.0]), tiny_m2)
-    assert moved.probability_better == 1.0 and moved.after_arcmin < 0.01
+    assert moved.probability_better == 1.0
+    assert moved.after_arcmin < 0.01
     unmoved = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.zeros(3), PRIOR_M2)
     assert unmoved.probability_better == 0.0
     assert unmoved.after_arcmin == unmoved.without_arcmin == unmoved.before_arcmin
@@ -81,3 +80,11 @@ def test_more_alignments_are_foreseen_to_help() -> None:
     assert foreseen_benefit(DISPLAY, shift_m, now_m2, now_m2) == foreseen_benefit(
         DISPLAY, shift_m, now_m2, now_m2
     )
+
+
+def test_expected_error_of_one_axis_by_hand() -> None:
+    # An eye 1 mm aside puts a point at z, seen against 2 m, off by (2 m - z) / z mm at 2 m.
+    at_2_m = np.mean([(2.0 - z) / z for z in (0.4, 0.5, 0.6)])
+    by_hand = 60 * np.degrees(1e-3 * at_2_m / 2.0) * np.sqrt(2 / np.pi)
+    found = expected_arcmin(DISPLAY, np.zeros(3), np.diag([0.001, 0.0, 0.0]) ** 2)
+    assert found == pytest.approx(by_hand, rel=0.02)

@@ -37,7 +37,7 @@ def test_the_default_has_eyes_in_the_box_that_differ_little() -> None:
     apart = np.hstack([-np.eye(3), np.eye(3)])
     apart_m2 = apart @ prior.covariance_m2 @ apart.T
     assert (np.sqrt(np.diag(apart_m2)) < PriorSettings().eye_difference_sigma_m).all()
-    assert (np.diag(prior.covariance_m2) < PriorSettings().eye_box_sigma_m**2).all()
+    assert (np.diag(prior.covariance_m2) < PriorSettings().eye_box_sigma_m ** 2).all()
 
 
 def test_few_sessions_make_no_prior() -> None:
@@ -49,7 +49,8 @@ def test_few_sessions_make_no_prior() -> None:
 def test_many_sessions_find_the_population(seen_by: list[Float64]) -> None:
     rng = np.random.default_rng(1)
     learned = learn_prior([_session(rng, seen_by) for _ in range(400)])
-    assert learned is not None and learned.sessions == 400
+    assert learned is not None
+    assert learned.sessions == 400
     covariance_m2 = np.reshape(learned.covariance_m2, (6, 6))
     # The mean of both eyes is seen either way; it must be found, with the spread among wearers.
     np.testing.assert_allclose(BOTH @ learned.mean_m, BOTH @ MEAN_M, atol=0.0004)
