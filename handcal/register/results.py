@@ -168,6 +168,16 @@ def results_json(results: Results) -> dict[str, Any]:
             for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
+        "observed": [
+            dict(
+                zip(
+                    ("H", "seen_m", "covariance_m2"),
+                    (part.tolist() for part in one.at(results.fused.wearer_scale)),
+                    strict=True,
+                )
+            )
+            for one in results.fused.observed
+        ],
         "alignments": [
             {eye: _shift_json(shift) for eye, shift in shifts.items()}
             for shifts in results.alignments.values()
