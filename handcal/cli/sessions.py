@@ -109,6 +109,7 @@ def prior(arguments: argparse.Namespace) -> None:
 
     from handcal.errors import FileError
     from handcal.io.resources import resource_path
+    from handcal.register.fuse import eye_slice
     from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
     from handcal.rig.rig_file import read_rig
     from handcal.station.lab_prior import run_learn_prior
@@ -131,7 +132,7 @@ def prior(arguments: argparse.Namespace) -> None:
     used = eye_prior(PriorSettings(learned=found.learned))
     sigma_mm = 1e3 * np.sqrt(np.diag(used.covariance_m2))
     shown = table("eye", "φ, mm", "± σ, mm")
-    for number, eye in enumerate(EYES):
-        part = slice(3 * number, 3 * number + 3)
+    for eye in EYES:
+        part = eye_slice(eye)
         shown.add_row(eye, triple(1e3 * used.mean_m[part]), triple(sigma_mm[part]))
     console.print(shown)

@@ -9,6 +9,7 @@ is averaged over a fixed set of samples: equal input gives equal output.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
@@ -24,7 +25,7 @@ from handcal.display import (
 from handcal.geometry import project
 from handcal.types import EyeDisplay, EyeShift, Float64
 
-_SAMPLES_LOG2 = 10
+_SAMPLES_LOG2 = 9
 _STEP_M = 1e-5
 
 
@@ -80,24 +81,27 @@ def benefit(
     )
 
 
-def foreseen_benefit(
-    display: EyeDisplay, shift_m: Float64, covariance_m2: Float64, later_m2: Float64
-) -> tuple[float, float]:
-    """Return the error to expect after further alignments, and the probability of a benefit.
+def foreseen_benefits(
+    display: EyeDisplay, shift_m: Float64, covariance_m2: Float64, later_m2: Sequence[Float64]
+) -> list[tuple[float, float]]:
+    """Return the errors to expect after further alignments, with the probabilities of a benefit.
 
     Parameters
     ----------
     display : EyeDisplay
     shift_m, covariance_m2 : (3,), (3, 3) float64
         φ of the eye as it is known now.
-    later_m2 : (3, 3) float64
-        The covariance of φ then; the later φ is taken to err by it around the true one.
+    later_m2 : sequence of (3, 3) float64
+        Covariances of φ then; the later φ is taken to err by it around the true one.
     """
     without = _errors_arcmin(display, _samples(shift_m, covariance_m2))
-    after = _errors_arcmin(display, _samples(np.zeros(3), later_m2))
     # Which of the later errors goes with which eye does not matter, as long as it is no pattern.
-    after = np.random.default_rng(0).permutation(after)
-    return float(after.mean()), float((after < without).mean())
+    order = np.random.default_rng(0).permutation(len(without))
+    found = []
+    for one_m2 in later_m2:
+        after = _errors_arcmin(display, _samples(np.zeros(3), one_m2))[order]
+        found.append((float(after.mean()), float((after < without).mean())))
+    return found
 
 
 def _samples(mean_m: Float64, covariance_m2: Float64) -> Float64:
@@ -118,8 +122,8 @@ def _standard_normal() -> Float64:
 
 def _errors_arcmin(display: EyeDisplay, difference_m: Float64) -> Float64:
     """Return the mean error over the corners (N,) for differences of φ (N, 3)."""
-    apart_px = np.einsum("cij,nj->nci", _jacobian(display), difference_m)
-    return np.asarray(arcmin_from_px(display, np.linalg.norm(apart_px, axis=2).mean(axis=1)))
+    x_px, y_px = np.tensordot(_jacobian(display), difference_m.T, axes=1).transpose(1, 0, 2)
+    return np.asarray(arcmin_from_px(display, np.hypot(x_px, y_px).mean(axis=0)))
 
 
 @lru_cache(maxsize=16)

@@ -131,7 +131,8 @@ def solve_session(
         solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
     pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
     fused = fuse_alignments(pairs, rig, settings.fuse, eye_distance)
-    verdicts = judge(rig, fused, settings.verdict, contradictions)
+    advice = {eye: advise(rig, fused, eye, settings.verdict) for eye in fused.shifts}
+    verdicts = judge(rig, fused, advice, settings.verdict, contradictions)
     another_m2 = fused.covariance_after_m2(tuple(fused.shifts), 1)
     return Results(
         method=settings.method,
@@ -140,11 +141,7 @@ def solve_session(
         verdicts=verdicts,
         eye_distance_m=eye_distance_m(rig, fused.shifts),
         benefits={eye: eye_benefit(rig, fused, eye) for eye in fused.shifts},
-        advice={
-            eye: advise(rig, fused, eye, settings.verdict)
-            for eye, verdict in verdicts.items()
-            if verdict.name == "repeat"
-        },
+        advice={eye: advice[eye] for eye in advice if verdicts[eye].name == "repeat"},
         expected_after_another_arcmin={
             eye: expected_arcmin(
                 rig.eyes[eye], np.zeros(3), another_m2[eye_slice(eye), eye_slice(eye)]

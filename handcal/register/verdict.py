@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.register.benefit import Benefit, benefit, foreseen_benefit
+from handcal.register.benefit import Benefit, benefit, foreseen_benefits
 from handcal.register.fuse import Fused, eye_position_m, eye_slice
 from handcal.types import EYES, Eye, EyeShift, Rig, Verdict
 
@@ -84,18 +84,17 @@ def advise(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) -> Advic
     plans: list[tuple[Eye, ...]] = [tuple(fused.shifts)]
     if len(plans[0]) > 1:
         plans.append((eye,))
+    ahead = [(eyes, count) for count in range(1, _MOST_ALIGNMENTS + 1) for eyes in plans]
+    part = eye_slice(eye)
+    later_m2 = [fused.covariance_after_m2(eyes, count)[part, part] for eyes, count in ahead]
+    foreseen = foreseen_benefits(rig.eyes[eye], shift.shift_m, shift.covariance_m2, later_m2)
     best: Advice | None = None
-    for count in range(1, _MOST_ALIGNMENTS + 1):
-        for eyes in plans:
-            later_m2 = fused.covariance_after_m2(eyes, count)[eye_slice(eye), eye_slice(eye)]
-            after_arcmin, probability = foreseen_benefit(
-                rig.eyes[eye], shift.shift_m, shift.covariance_m2, later_m2
-            )
-            is_accepted = _is_enough(after_arcmin, probability, settings)
-            meets_target = after_arcmin <= settings.target_arcmin
-            found = Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted)
-            if best is None or _is_better_advice(found, best):
-                best = found
+    for (eyes, count), (after_arcmin, probability) in zip(ahead, foreseen, strict=True):
+        is_accepted = _is_enough(after_arcmin, probability, settings)
+        meets_target = after_arcmin <= settings.target_arcmin
+        found = Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted)
+        if best is None or _is_better_advice(found, best):
+            best = found
     assert best is not None
     return best
 
@@ -112,6 +111,7 @@ def _is_better_advice(one: Advice, other: Advice) -> bool:
 def judge(
     rig: Rig,
     fused: Fused,
+    advice: Mapping[Eye, Advice],
     settings: VerdictSettings,
     contradictions: Sequence[str] = (),
 ) -> dict[Eye, Verdict]:
@@ -121,6 +121,8 @@ def judge(
     ----------
     rig : Rig
     fused : Fused
+    advice : mapping of eye to Advice
+        As `advise` gives it, for each solved eye.
     settings : VerdictSettings
     contradictions : sequence of str
         Sentences of evidence from outside the solver against the result.
@@ -132,7 +134,8 @@ def judge(
             for eye in fused.shifts
         }
     return {
-        eye: _fault(shift, apart_m, settings) or _judge_benefit(rig, fused, eye, settings)
+        eye: _fault(shift, apart_m, settings)
+        or _judge_benefit(eye_benefit(rig, fused, eye), advice[eye], eye, settings)
         for eye, shift in fused.shifts.items()
     }
 
@@ -171,8 +174,7 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
     return None
 
 
-def _judge_benefit(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) -> Verdict:
-    gain = eye_benefit(rig, fused, eye)
+def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSettings) -> Verdict:
     percent = f"{100 * gain.probability_better:.0f} %"
     if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
@@ -180,7 +182,6 @@ def _judge_benefit(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) 
             f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
             f"better than none with {percent}",
         )
-    advice = advise(rig, fused, eye, settings)
     is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
     if gain.without_arcmin <= gain.after_arcmin or (
         gain.without_arcmin <= settings.target_arcmin and not is_soon_accepted

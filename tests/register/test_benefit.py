@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.display import reprojection_arcmin
-from handcal.register.benefit import benefit, expected_arcmin, foreseen_benefit
+from handcal.register.benefit import benefit, expected_arcmin, foreseen_benefits
 from handcal.rig.example import example_rig
 from handcal.types import EYES, Eye, Float64
 
@@ -71,15 +71,12 @@ def test_a_known_eye_gains_all_and_an_unmoved_one_nothing() -> None:
 def test_more_alignments_are_foreseen_to_help() -> None:
     shift_m = np.array([0.003, 0.001, 0.0])
     now_m2 = 0.0015**2 * np.eye(3)
-    arcmin, probability = zip(
-        *(foreseen_benefit(DISPLAY, shift_m, now_m2, now_m2 / count) for count in (1, 2, 4, 8)),
-        strict=True,
-    )
+    later_m2 = [now_m2 / count for count in (1, 2, 4, 8)]
+    foreseen = foreseen_benefits(DISPLAY, shift_m, now_m2, later_m2)
+    arcmin, probability = zip(*foreseen, strict=True)
     assert list(arcmin) == sorted(arcmin, reverse=True)
     assert list(probability) == sorted(probability)
-    assert foreseen_benefit(DISPLAY, shift_m, now_m2, now_m2) == foreseen_benefit(
-        DISPLAY, shift_m, now_m2, now_m2
-    )
+    assert foreseen_benefits(DISPLAY, shift_m, now_m2, later_m2) == foreseen
 
 
 def test_expected_error_of_one_axis_by_hand() -> None:

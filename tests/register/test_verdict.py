@@ -1,4 +1,4 @@
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -47,7 +47,14 @@ def _fused(shifts: Mapping[Eye, EyeShift]) -> Fused:
 def _judge(
     shifts: Mapping[Eye, EyeShift], settings: VerdictSettings = SETTINGS
 ) -> dict[Eye, Verdict]:
-    return judge(RIG, _fused(shifts), settings)
+    return _judge_fused(_fused(shifts), settings)
+
+
+def _judge_fused(
+    fused: Fused, settings: VerdictSettings = SETTINGS, contradictions: Sequence[str] = ()
+) -> dict[Eye, Verdict]:
+    advice = {eye: advise(RIG, fused, eye, settings) for eye in fused.shifts}
+    return judge(RIG, fused, advice, settings, contradictions)
 
 
 def test_a_surely_better_solution_within_the_target_is_accepted() -> None:
@@ -131,7 +138,7 @@ def test_advice_is_the_fewest_alignments_that_are_enough() -> None:
     assert advise(RIG, fused, "left", stricter).alignments > advice.alignments
     hopeless = advise(RIG, fused, "left", replace(SETTINGS, target_arcmin=0.1))
     assert not hopeless.meets_target
-    verdict = judge(RIG, fused, replace(SETTINGS, target_arcmin=0.1))["left"]
+    verdict = _judge_fused(fused, replace(SETTINGS, target_arcmin=0.1))["left"]
     assert verdict.reason.endswith("enter the eye distance, or verify each eye")
 
 
@@ -143,7 +150,7 @@ def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> N
 
 
 def test_evidence_from_outside_contradicts_the_best_result() -> None:
-    verdicts = judge(RIG, _fused({"left": GOOD, "right": GOOD}), SETTINGS, ["the picture froze"])
+    verdicts = _judge_fused(_fused({"left": GOOD, "right": GOOD}), SETTINGS, ["the picture froze"])
     assert {(verdict.name, verdict.reason) for verdict in verdicts.values()} == {
         ("contradicted", "the picture froze")
     }
