@@ -32,7 +32,7 @@ RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp", "icp-open3d"]
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open3d")
 """The last needs the extra ``3d``; studies leave it out unless it is requested."""
-VerdictName: TypeAlias = Literal["accept", "repeat", "implausible"]
+VerdictName: TypeAlias = Literal["accept", "repeat", "keep", "implausible", "contradicted"]
 
 _FEW = 6  # items that `brief` shows
 

@@ -122,6 +122,10 @@ COMMANDS: Mapping[str, Entry] = {
         "Segment the hand in one image pair: cloud, contour, mask and overlay.", "cameras"
     ),
     "solve": Entry("Solve a stored session again; the session itself is not changed.", "sessions"),
+    "prior": Entry(
+        "Show where wearers' eyes are, as learned from the finished sessions with one rig.",
+        "sessions",
+    ),
     "export": Entry(
         "Export a session: report, tables, calibration, clouds, and the session as one file.",
         "sessions",

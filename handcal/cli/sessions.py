@@ -162,3 +162,45 @@ def inspect(arguments: argparse.Namespace) -> None:
 
     outcome = load_outcome(Session.open(arguments.session))
     inspect_session(outcome, arguments.alignment, arguments.picture)
+
+
+@command(
+    arg("folder", type=Path, help="folder of sessions"),
+    arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
+    json=True,
+)
+def prior(arguments: argparse.Namespace) -> None:
+    """Show where wearers' eyes are, as learned from the finished sessions with one rig."""
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from handcal.errors import FileError
+    from handcal.io.resources import resource_path
+    from handcal.register.fuse import eye_slice
+    from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
+    from handcal.rig.rig_file import read_rig
+    from handcal.station.lab_prior import run_learn_prior
+    from handcal.types import EYES
+
+    if not arguments.folder.is_dir():
+        raise FileError(f"{arguments.folder} is not a folder; choose the one that holds sessions")
+    settings = PriorSettings()
+    with show_progress() as progress:
+        rig = read_rig(arguments.rig or resource_path("example_rig.yaml"))
+        found = run_learn_prior(arguments.folder, rig, settings, progress)
+    learned = asdict(found.learned) if found.learned else None
+    left_out = dict(found.left_out)
+    save(arguments.json, {"used": found.used, "left_out": left_out, "learned": learned})
+    console.print(f"Sessions used: {found.used}")
+    for reason, count in found.left_out.items():
+        console.print(f"Left out: {count} {reason}")
+    if found.learned is None:
+        console.print(f"At least {MIN_SESSIONS} are needed; until then the default is used:")
+    used = eye_prior(PriorSettings(learned=found.learned))
+    sigma_mm = 1e3 * np.sqrt(np.diag(used.covariance_m2))
+    shown = table("eye", "φ, mm", "± σ, mm")
+    for eye in EYES:
+        part = eye_slice(eye)
+        shown.add_row(eye, triple(1e3 * used.mean_m[part]), triple(sigma_mm[part]))
+    console.print(shown)

@@ -19,8 +19,8 @@ from handcal.export.figure_rows import (
 from handcal.export.figures import ResidualCells
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
 from handcal.export.tables import corner_rows, parameter_rows
+from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
-from handcal.register.verdict import expected_error_arcmin
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
@@ -36,7 +36,9 @@ _ORIGINS: Mapping[ShiftOrigin, str] = {
 _VERDICTS: Mapping[VerdictName, str] = {
     "accept": "accepted",
     "repeat": "to be aligned again",
+    "keep": "offline calibration kept",
     "implausible": "implausible",
+    "contradicted": "contradicted",
 }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.io.files import write_atomic
-from handcal.register.verdict import expected_error_arcmin
+from handcal.register.benefit import expected_error_arcmin
 from handcal.report.rows import rows_csv
 from handcal.session.trial import Trial
 from handcal.types import EYES, Eye, EyeShift, Float64

@@ -7,18 +7,25 @@ squares in the image, at ``φ_seen = W_left φ_left + W_right φ_right`` with
 pixels in eye e with respect to a displacement of the hand. Three measurements do not determine six
 unknowns, so a prior limits how far the two eyes differ. Everything is Gaussian, so this is one
 linear system, in which the alignments add up, weighted by their covariances.
+
+Wearers differ in how precisely they align, by more than can be neglected: an estimate that assumes
+a usual wearer is far too sure of a careless one. So the precision is unknown too, one of
+`FuseSettings.wearer_scales`, and the estimate is the mean over them, weighted by how well each
+explains the alignments. One alignment says little about it, several say much by their scatter.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.special import softmax
 
 from handcal.display import eye_projection
-from handcal.geometry import project, transform
+from handcal.geometry import invert, project, transform
+from handcal.register.prior import EyePrior, Observed, PriorSettings, eye_prior, posterior
 from handcal.register.surface import describe_surface
 from handcal.types import EYES, Alignment, Bool, Eye, EyeDisplay, EyeShift, Float64, Rig
 
@@ -26,25 +33,52 @@ from handcal.types import EYES, Alignment, Bool, Eye, EyeDisplay, EyeShift, Floa
 _OUTLINE_FROM_POINTS = 1500
 # Far less than that of one point; it keeps the weights defined for a cursor outside the display.
 _NORMAL_FLOOR = 1e-3
-
-# H (3, 6), the displacement seen (3,), and its covariance (3, 3).
-Observed: TypeAlias = tuple[Float64, Float64, Float64]
+# Of a single solved eye: the eye box is about 2 cm wide (paper).
+_WIDE_EYE_BOX_M = 0.010
+# Of adults, with room to spare (ANSUR II: 52 to 78 mm).
+_EYE_DISTANCES_M = 0.045, 0.085
 
 
 @dataclass(frozen=True, slots=True)
 class FuseSettings:
     """Priors on φ, and the precision of a wearer's alignment."""
 
-    eye_box_sigma_m: float = 0.010
-    """Standard deviation of each component of φ: the eye box is about 2 cm wide (paper)."""
-    eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
-    """Standard deviation of the right φ minus the left. x is the difference of the wearer's eye
-    distance from the rig's: 2 mm if the headset is adjusted to the wearer; 3.6 mm among adults
-    (Gordon et al. 2014, ANSUR II)."""
-    lateral_sigma_arcmin: float = 3.0
-    """Standard deviation of the overlay in each of two directions."""
-    depth_sigma: float = 0.003
-    """Relative standard deviation of the depth, by matching the size."""
+    prior: PriorSettings = field(default_factory=PriorSettings)
+    lateral_sigma_arcmin: float = 4.0
+    """Standard deviation of a usual wearer's overlay in each of two directions."""
+    depth_sigma: float = 0.004
+    """Relative standard deviation of the depth, by matching the size. These are the errors with
+    which the paper's method errs as in the paper's user test."""
+    wearer_scales: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0)
+    """Errors of a wearer's overlay, in those of a usual wearer."""
+    wearer_weights: tuple[float, ...] = (0.8, 0.14, 0.05, 0.01)
+    """Probability of each of `wearer_scales`."""
+
+    def __post_init__(self) -> None:
+        if not self.wearer_scales or len(self.wearer_scales) != len(self.wearer_weights):
+            raise ValueError("wearer_scales and wearer_weights must have the same length")
+        if min(self.wearer_scales) <= 0.0 or min(self.wearer_weights) <= 0.0:
+            raise ValueError("wearer_scales and wearer_weights must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class EyeDistance:
+    """A measured distance between the wearer's pupils."""
+
+    value_m: float
+    sigma_m: float = 0.001
+    """Standard deviation: 1 mm for a ruler or a pupillometer."""
+    source: str = "typed"
+    """``"typed"`` or ``"headset"``."""
+
+    def __post_init__(self) -> None:
+        if not (_EYE_DISTANCES_M[0] <= self.value_m <= _EYE_DISTANCES_M[1]):
+            raise ValueError(
+                f"an eye distance of {1e3 * self.value_m:.1f} mm is not one of a person; "
+                f"enter {1e3 * _EYE_DISTANCES_M[0]:.0f} to {1e3 * _EYE_DISTANCES_M[1]:.0f} mm"
+            )
+        if not 0.0 < self.sigma_m <= 0.02:
+            raise ValueError("the eye distance's standard deviation must be from 0 to 20 mm")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,14 +86,47 @@ class Fused:
     """Estimates from several alignments, for each eye that any of them has."""
 
     shifts: Mapping[Eye, EyeShift]
-    covariances_after_another_m2: Mapping[Eye, Float64]
-    """each (3, 3); covariances to expect after one more alignment that is as informative as those
-    so far are on average, and agrees with them as well."""
+    prior: EyePrior
+    """What was assumed before the alignments, with the eye distance if it was measured."""
+    observed: tuple[Observation, ...]
+    """What each alignment measured."""
+    wearer_scale: float
+    """Expected error of the wearer's overlays, in those of a usual wearer."""
+
+    def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
+        """Return the covariance (6, 6) to expect after more alignments with some eyes open.
+
+        They are taken to be as precise as those so far on average.
+        """
+        H = np.zeros((3, 6))
+        for eye in eyes:
+            H[:, eye_slice(eye)] = np.eye(3) / len(eyes)
+        known = [one.at(self.wearer_scale) for one in self.observed]
+        noise_m2 = np.mean([covariance_m2 for _, _, covariance_m2 in known], axis=0)
+        return posterior(self.prior, [*known, *[(H, np.zeros(3), noise_m2)] * count])[1]
 
 
-def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> EyeShift:
-    """Return the estimate with the eye box as prior: uncertain components shrink towards C0."""
-    prior = np.eye(3) / settings.eye_box_sigma_m**2
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """The displacement measured by one alignment, in the axes of the left eye's E."""
+
+    H: Float64
+    """(3, 6); the displacement is H [φ_left; φ_right]."""
+    seen_m: Float64
+    """(3,)."""
+    registration_m2: Float64
+    """(3, 3); covariance of the registration."""
+    wearer_m2: Float64
+    """(3, 3); covariance of a usual wearer's overlay."""
+
+    def at(self, scale: float) -> Observed:
+        """Return H, displacement and covariance for a wearer of a precision."""
+        return self.H, self.seen_m, self.registration_m2 + scale**2 * self.wearer_m2
+
+
+def with_eye_box(shift: EyeShift) -> EyeShift:
+    """Return the estimate with a wide eye box as prior: uncertain components shrink towards C0."""
+    prior = np.eye(3) / _WIDE_EYE_BOX_M**2
     covariance_m2 = np.asarray(np.linalg.inv(np.linalg.inv(shift.covariance_m2) + prior))
     return replace(
         shift,
@@ -69,7 +136,10 @@ def with_eye_box(shift: EyeShift, settings: FuseSettings = FuseSettings()) -> Ey
 
 
 def fuse_alignments(
-    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]], rig: Rig, settings: FuseSettings
+    solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]],
+    rig: Rig,
+    settings: FuseSettings,
+    eye_distance: EyeDistance | None = None,
 ) -> Fused:
     """Fuse solved alignments into one estimate for each eye that any of them has.
 
@@ -79,6 +149,8 @@ def fuse_alignments(
         As returned by `solve_alignment`, without prior.
     rig : Rig
     settings : FuseSettings
+    eye_distance : EyeDistance, optional
+        The wearer's, if it was measured.
 
     Raises
     ------
@@ -89,76 +161,110 @@ def fuse_alignments(
     """
     if not solved:
         raise ValueError("at least one alignment is needed")
-    rows = [_observe(alignment, shifts, rig, settings) for alignment, shifts in solved]
-    disagreement = _disagreement(rows, _combine(rows, 1.0, settings)[0])
-    estimate_m, joint_m2 = _combine(rows, disagreement, settings)
-    # One more average alignment adds as much information as this much less noise.
-    less_noise = disagreement * len(rows) / (len(rows) + 1)
-    _, after_another_m2 = _combine(rows, less_noise, settings)
+    observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
+    prior = _with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
+    weights = _scale_weights(prior, observed, settings)
+    found = [posterior(prior, [o.at(scale) for o in observed]) for scale in settings.wearer_scales]
+    estimate_m = sum(weight * mean_m for weight, (mean_m, _) in zip(weights, found, strict=True))
+    joint_m2 = sum(
+        weight * (covariance_m2 + np.outer(mean_m - estimate_m, mean_m - estimate_m))
+        for weight, (mean_m, covariance_m2) in zip(weights, found, strict=True)
+    )
     of_eye = {
-        eye: found
+        eye: found_shifts
         for eye in EYES
-        if (found := [shifts[eye] for _, shifts in solved if eye in shifts])
+        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts])
     }
     return Fused(
-        {
-            eye: _summarise(shifts, estimate_m[_of(eye)], joint_m2[_of(eye), _of(eye)])
+        shifts={
+            eye: _summarise(
+                shifts, estimate_m[eye_slice(eye)], joint_m2[eye_slice(eye), eye_slice(eye)]
+            )
             for eye, shifts in of_eye.items()
         },
-        {eye: after_another_m2[_of(eye), _of(eye)] for eye in of_eye},
+        prior=prior,
+        observed=observed,
+        wearer_scale=float(np.sqrt(weights @ np.square(settings.wearer_scales))),
     )
 
 
-def _of(eye: Eye) -> slice:
+def eye_slice(eye: Eye) -> slice:
     """Return an eye's components in [φ_left; φ_right]."""
     return slice(3 * EYES.index(eye), 3 * EYES.index(eye) + 3)
 
 
-def _combine(
-    rows: Sequence[Observed], inflation: float, settings: FuseSettings
-) -> tuple[Float64, Float64]:
-    """Return [φ_left; φ_right] (6,) and its covariance, with inflated observation noise."""
-    information = np.kron(np.eye(2), np.eye(3) / settings.eye_box_sigma_m**2)
-    apart = np.diag(1.0 / np.square(settings.eye_difference_sigma_m))
-    information += np.kron([[1.0, -1.0], [-1.0, 1.0]], apart)
-    state = np.zeros(6)
-    for H, seen_m, covariance_m2 in rows:
-        weighted = np.linalg.solve(inflation * covariance_m2, H).T
-        information += weighted @ H
-        state += weighted @ seen_m
-    covariance_m2 = np.asarray(np.linalg.inv(information))
-    return covariance_m2 @ state, covariance_m2
+def eye_position_m(display: EyeDisplay, shift_m: Float64) -> Float64:
+    """Return where an eye with φ is, (3,), in H."""
+    eye_V = shift_m - display.t_C0_V_m
+    return np.asarray(transform(invert(display.T_V_H), eye_V[None])[0])
+
+
+def _with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | None) -> EyePrior:
+    """Return the prior with a measured eye distance, which is nearly linear in φ."""
+    if eye_distance is None:
+        return prior
+    left_m, right_m = (eye_position_m(rig.eyes[eye], prior.mean_m[eye_slice(eye)]) for eye in EYES)
+    between_m = right_m - left_m
+    distance_m = float(np.linalg.norm(between_m))
+    H = np.zeros((1, 6))
+    for eye, sign in zip(EYES, (-1.0, 1.0), strict=True):
+        H[0, eye_slice(eye)] = sign * rig.eyes[eye].T_V_H[:3, :3] @ between_m / distance_m
+    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ prior.mean_m
+    observed = H, seen_m, np.array([[eye_distance.sigma_m**2]])
+    return EyePrior(*posterior(prior, [observed]), prior.sessions)
+
+
+def _scale_weights(
+    prior: EyePrior, observed: Sequence[Observation], settings: FuseSettings
+) -> Float64:
+    """Return the probability of each precision of the wearer, by how well it predicts all.
+
+    The displacements of all alignments are jointly Gaussian, given the precision.
+    """
+    H = np.concatenate([one.H for one in observed])
+    surprise_m = np.concatenate([one.seen_m for one in observed]) - H @ prior.mean_m
+    common_m2 = H @ prior.covariance_m2 @ H.T
+    logarithms = []
+    for scale, weight in zip(settings.wearer_scales, settings.wearer_weights, strict=True):
+        noise_m2 = block_diag(*[one.at(scale)[2] for one in observed])
+        total_m2 = common_m2 + noise_m2
+        _, log_determinant = np.linalg.slogdet(total_m2)
+        fit = float(surprise_m @ np.linalg.solve(total_m2, surprise_m))
+        logarithms.append(np.log(weight) - 0.5 * (log_determinant + fit))
+    return np.asarray(softmax(logarithms))
 
 
 def _observe(
     alignment: Alignment, shifts: Mapping[Eye, EyeShift], rig: Rig, settings: FuseSettings
-) -> Observed:
-    """Return H (3, 6), the displacement seen (3,) in W's axes, and its covariance.
+) -> Observation:
+    """Return what an alignment measured.
 
-    The displacement is H [φ_left; φ_right]. The wearer sees the part of the cursor's outline that
-    lies within the display.
+    The wearer sees the part of the cursor's outline that lies within the display.
     """
+    # The left eye's E is as good as any common axes, and the same for every position of the head.
+    R_W_A = next(alignment.T_E_W[eye] for eye in EYES if eye in alignment.T_E_W)[:3, :3].T
     surface = describe_surface(alignment.cursor_m, alignment.cursor_is_cut, _OUTLINE_FROM_POINTS)
     outline_m = surface.points_m[surface.outline]
     normals: dict[Eye, Float64] = {}
-    noises: dict[Eye, Float64] = {}
+    registrations, wearers = [], []
     for eye, shift in shifts.items():
         display, T_E_W = rig.eyes[eye], alignment.T_E_W[eye]
-        R_W_E = T_E_W[:3, :3].T
+        R_A_E = R_W_A.T @ T_E_W[:3, :3].T
         cursor_E = transform(T_E_W, outline_m)
         shown = _is_shown(cursor_E, display, alignment.drawn_shift_m[eye])
-        normals[eye] = R_W_E @ _pixel_normal(cursor_E[shown]) @ R_W_E.T
+        normals[eye] = R_A_E @ _pixel_normal(cursor_E[shown]) @ R_A_E.T
         depth_m = float(transform(T_E_W, alignment.cursor_m)[:, 2].mean())
         wearer = _wearer_covariance(depth_m, display.z_C0_S_m, settings)
-        noises[eye] = R_W_E @ (shift.covariance_m2 + wearer) @ R_W_E.T
+        registrations.append(R_A_E @ shift.covariance_m2 @ R_A_E.T)
+        wearers.append(R_A_E @ wearer @ R_A_E.T)
     total = np.sum(list(normals.values()), axis=0)
     H = np.zeros((3, 6))
     seen_m = np.zeros(3)
     for eye, shift in shifts.items():
-        weight = np.linalg.solve(total, normals[eye]) @ alignment.T_E_W[eye][:3, :3].T
-        H[:, _of(eye)] = weight
+        weight = np.linalg.solve(total, normals[eye]) @ R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
+        H[:, eye_slice(eye)] = weight
         seen_m += weight @ shift.shift_m
-    return H, seen_m, np.mean(list(noises.values()), axis=0)
+    return Observation(H, seen_m, np.mean(registrations, axis=0), np.mean(wearers, axis=0))
 
 
 def _is_shown(points_E_m: Float64, display: EyeDisplay, drawn_shift_m: Float64) -> Bool:
@@ -184,16 +290,6 @@ def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings
     along_m = depth_m * settings.depth_sigma
     gain = 1.0 / (1.0 - depth_m / distance_m)
     return np.diag(np.square([gain * lateral_m, gain * lateral_m, gain * along_m]))
-
-
-def _disagreement(rows: Sequence[Observed], estimate_m: Float64) -> float:
-    """Return the Birge ratio, at least 1: scatter of alignments beyond their covariances."""
-    chi_square = sum(
-        float((seen_m - H @ estimate_m) @ np.linalg.solve(covariance_m2, seen_m - H @ estimate_m))
-        for H, seen_m, covariance_m2 in rows
-    )
-    freedom = 3 * (len(rows) - 1)
-    return max(1.0, chi_square / freedom) if freedom else 1.0
 
 
 def _summarise(shifts: Sequence[EyeShift], shift_m: Float64, covariance_m2: Float64) -> EyeShift:

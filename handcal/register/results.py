@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
+import numpy as np
+
 from handcal.progress import Progress
-from handcal.register.fuse import FuseSettings, fuse_alignments
+from handcal.register.benefit import Benefit, expected_arcmin
+from handcal.register.fuse import EyeDistance, Fused, FuseSettings, eye_slice, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
+    Advice,
     VerdictSettings,
-    expected_error_arcmin,
+    advise,
+    eye_benefit,
     eye_distance_m,
     judge,
 )
@@ -27,7 +32,7 @@ from handcal.types import (
     shift_rows,
 )
 
-RESULTS_VERSION = 1
+RESULTS_VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +57,14 @@ class Results:
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
     """Eye distance implied by `eyes`; None unless both eyes are solved."""
+    benefits: Mapping[Eye, Benefit]
+    """Expected error of each eye without the calibration and with it."""
+    advice: Mapping[Eye, Advice]
+    """Further alignments that would lead to *accept*, for each eye with the verdict *repeat*."""
     expected_after_another_arcmin: Mapping[Eye, float]
-    """`expected_error_arcmin` of `eyes` after one more alignment like those so far."""
+    """Expected error after one more alignment with all solved eyes open."""
+    fused: Fused
+    """The observations and the prior behind `eyes`."""
 
     def __str__(self) -> str:
         solved = (
@@ -86,6 +97,8 @@ def solve_session(
     rig: Rig,
     settings: SolveSettings,
     progress: Progress = Progress(),
+    eye_distance: EyeDistance | None = None,
+    contradictions: Sequence[str] = (),
 ) -> Results:
     """Solve, fuse and judge alignments; equal input gives identical output, bit for bit.
 
@@ -97,6 +110,10 @@ def solve_session(
     settings : SolveSettings
     progress : Progress
         Reported to before each alignment; the slow methods can be cancelled before each iteration.
+    eye_distance : EyeDistance, optional
+        The wearer's, if it was measured.
+    contradictions : sequence of str
+        Evidence from outside the solver against the result, a sentence each.
 
     Raises
     ------
@@ -113,20 +130,25 @@ def solve_session(
         progress.at(done / len(alignments), f"Solving alignment {done + 1} of {len(alignments)}")
         solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
     pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
-    fused = fuse_alignments(pairs, rig, settings.fuse)
+    fused = fuse_alignments(pairs, rig, settings.fuse, eye_distance)
+    advice = {eye: advise(rig, fused, eye, settings.verdict) for eye in fused.shifts}
+    verdicts = judge(rig, fused, advice, settings.verdict, contradictions)
+    another_m2 = fused.covariance_after_m2(tuple(fused.shifts), 1)
     return Results(
         method=settings.method,
         alignments=solved,
         eyes=fused.shifts,
-        verdicts=judge(rig, fused.shifts, settings.verdict),
+        verdicts=verdicts,
         eye_distance_m=eye_distance_m(rig, fused.shifts),
+        benefits={eye: eye_benefit(rig, fused, eye) for eye in fused.shifts},
+        advice={eye: advice[eye] for eye in advice if verdicts[eye].name == "repeat"},
         expected_after_another_arcmin={
-            eye: expected_error_arcmin(
-                rig.eyes[eye],
-                replace(shift, covariance_m2=fused.covariances_after_another_m2[eye]),
+            eye: expected_arcmin(
+                rig.eyes[eye], np.zeros(3), another_m2[eye_slice(eye), eye_slice(eye)]
             )
-            for eye, shift in fused.shifts.items()
+            for eye in fused.shifts
         },
+        fused=fused,
     )
 
 
@@ -138,9 +160,21 @@ def results_json(results: Results) -> dict[str, Any]:
         "eyes": {
             eye: _shift_json(shift)
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
+            | {"benefit": asdict(results.benefits[eye])}
+            | {"advice": asdict(results.advice[eye]) if eye in results.advice else None}
             for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
+        "observed": [
+            dict(
+                zip(
+                    ("H", "seen_m", "covariance_m2"),
+                    (part.tolist() for part in one.at(results.fused.wearer_scale)),
+                    strict=True,
+                )
+            )
+            for one in results.fused.observed
+        ],
         "alignments": [
             {eye: _shift_json(shift) for eye, shift in shifts.items()}
             for shifts in results.alignments.values()

@@ -1,80 +1,148 @@
-"""The verdict on a solved eye shift: accept, repeat the alignment, or implausible."""
+"""The verdict on a solved eye shift: accept, repeat, keep the offline calibration, or implausible.
+
+A calibration is accepted for its benefit: it must be better than no calibration with high
+probability, and its expected error within the lab's target. Evidence from outside the solver can
+contradict it, whatever the solver says.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.display import arcmin_from_px, eye_projection, target_corners_m
-from handcal.geometry import invert, project, transform
-from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Float64, Rig, Verdict
+from handcal.register.benefit import Benefit, benefit, foreseen_benefits
+from handcal.register.fuse import Fused, eye_position_m, eye_slice
+from handcal.types import EYES, Eye, EyeShift, Rig, Verdict
+
+_MOST_ALIGNMENTS = 10
+# More than this are not worth it where the offline calibration is within the target.
+_FEW_ALIGNMENTS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class VerdictSettings:
     """Limits of the verdict."""
 
+    target_arcmin: float = 8.0
+    """Largest expected error in the display that the lab accepts."""
+    probability_min: float = 0.95
+    """Least probability that the calibration is better than none."""
     eye_box_m: float = 0.020
     """Longest plausible φ."""
     eye_distance_min_m: float = 0.050
     eye_distance_max_m: float = 0.080
     """Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm)."""
-    error_max_arcmin: float = 15.0
-    """Largest expected error in the display. Published methods have medians of 10 to 17′ (paper,
-    table of reprojection errors)."""
     rms_max_m: float = 0.005
     inlier_ratio_min: float = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """The alignments that would lead to *accept*, as far as can be foreseen."""
+
+    eyes: tuple[Eye, ...]
+    """Eyes to keep open in each of them."""
+    alignments: int
+    after_arcmin: float
+    """Error to expect then."""
+    probability_better: float
+    """Probability that the calibration is then better than none."""
+    meets_target: bool
+    """True if that error is within the target."""
+    is_accepted: bool
+    """True if both are enough for *accept*."""
 
 
 def eye_distance_m(rig: Rig, shifts: Mapping[Eye, EyeShift]) -> float | None:
     """Return the distance between the solved eyes, or None unless both are solved."""
     if set(shifts) != set(EYES):
         return None
-    places = []
-    for eye in EYES:
-        display = rig.eyes[eye]
-        eye_V = shifts[eye].shift_m - display.t_C0_V_m
-        places.append(transform(invert(display.T_V_H), eye_V[None])[0])
-    return float(np.linalg.norm(places[1] - places[0]))
+    left_m, right_m = (eye_position_m(rig.eyes[eye], shifts[eye].shift_m) for eye in EYES)
+    return float(np.linalg.norm(right_m - left_m))
+
+
+def eye_benefit(rig: Rig, fused: Fused, eye: Eye) -> Benefit:
+    """Return the benefit of a solved eye's φ."""
+    part, shift = eye_slice(eye), fused.shifts[eye]
+    return benefit(
+        rig.eyes[eye],
+        fused.prior.mean_m[part],
+        fused.prior.covariance_m2[part, part],
+        shift.shift_m,
+        shift.covariance_m2,
+    )
+
+
+def advise(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) -> Advice:
+    """Return the fewest further alignments after which an eye is expected to be accepted.
+
+    Alignments with this eye alone open are compared with alignments with all solved eyes open.
+    """
+    shift = fused.shifts[eye]
+    plans: list[tuple[Eye, ...]] = [tuple(fused.shifts)]
+    if len(plans[0]) > 1:
+        plans.append((eye,))
+    ahead = [(eyes, count) for count in range(1, _MOST_ALIGNMENTS + 1) for eyes in plans]
+    part = eye_slice(eye)
+    later_m2 = [fused.covariance_after_m2(eyes, count)[part, part] for eyes, count in ahead]
+    foreseen = foreseen_benefits(rig.eyes[eye], shift.shift_m, shift.covariance_m2, later_m2)
+    best: Advice | None = None
+    for (eyes, count), (after_arcmin, probability) in zip(ahead, foreseen, strict=True):
+        is_accepted = _is_enough(after_arcmin, probability, settings)
+        meets_target = after_arcmin <= settings.target_arcmin
+        found = Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted)
+        if best is None or _is_better_advice(found, best):
+            best = found
+    assert best is not None
+    return best
+
+
+def _is_better_advice(one: Advice, other: Advice) -> bool:
+    """Return whether advice leads further, or as far with fewer alignments, or then closer."""
+    steps = one.is_accepted - other.is_accepted or one.meets_target - other.meets_target
+    if steps or not other.meets_target:
+        return steps > 0 or (steps == 0 and one.after_arcmin < other.after_arcmin)
+    fewer = other.alignments - one.alignments
+    return fewer > 0 or (fewer == 0 and one.after_arcmin < other.after_arcmin)
 
 
 def judge(
-    rig: Rig, shifts: Mapping[Eye, EyeShift], settings: VerdictSettings
+    rig: Rig,
+    fused: Fused,
+    advice: Mapping[Eye, Advice],
+    settings: VerdictSettings,
+    contradictions: Sequence[str] = (),
 ) -> dict[Eye, Verdict]:
-    """Judge every solved eye; the first reason that applies is given."""
-    apart_m = eye_distance_m(rig, shifts)
-    return {eye: _judge(shift, rig.eyes[eye], apart_m, settings) for eye, shift in shifts.items()}
+    """Judge every solved eye; the first reason that applies is given.
 
-
-def expected_error_arcmin(display: EyeDisplay, shift: EyeShift) -> float:
-    """Return the root mean square error expected from φ's covariance, in arcmin.
-
-    Evaluated at the corners of the user test's target at half a metre.
+    Parameters
+    ----------
+    rig : Rig
+    fused : Fused
+    advice : mapping of eye to Advice
+        As `advise` gives it, for each solved eye.
+    settings : VerdictSettings
+    contradictions : sequence of str
+        Sentences of evidence from outside the solver against the result.
     """
-    corners_m = target_corners_m(0.5)
-
-    def drawn_px(shift_m: Float64) -> Float64:
-        return project(eye_projection(display, shift_m), corners_m)
-
-    steps_m = 1e-5 * np.eye(3)
-    J = np.stack(
-        [
-            (drawn_px(shift.shift_m + step) - drawn_px(shift.shift_m - step)) / 2e-5
-            for step in steps_m
-        ],
-        axis=-1,
-    )
-    variance_px2 = np.einsum("nij,jk,nik->n", J, shift.covariance_m2, J)
-    return float(arcmin_from_px(display, np.sqrt(variance_px2.mean())))
+    apart_m = eye_distance_m(rig, fused.shifts)
+    if contradictions:
+        return {
+            eye: Verdict("contradicted", "; ".join(dict.fromkeys(contradictions)))
+            for eye in fused.shifts
+        }
+    return {
+        eye: _fault(shift, apart_m, settings)
+        or _judge_benefit(eye_benefit(rig, fused, eye), advice[eye], eye, settings)
+        for eye, shift in fused.shifts.items()
+    }
 
 
-def _judge(
-    shift: EyeShift, display: EyeDisplay, apart_m: float | None, settings: VerdictSettings
-) -> Verdict:
+def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict | None:
+    """Return the verdict on a result that is wrong in itself, else None."""
     length_m = float(np.linalg.norm(shift.shift_m))
-    error_arcmin = expected_error_arcmin(display, shift)
     if length_m > settings.eye_box_m:
         return Verdict(
             "implausible",
@@ -103,9 +171,34 @@ def _judge(
             f"hand and cursor differ by {1e3 * shift.rms_m:.1f} mm; "
             "hold the hand in the cursor's shape",
         )
-    if error_arcmin > settings.error_max_arcmin:
+    return None
+
+
+def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSettings) -> Verdict:
+    percent = f"{100 * gain.probability_better:.0f} %"
+    if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
-            "repeat",
-            f"still uncertain by {error_arcmin:.0f}′ in the display; align once more",
+            "accept",
+            f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
+            f"better than none with {percent}",
         )
-    return Verdict("accept", f"expected error {error_arcmin:.1f}′ in the display")
+    is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
+    if gain.without_arcmin <= gain.after_arcmin or (
+        gain.without_arcmin <= settings.target_arcmin and not is_soon_accepted
+    ):
+        return Verdict(
+            "keep",
+            f"the offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here; "
+            f"this result, expected at {gain.after_arcmin:.1f}′, is better with just {percent}",
+        )
+    which = "with both eyes open" if len(advice.eyes) > 1 else f"with the {eye} eye alone"
+    more = f"{advice.alignments} more alignment{'s' * (advice.alignments != 1)} {which}"
+    now = f"expected error {gain.after_arcmin:.1f}′, better than none with {percent}"
+    then = f"{advice.after_arcmin:.1f}′ expected after {more}"
+    if advice.meets_target:
+        return Verdict("repeat", f"{now}; {then}")
+    return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
+
+
+def _is_enough(after_arcmin: float, probability_better: float, settings: VerdictSettings) -> bool:
+    return probability_better >= settings.probability_min and after_arcmin <= settings.target_arcmin

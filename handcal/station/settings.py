@@ -45,6 +45,9 @@ class StationSettings:
     """Share of the virtual headset's datagrams lost, and reordered, in each direction."""
     sessions: str = "sessions"
     """Folder in which sessions are created."""
+    learn_prior: bool = True
+    """Learn where wearers' eyes are from the finished sessions in this folder with the same rig,
+    once there are enough."""
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
 
     @property

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack, suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
 from handcal.station.hands import PlacedHand
+from handcal.station.lab_prior import run_learn_prior
 from handcal.station.procedure import Calibration, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
@@ -76,6 +77,7 @@ class Station(Closable):
         resume: Path | None = None,
         pairings: Pairings | str = "",
     ) -> None:
+        settings = settings if resume else _with_lab_prior(settings)
         self.settings = settings
         is_virtual = settings.headset == "virtual"
         if is_virtual or isinstance(pairings, str):
@@ -404,6 +406,18 @@ def _open_session(settings: StationSettings, wearer: str, resume: Path | None) -
     station = settings_json(settings)
     stored = {"calibration": station.pop("calibration"), "station": station}
     return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
+
+
+def _with_lab_prior(settings: StationSettings) -> StationSettings:
+    """Return the settings with the prior learned from the lab's earlier sessions, if wanted."""
+    solve = settings.calibration.solve
+    if not settings.learn_prior or solve.fuse.prior.learned is not None:
+        return settings
+    rig = read_rig(settings.rig_path)
+    found = run_learn_prior(Path(settings.sessions), rig, solve.fuse.prior)
+    prior = replace(solve.fuse.prior, learned=found.learned)
+    solve = replace(solve, fuse=replace(solve.fuse, prior=prior))
+    return replace(settings, calibration=replace(settings.calibration, solve=solve))
 
 
 def _outline_E(T_E_W: Float64, hand: PlacedHand) -> Float64:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
-from handcal.register.verdict import expected_error_arcmin
 from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed
@@ -15,7 +15,9 @@ EYE_NAMES: Mapping[Eye, str] = {"left": "Left eye", "right": "Right eye"}
 VERDICT_WORDS: Mapping[VerdictName, str] = {
     "accept": "✓ Accept",
     "repeat": "↻ Repeat",
+    "keep": "↩ Keep offline",
     "implausible": "✕ Implausible",
+    "contradicted": "✕ Contradicted",
 }
 NOTHING = "–"
 
@@ -64,7 +66,7 @@ PHI = (_phi(0, "to the right of"), _phi(1, "below"), _phi(2, "in front of"))
 EXPECTED_ERROR = Quantity(
     "Expected error",
     "′",
-    "Expected angle between real and drawn points at 0.5 m due to the uncertainty of φ,\n"
+    "Expected angle between real and drawn points at 0.4 to 0.6 m due to the uncertainty of φ,\n"
     "in arcminutes. 1′ is 0.15 mm at 0.5 m.",
     lambda shift, display: expected_error_arcmin(display, shift),
     1,

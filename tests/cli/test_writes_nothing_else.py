@@ -65,6 +65,7 @@ COMMANDS = {
     "solve": "SESSION --json OUTPUT/solved.json",
     "export": "SESSION --output OUTPUT",
     "inspect": "SESSION --picture OUTPUT/view.png",
+    "prior": ".",
     "session check": "SESSION --json OUTPUT/checked.json",
     "session repair": "SESSION --output OUTPUT/repaired",
     "record": "OUTPUT/recording --source simulator --frames 2",

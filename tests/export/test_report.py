@@ -18,7 +18,7 @@ from handcal.errors import CancelledError
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
 from handcal.progress import Progress
-from handcal.register.verdict import expected_error_arcmin
+from handcal.register.benefit import expected_error_arcmin
 from handcal.report.pdf import compose, write_pdf
 from handcal.session.session import SessionRecord
 from handcal.session.trial import Trial

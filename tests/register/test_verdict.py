@@ -1,17 +1,21 @@
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from handcal.register.fuse import Fused, Observation, eye_slice
+from handcal.register.prior import eye_prior
 from handcal.register.verdict import (
     VerdictSettings,
-    expected_error_arcmin,
+    advise,
+    eye_benefit,
     eye_distance_m,
     judge,
 )
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
-from handcal.types import EyeShift
+from handcal.types import Eye, EyeShift, Verdict
 
 RIG = example_rig()
 SETTINGS = VerdictSettings()
@@ -29,12 +33,40 @@ GOOD = EyeShift(
 )
 
 
-def test_a_good_solution_is_accepted_with_its_expected_error() -> None:
-    for eye, verdict in judge(RIG, {"left": GOOD, "right": GOOD}, SETTINGS).items():
+def _fused(shifts: Mapping[Eye, EyeShift]) -> Fused:
+    """Return estimates as of one alignment of all their eyes, as precise as the left one."""
+    eyes = tuple(shifts)
+    H = np.zeros((3, 6))
+    for eye in eyes:
+        H[:, eye_slice(eye)] = np.eye(3) / len(eyes)
+    noise_m2 = shifts[eyes[0]].covariance_m2
+    observed = Observation(H, np.zeros(3), 0.5 * noise_m2, 0.5 * noise_m2)
+    return Fused(shifts, eye_prior(), (observed,), 1.0)
+
+
+def _judge(
+    shifts: Mapping[Eye, EyeShift], settings: VerdictSettings = SETTINGS
+) -> dict[Eye, Verdict]:
+    return _judge_fused(_fused(shifts), settings)
+
+
+def _judge_fused(
+    fused: Fused, settings: VerdictSettings = SETTINGS, contradictions: Sequence[str] = ()
+) -> dict[Eye, Verdict]:
+    advice = {eye: advise(RIG, fused, eye, settings) for eye in fused.shifts}
+    return judge(RIG, fused, advice, settings, contradictions)
+
+
+def test_a_surely_better_solution_within_the_target_is_accepted() -> None:
+    shifts: dict[Eye, EyeShift] = {"left": GOOD, "right": GOOD}
+    for eye, verdict in _judge(shifts).items():
+        gain = eye_benefit(RIG, _fused(shifts), eye)
         assert verdict.name == "accept"
-        arcmin = expected_error_arcmin(RIG.eyes[eye], GOOD)
-        assert verdict.reason == f"expected error {arcmin:.1f}′ in the display"
-        assert 1.0 < arcmin < 15.0
+        assert verdict.reason == (
+            f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
+            f"better than none with 100 %"
+        )
+        assert 1.0 < gain.after_arcmin < SETTINGS.target_arcmin < gain.without_arcmin
 
 
 @pytest.mark.parametrize(
@@ -65,40 +97,70 @@ def test_a_good_solution_is_accepted_with_its_expected_error() -> None:
     ],
 )
 def test_what_fails_is_named(changes: dict[str, Any], name: str, reason: str) -> None:
-    verdict = judge(RIG, {"left": replace(GOOD, **changes)}, SETTINGS)["left"]
+    verdict = _judge({"left": replace(GOOD, **changes)})["left"]
     assert (verdict.name, verdict.reason) == (name, reason)
 
 
 @pytest.mark.parametrize(("apart_mm", "said"), [(49.0, "49"), (81.0, "81")])
 def test_eyes_too_near_or_too_far_apart(apart_mm: float, said: str) -> None:
     half_m = 0.5e-3 * apart_mm - HALF_EYE_DISTANCE_M
-    shifts = {
+    shifts: dict[Eye, EyeShift] = {
         "left": replace(GOOD, shift_m=np.array([-half_m, 0.0, 0.0])),
         "right": replace(GOOD, shift_m=np.array([half_m, 0.0, 0.0])),
     }
-    for verdict in judge(RIG, shifts, SETTINGS).values():  # type: ignore[arg-type]
+    for verdict in _judge(shifts).values():
         assert verdict.name == "implausible"
         assert verdict.reason == (
             f"the eyes would lie {said} mm apart; check the rig, or align one eye at a time"
         )
 
 
-def test_an_uncertain_eye_asks_for_another_alignment_and_leaves_the_other_alone() -> None:
-    uncertain = replace(GOOD, covariance_m2=np.diag([0.004, 0.004, 0.006]) ** 2)
-    verdicts = judge(RIG, {"left": uncertain, "right": GOOD}, SETTINGS)
-    arcmin = expected_error_arcmin(RIG.eyes["left"], uncertain)
+def test_an_uncertain_eye_asks_for_alignments_and_leaves_the_other_alone() -> None:
+    uncertain = replace(GOOD, covariance_m2=np.diag([0.002, 0.002, 0.004]) ** 2)
+    shifts: dict[Eye, EyeShift] = {"left": uncertain, "right": GOOD}
+    verdicts = _judge(shifts)
+    advice = advise(RIG, _fused(shifts), "left", SETTINGS)
     assert verdicts["left"].name == "repeat"
-    assert verdicts["left"].reason == (
-        f"still uncertain by {arcmin:.0f}′ in the display; align once more"
-    )
+    assert f"{advice.alignments} more alignment" in verdicts["left"].reason
+    assert f"{advice.after_arcmin:.1f}′ expected" in verdicts["left"].reason
     assert verdicts["right"].name == "accept"
 
 
+def test_advice_is_the_fewest_alignments_that_are_enough() -> None:
+    uncertain = replace(GOOD, covariance_m2=np.diag([0.002, 0.002, 0.004]) ** 2)
+    fused = _fused({"left": uncertain, "right": uncertain})
+    advice = advise(RIG, fused, "left", SETTINGS)
+    assert advice.meets_target
+    assert advice.after_arcmin <= SETTINGS.target_arcmin
+    # Both eyes at once cannot tell where they differ, so the one eye alone is worth more.
+    assert advice.eyes == ("left",)
+    stricter = replace(SETTINGS, target_arcmin=0.6 * advice.after_arcmin)
+    assert advise(RIG, fused, "left", stricter).alignments > advice.alignments
+    hopeless = advise(RIG, fused, "left", replace(SETTINGS, target_arcmin=0.1))
+    assert not hopeless.meets_target
+    verdict = _judge_fused(fused, replace(SETTINGS, target_arcmin=0.1))["left"]
+    assert verdict.reason.endswith("enter the eye distance, or verify each eye")
+
+
+def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> None:
+    unmoved = replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))
+    verdict = _judge({"left": unmoved})["left"]
+    assert verdict.name == "keep"
+    assert verdict.reason.startswith("the offline calibration is expected to err by only")
+
+
+def test_evidence_from_outside_contradicts_the_best_result() -> None:
+    verdicts = _judge_fused(_fused({"left": GOOD, "right": GOOD}), SETTINGS, ["the picture froze"])
+    assert {(verdict.name, verdict.reason) for verdict in verdicts.values()} == {
+        ("contradicted", "the picture froze")
+    }
+
+
 def test_limits_are_the_settings() -> None:
-    strict = VerdictSettings(error_max_arcmin=0.1)
-    assert judge(RIG, {"left": GOOD}, strict)["left"].name == "repeat"
+    strict = VerdictSettings(target_arcmin=0.1)
+    assert _judge({"left": GOOD}, strict)["left"].name == "repeat"
     narrow = VerdictSettings(eye_box_m=0.001)
-    assert judge(RIG, {"left": GOOD}, narrow)["left"].name == "implausible"
+    assert _judge({"left": GOOD}, narrow)["left"].name == "implausible"
 
 
 def test_eye_distance() -> None:
@@ -108,31 +170,3 @@ def test_eye_distance() -> None:
     apart_m = eye_distance_m(RIG, {"left": GOOD, "right": moved})
     assert apart_m == pytest.approx(2 * HALF_EYE_DISTANCE_M + 0.002, abs=1e-4)
     assert eye_distance_m(RIG, {"left": GOOD}) is None
-
-
-def test_expected_error_of_one_axis_by_hand() -> None:
-    # An eye 1 mm aside puts a point at 0.5 m, seen against 2 m, off by 3 mm at 2 m.
-    aside = replace(GOOD, covariance_m2=np.diag([0.001, 0.0, 0.0]) ** 2, shift_m=np.zeros(3))
-    arcmin = expected_error_arcmin(RIG.eyes["left"], aside)
-    assert arcmin == pytest.approx(60 * np.degrees(0.003 / 2.0), rel=0.01)
-
-
-def test_expected_error_is_the_spread_of_drawn_pixels() -> None:
-    rng = np.random.default_rng(0)
-    axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    shift = replace(GOOD, covariance_m2=axes @ np.diag([0.0003, 0.001, 0.002]) ** 2 @ axes.T)
-    display = RIG.eyes["right"]
-    corners_m = np.array([[x, y, 0.5, 1.0] for x in (-0.04, 0.04) for y in (-0.04, 0.04)])
-    drawn = rng.multivariate_normal(shift.shift_m, shift.covariance_m2, 4000)
-
-    def pixels(phi: np.ndarray) -> np.ndarray:
-        # UQ by its definition, with φ4 = 1/2.
-        a, b, c = phi
-        UQ = np.array([[1 - c / 2, 0, a / 2, -a], [0, 1 - c / 2, b / 2, -b], [0, 0, 1, -c]])
-        image = corners_m @ (display.K @ display.H0 @ UQ).T
-        return np.asarray(image[:, :2] / image[:, 2:])
-
-    middle_px = pixels(shift.shift_m)
-    squares = [np.sum((pixels(phi) - middle_px) ** 2, axis=1).mean() for phi in drawn]
-    expected = 60 * np.degrees(np.sqrt(np.mean(squares)) / display.K[0, 0])
-    assert expected_error_arcmin(display, shift) == pytest.approx(expected, rel=0.04)

@@ -11,7 +11,13 @@ from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
-_ROLES = {"accept": "good", "repeat": "warning", "implausible": "red"}
+_ROLES = {
+    "accept": "good",
+    "repeat": "warning",
+    "keep": "warning",
+    "implausible": "red",
+    "contradicted": "red",
+}
 _REASON_LINES = 4
 
 

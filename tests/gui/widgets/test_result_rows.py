@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.register.verdict import expected_error_arcmin
 from handcal.types import EYES, Alignment, EyeShift, Rig
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (

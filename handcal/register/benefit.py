@@ -1,0 +1,138 @@
+"""The benefit of a calibration: the error expected without it and with it.
+
+The error of an eye is the mean distance, in arcminutes, between the corners of the user test's
+target as they are drawn and as they should be, at its three distances. Around the offline
+calibration it is linear in φ: with the Jacobian J of the drawn corners, drawing with φ for an eye
+at φ' errs by J (φ - φ') at each corner. Its expectation over a Gaussian has no closed form, so it
+is averaged over a fixed set of samples: equal input gives equal output.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+
+import numpy as np
+from scipy.stats import qmc
+
+from handcal.display import (
+    TARGET_DEPTHS_M,
+    arcmin_from_px,
+    eye_projection,
+    target_corners_m,
+)
+from handcal.geometry import project
+from handcal.types import EyeDisplay, EyeShift, Float64
+
+_SAMPLES_LOG2 = 9
+_STEP_M = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Benefit:
+    """The error of one eye without the calibration and with it."""
+
+    before_arcmin: float
+    """Expected with the offline calibration, before anything is known of the wearer."""
+    without_arcmin: float
+    """Expected with the offline calibration, from what the alignments say of the wearer."""
+    after_arcmin: float
+    """Expected with the solved φ."""
+    probability_better: float
+    """Probability that the solved φ errs less than the offline calibration."""
+
+
+def expected_arcmin(display: EyeDisplay, mean_m: Float64, covariance_m2: Float64) -> float:
+    """Return the expected error of drawing with φ = 0 for an eye at a Gaussian φ, arcmin."""
+    return float(_errors_arcmin(display, _samples(mean_m, covariance_m2)).mean())
+
+
+def expected_error_arcmin(display: EyeDisplay, shift: EyeShift) -> float:
+    """Return the expected error of drawing with a solved φ, from its covariance, arcmin."""
+    return expected_arcmin(display, np.zeros(3), shift.covariance_m2)
+
+
+def benefit(
+    display: EyeDisplay,
+    prior_mean_m: Float64,
+    prior_covariance_m2: Float64,
+    shift_m: Float64,
+    covariance_m2: Float64,
+) -> Benefit:
+    """Return the benefit of drawing with φ instead of the offline calibration.
+
+    Parameters
+    ----------
+    display : EyeDisplay
+    prior_mean_m, prior_covariance_m2 : (3,), (3, 3) float64
+        φ of the eye before the alignments.
+    shift_m, covariance_m2 : (3,), (3, 3) float64
+        φ of the eye after the alignments; the former is drawn with.
+    """
+    eyes_m = _samples(shift_m, covariance_m2)
+    after = _errors_arcmin(display, eyes_m - shift_m)
+    without = _errors_arcmin(display, eyes_m)
+    return Benefit(
+        before_arcmin=expected_arcmin(display, prior_mean_m, prior_covariance_m2),
+        without_arcmin=float(without.mean()),
+        after_arcmin=float(after.mean()),
+        probability_better=float((after < without).mean()),
+    )
+
+
+def foreseen_benefits(
+    display: EyeDisplay, shift_m: Float64, covariance_m2: Float64, later_m2: Sequence[Float64]
+) -> list[tuple[float, float]]:
+    """Return the errors to expect after further alignments, with the probabilities of a benefit.
+
+    Parameters
+    ----------
+    display : EyeDisplay
+    shift_m, covariance_m2 : (3,), (3, 3) float64
+        φ of the eye as it is known now.
+    later_m2 : sequence of (3, 3) float64
+        Covariances of φ then; the later φ is taken to err by it around the true one.
+    """
+    without = _errors_arcmin(display, _samples(shift_m, covariance_m2))
+    # Which of the later errors goes with which eye does not matter, as long as it is no pattern.
+    order = np.random.default_rng(0).permutation(len(without))
+    found = []
+    for one_m2 in later_m2:
+        after = _errors_arcmin(display, _samples(np.zeros(3), one_m2))[order]
+        found.append((float(after.mean()), float((after < without).mean())))
+    return found
+
+
+def _samples(mean_m: Float64, covariance_m2: Float64) -> Float64:
+    """Return samples (N, 3) of a Gaussian; the covariance may be singular."""
+    values, axes = np.linalg.eigh(covariance_m2)
+    root = axes * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(mean_m + _standard_normal() @ root.T)
+
+
+@cache
+def _standard_normal() -> Float64:
+    draw = qmc.MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0))
+    half = draw.random(2**_SAMPLES_LOG2)
+    samples = np.concatenate([half, -half])
+    samples.flags.writeable = False
+    return np.asarray(samples)
+
+
+def _errors_arcmin(display: EyeDisplay, difference_m: Float64) -> Float64:
+    """Return the mean error over the corners (N,) for differences of φ (N, 3)."""
+    x_px, y_px = np.tensordot(_jacobian(display), difference_m.T, axes=1).transpose(1, 0, 2)
+    return np.asarray(arcmin_from_px(display, np.hypot(x_px, y_px).mean(axis=0)))
+
+
+@lru_cache(maxsize=16)
+def _jacobian(display: EyeDisplay) -> Float64:
+    """Return the derivative (12, 2, 3) of the drawn corners with respect to φ, px/m."""
+    corners_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
+
+    def drawn_px(shift_m: Float64) -> Float64:
+        return project(eye_projection(display, shift_m), corners_m)
+
+    steps_m = _STEP_M * np.eye(3)
+    return np.stack([drawn_px(s) - drawn_px(-s) for s in steps_m], axis=-1) / (2.0 * _STEP_M)

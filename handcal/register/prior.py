@@ -1,0 +1,144 @@
+"""The prior on where a wearer's eyes are, as default and as learned from earlier sessions.
+
+[φ_left; φ_right] is Gaussian. By default its mean is zero, each φ lies in the eye box, and the two
+eyes differ little. A lab's finished sessions with one rig tell more: how far its headset sits from
+the viewpoint on average, and how much wearers differ. Mean and covariance are estimated by
+expectation maximisation, as every session measures φ with an error of its own, and a single
+alignment with both eyes open measures three of the six numbers. The default prior takes part as
+if it were `_DEFAULT_WEIGHT` sessions (an inverse Wishart prior of the covariance), so that few
+sessions change little (empirical Bayes: Efron & Morris 1975; Dempster, Laird & Rubin 1977).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from handcal.types import Float64
+
+MIN_SESSIONS = 10
+"""Fewer sessions than this do not make a prior."""
+# H (3, 6), the displacement seen (3,), and its covariance (3, 3).
+Observed: TypeAlias = tuple[Float64, Float64, Float64]
+
+_DEFAULT_WEIGHT = 4.0
+_MEAN_WEIGHT = 2.0
+_ITERATIONS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedPrior:
+    """Mean and covariance of [φ_left; φ_right] among the wearers of one rig."""
+
+    mean_m: tuple[float, ...]
+    """(6,)."""
+    covariance_m2: tuple[float, ...]
+    """(36,); row by row."""
+    sessions: int
+    """Number of sessions it was learned from."""
+
+    def __post_init__(self) -> None:
+        if len(self.mean_m) != 6 or len(self.covariance_m2) != 36:
+            raise ValueError("a prior has a mean of 6 numbers and a covariance of 36")
+        covariance = np.reshape(self.covariance_m2, (6, 6))
+        is_symmetric = np.allclose(covariance, covariance.T, rtol=1e-6, atol=1e-12)
+        if not is_symmetric or np.linalg.eigvalsh(covariance)[0] <= 0.0:
+            raise ValueError("the prior's covariance is not symmetric and positive definite")
+
+
+@dataclass(frozen=True, slots=True)
+class PriorSettings:
+    """The prior on φ of both eyes."""
+
+    eye_box_sigma_m: float = 0.004
+    """Standard deviation of each component of φ where nothing is known about the wearers."""
+    eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
+    """Standard deviation of the right φ minus the left. x is the difference of the wearer's eye
+    distance from the rig's: 2 mm if the headset is adjusted to the wearer; 3.6 mm among adults
+    (Gordon et al. 2014, ANSUR II)."""
+    learned: LearnedPrior | None = None
+    """Used instead, if there is one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyePrior:
+    """The prior on [φ_left; φ_right], Gaussian."""
+
+    mean_m: Float64
+    """(6,)."""
+    covariance_m2: Float64
+    """(6, 6)."""
+    sessions: int = 0
+    """Number of sessions it was learned from; 0 for the default."""
+
+
+def eye_prior(settings: PriorSettings = PriorSettings()) -> EyePrior:
+    """Return the learned prior of the settings, or else the default one."""
+    learned = settings.learned
+    if learned is not None:
+        covariance_m2 = np.reshape(learned.covariance_m2, (6, 6))
+        return EyePrior(np.array(learned.mean_m), covariance_m2, learned.sessions)
+    information = np.kron(np.eye(2), np.eye(3) / settings.eye_box_sigma_m**2)
+    apart = np.diag(1.0 / np.square(settings.eye_difference_sigma_m))
+    information += np.kron([[1.0, -1.0], [-1.0, 1.0]], apart)
+    return EyePrior(np.zeros(6), np.asarray(np.linalg.inv(information)))
+
+
+def posterior(prior: EyePrior, observed: Sequence[Observed]) -> tuple[Float64, Float64]:
+    """Return the mean (6,) and covariance (6, 6) of [φ_left; φ_right] after observations."""
+    information, state = _information(observed)
+    known = np.linalg.inv(prior.covariance_m2)
+    covariance_m2 = np.asarray(np.linalg.inv(known + information))
+    return covariance_m2 @ (known @ prior.mean_m + state), covariance_m2
+
+
+def _information(observed: Sequence[Observed]) -> tuple[Float64, Float64]:
+    """Return the information matrix (6, 6) and vector (6,) of observations."""
+    information, state = np.zeros((6, 6)), np.zeros(6)
+    for H, seen_m, covariance_m2 in observed:
+        weighted = np.linalg.solve(covariance_m2, H).T
+        information += weighted @ H
+        state += weighted @ seen_m
+    return information, state
+
+
+def learn_prior(
+    sessions: Sequence[Sequence[Observed]], settings: PriorSettings = PriorSettings()
+) -> LearnedPrior | None:
+    """Learn the prior from the observations of earlier sessions, each of another wearer.
+
+    Parameters
+    ----------
+    sessions : sequence of sequence of (H, seen, covariance)
+        The observations of each session's alignments, as in `Fused.observed`.
+    settings : PriorSettings
+        Of the default prior, which takes part as a few sessions.
+
+    Returns
+    -------
+    LearnedPrior or None
+        None for fewer than `MIN_SESSIONS` sessions.
+    """
+    if len(sessions) < MIN_SESSIONS:
+        return None
+    default = eye_prior(PriorSettings(settings.eye_box_sigma_m, settings.eye_difference_sigma_m))
+    known = [_information(observed) for observed in sessions]
+    information, state = (np.array(parts) for parts in zip(*known, strict=True))
+    count = len(sessions)
+    mean_m, covariance_m2 = default.mean_m, default.covariance_m2
+    for _ in range(_ITERATIONS):
+        common = np.linalg.inv(covariance_m2)
+        each_m2 = np.linalg.inv(common + information)
+        each_m = np.einsum("nij,nj->ni", each_m2, common @ mean_m + state)
+        mean_m = each_m.sum(axis=0) / (count + _MEAN_WEIGHT)
+        apart_m = each_m - mean_m
+        scatter_m2 = each_m2.sum(axis=0) + apart_m.T @ apart_m
+        scatter_m2 += _MEAN_WEIGHT * np.outer(mean_m, mean_m)
+        covariance_m2 = (_DEFAULT_WEIGHT * default.covariance_m2 + scatter_m2) / (
+            _DEFAULT_WEIGHT + count
+        )
+    symmetric = 0.5 * (covariance_m2 + covariance_m2.T)
+    return LearnedPrior(tuple(mean_m.tolist()), tuple(symmetric.ravel().tolist()), count)

@@ -1,0 +1,159 @@
+"""The prior on where wearers' eyes are, learned from a lab's finished sessions with one rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handcal.errors import FileError
+from handcal.progress import Progress
+from handcal.register.prior import LearnedPrior, Observed, PriorSettings, learn_prior
+from handcal.rig.rig_file import read_rig
+from handcal.session.journal import Event, read_journal
+from handcal.session.state import SessionEvent
+from handcal.types import EYES, Float64, Rig
+
+MAX_SESSIONS = 300
+"""Only the newest sessions count: a headset's fit and a lab's wearers change."""
+_MAX_OBSERVATIONS = 100
+_OBSERVED_SHAPES = {"H": (3, 6), "seen_m": (3,), "covariance_m2": (3, 3)}
+
+
+@dataclass(frozen=True, slots=True)
+class LabPrior:
+    """A prior learned from the sessions in a folder."""
+
+    learned: LearnedPrior | None
+    """None if there are too few sessions."""
+    used: int
+    """Number of sessions it was, or would be, learned from."""
+    left_out: Mapping[str, int]
+    """Number of other sessions by the reason why they do not count."""
+
+
+def run_learn_prior(
+    folder: Path, rig: Rig, settings: PriorSettings, progress: Progress = Progress()
+) -> LabPrior:
+    """Learn the prior from the finished sessions in a folder that used one rig.
+
+    A session counts once, with its newest results; a wearer with several sessions counts with the
+    newest only. A session whose result was contradicted or implausible does not count.
+
+    Parameters
+    ----------
+    folder : Path
+        It holds a folder for each session; it may be missing.
+    rig : Rig
+        Its numbers must be those of the session's own rig.
+    settings : PriorSettings
+    progress : Progress
+        Reported to before each session.
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    """
+    journals = sorted(folder.glob("*/journal.jsonl"), key=_modified_s, reverse=True)[:MAX_SESSIONS]
+    sessions: list[list[Observed]] = []
+    left_out: dict[str, int] = {}
+    wearers: set[str] = set()
+    for number, journal in enumerate(journals):
+        progress.at(number / len(journals), f"Reading session {number + 1} of {len(journals)}")
+        try:
+            observed, wearer = _read_session(journal, rig)
+            if wearer and wearer in wearers:
+                raise _NotUsableError("earlier sessions of the same wearer")
+        except _NotUsableError as reason:
+            left_out[str(reason)] = left_out.get(str(reason), 0) + 1
+            continue
+        wearers.add(wearer)
+        sessions.append(observed)
+    return LabPrior(learn_prior(sessions, settings), len(sessions), left_out)
+
+
+class _NotUsableError(Exception):
+    """A session that does not count; the text says why."""
+
+
+def _modified_s(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _read_session(journal: Path, rig: Rig) -> tuple[list[Observed], str]:
+    """Return the observations of a session and its wearer."""
+    try:
+        events = read_journal(journal).events
+        is_same_rig = _numbers(read_rig(journal.with_name("rig.yaml"))) == _numbers(rig)
+    except FileError:
+        raise _NotUsableError("not readable") from None
+    if not is_same_rig:
+        raise _NotUsableError("of another rig")
+    if not events or events[-1].name != SessionEvent.FINISHED:
+        raise _NotUsableError("not finished")
+    results = _newest_results(events)
+    if results is None:
+        raise _NotUsableError("not solved")
+    eyes = results.get("eyes")
+    verdicts = [one.get("verdict") for one in eyes.values()] if isinstance(eyes, dict) else []
+    if "contradicted" in verdicts or "implausible" in verdicts:
+        raise _NotUsableError("contradicted or implausible")
+    wearer = events[0].data.get("wearer", "")
+    return _observations(results.get("observed")), wearer if isinstance(wearer, str) else ""
+
+
+def _numbers(rig: Rig) -> list[list[float]]:
+    """Return the numbers of a rig that an eye shift depends on."""
+    arrays: list[Float64] = [rig.T_H_D]
+    for eye in EYES:
+        display = rig.eyes[eye]
+        arrays += [display.K, display.H0, display.t_C0_V_m, display.T_V_H]
+        arrays.append(np.array([display.z_C0_S_m]))
+    return [np.round(array, 9).ravel().tolist() for array in arrays]
+
+
+def _newest_results(events: tuple[Event, ...]) -> dict[str, Any] | None:
+    """Return the results of all alignments at the end of the session, if there are any."""
+    results: dict[str, Any] | None = None
+    for event in events:
+        if event.name == SessionEvent.SOLVED:
+            results = event.data
+        elif event.name in _CHANGE_ALIGNMENTS:
+            results = None
+    return results
+
+
+_CHANGE_ALIGNMENTS = {
+    SessionEvent.ALIGNMENT_SAVED,
+    SessionEvent.ALIGNMENT_DELETED,
+    SessionEvent.ALIGNMENT_RESTORED,
+}
+
+
+def _observations(stored: object) -> list[Observed]:
+    """Return observations from JSON; `_NotUsableError` if they are missing or damaged."""
+    if not isinstance(stored, list) or not 0 < len(stored) <= _MAX_OBSERVATIONS:
+        raise _NotUsableError("solved by an older version")
+    try:
+        observed = [
+            tuple(np.array(one[name], dtype=np.float64) for name in _OBSERVED_SHAPES)
+            for one in stored
+        ]
+    except (KeyError, TypeError, ValueError):
+        raise _NotUsableError("not readable") from None
+    for H, seen_m, covariance_m2 in observed:
+        shapes = tuple(part.shape for part in (H, seen_m, covariance_m2))
+        if (
+            shapes != tuple(_OBSERVED_SHAPES.values())
+            or not all(np.isfinite(part).all() for part in (H, seen_m, covariance_m2))
+            or np.linalg.eigvalsh(covariance_m2)[0] <= 0.0
+        ):
+            raise _NotUsableError("not readable")
+    return [(H, seen_m, covariance_m2) for H, seen_m, covariance_m2 in observed]

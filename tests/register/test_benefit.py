@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handcal.display import reprojection_arcmin
+from handcal.register.benefit import benefit, expected_arcmin, foreseen_benefits
+from handcal.rig.example import example_rig
+from handcal.types import EYES, Eye, Float64
+
+RIG = example_rig()
+DISPLAY = RIG.eyes["left"]
+PRIOR_M2 = 0.004**2 * np.eye(3)
+
+
+def _covariance(rng: np.random.Generator, size_m: float) -> Float64:
+    root = size_m * rng.normal(size=(3, 3))
+    return np.asarray(root @ root.T)
+
+
+def test_without_uncertainty_it_is_the_reprojection_error() -> None:
+    shift_m = np.array([0.002, -0.001, 0.003])
+    true_m: dict[Eye, Float64] = dict.fromkeys(EYES, shift_m)
+    offline: dict[Eye, Float64] = dict.fromkeys(EYES, np.zeros(3))
+    exact_arcmin = reprojection_arcmin(RIG, offline, true_m)
+    expected = np.mean([expected_arcmin(RIG.eyes[eye], shift_m, np.zeros((3, 3))) for eye in EYES])
+    assert expected == pytest.approx(exact_arcmin, rel=0.02)
+
+
+def test_the_expectations_are_those_of_many_simulated_eyes() -> None:
+    rng = np.random.default_rng(1)
+    shift_m, covariance_m2 = np.array([0.003, -0.001, 0.002]), _covariance(rng, 0.001)
+    found = benefit(DISPLAY, np.zeros(3), PRIOR_M2, shift_m, covariance_m2)
+    zero = np.zeros((3, 3))
+    eyes_m = rng.multivariate_normal(shift_m, covariance_m2, 1500)
+    after = np.array([expected_arcmin(DISPLAY, eye - shift_m, zero) for eye in eyes_m])
+    without = np.array([expected_arcmin(DISPLAY, eye, zero) for eye in eyes_m])
+    assert found.after_arcmin == pytest.approx(after.mean(), rel=0.05)
+    assert found.without_arcmin == pytest.approx(without.mean(), rel=0.05)
+    assert found.probability_better == pytest.approx((after < without).mean(), abs=0.03)
+    assert found.before_arcmin == pytest.approx(
+        expected_arcmin(DISPLAY, np.zeros(3), PRIOR_M2), rel=1e-9
+    )
+
+
+@given(seed=st.integers(0, 10_000), size_mm=st.floats(0.1, 5.0))
+def test_more_uncertainty_means_more_error_and_less_certain_benefit(
+    seed: int, size_mm: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    shift_m, covariance_m2 = rng.normal(0.0, 0.003, 3), _covariance(rng, 1e-3 * size_mm)
+    less, more = (
+        benefit(DISPLAY, np.zeros(3), PRIOR_M2, shift_m, factor * covariance_m2)
+        for factor in (1.0, 4.0)
+    )
+    assert more.after_arcmin == pytest.approx(2.0 * less.after_arcmin, rel=0.01)
+    assert more.probability_better <= less.probability_better + 0.05
+    assert 0.0 <= more.probability_better <= 1.0
+
+
+def test_a_known_eye_gains_all_and_an_unmoved_one_nothing() -> None:
+    tiny_m2 = 1e-12 * np.eye(3)
+    moved = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.004, 0.0, 0.0]), tiny_m2)
+    assert moved.probability_better == 1.0
+    assert moved.after_arcmin < 0.01
+    unmoved = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.zeros(3), PRIOR_M2)
+    assert unmoved.probability_better == 0.0
+    assert unmoved.after_arcmin == unmoved.without_arcmin == unmoved.before_arcmin
+
+
+def test_more_alignments_are_foreseen_to_help() -> None:
+    shift_m = np.array([0.003, 0.001, 0.0])
+    now_m2 = 0.0015**2 * np.eye(3)
+    later_m2 = [now_m2 / count for count in (1, 2, 4, 8)]
+    foreseen = foreseen_benefits(DISPLAY, shift_m, now_m2, later_m2)
+    arcmin, probability = zip(*foreseen, strict=True)
+    assert list(arcmin) == sorted(arcmin, reverse=True)
+    assert list(probability) == sorted(probability)
+    assert foreseen_benefits(DISPLAY, shift_m, now_m2, later_m2) == foreseen
+
+
+def test_expected_error_of_one_axis_by_hand() -> None:
+    # An eye 1 mm aside puts a point at z, seen against 2 m, off by (2 m - z) / z mm at 2 m.
+    at_2_m = np.mean([(2.0 - z) / z for z in (0.4, 0.5, 0.6)])
+    by_hand = 60 * np.degrees(1e-3 * at_2_m / 2.0) * np.sqrt(2 / np.pi)
+    found = expected_arcmin(DISPLAY, np.zeros(3), np.diag([0.001, 0.0, 0.0]) ** 2)
+    assert found == pytest.approx(by_hand, rel=0.02)

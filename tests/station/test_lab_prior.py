@@ -1,0 +1,105 @@
+"""The prior learned from a lab's sessions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.progress import Progress
+from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
+from handcal.register.results import SolveSettings, results_json, solve_session
+from handcal.rig.example import example_rig
+from handcal.session.session import Session
+from handcal.station.lab_prior import run_learn_prior
+from handcal.types import Alignment, Rig
+
+RIG = example_rig()
+SETTINGS = PriorSettings()
+
+
+@pytest.fixture(scope="module")
+def alignment(simulated: Callable[..., Alignment]) -> Alignment:
+    return simulated(1)
+
+
+def _session(
+    folder: Path,
+    name: str,
+    alignment: Alignment,
+    *,
+    rig: Rig = RIG,
+    wearer: str = "",
+    contradictions: tuple[str, ...] = (),
+    is_finished: bool = True,
+) -> None:
+    results = solve_session([alignment], RIG, SolveSettings(), contradictions=contradictions)
+    with Session.create(folder, rig, {}, name, wearer) as session:
+        session.save_alignment(alignment)
+        session.save_results(json.loads(json.dumps(results_json(results))))
+        if is_finished:
+            session.finish()
+
+
+def test_a_lab_without_sessions_has_no_prior(tmp_path: Path) -> None:
+    found = run_learn_prior(tmp_path / "missing", RIG, SETTINGS)
+    assert (found.learned, found.used, dict(found.left_out)) == (None, 0, {})
+
+
+def test_only_sound_finished_sessions_of_the_same_rig_count(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    moved = replace(RIG, T_H_D=RIG.T_H_D @ np.diag([1.0, -1.0, -1.0, 1.0]))
+    _session(tmp_path, "good", alignment)
+    _session(tmp_path, "twice", alignment, wearer="P01")
+    _session(tmp_path, "twice again", alignment, wearer="P01")
+    _session(tmp_path, "contradicted", alignment, contradictions=("the picture froze",))
+    _session(tmp_path, "another rig", alignment, rig=moved)
+    _session(tmp_path, "interrupted", alignment, is_finished=False)
+    with Session.create(tmp_path, RIG, {}, "empty") as session:
+        session.finish()
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "journal.jsonl").write_text("nonsense\n")
+    found = run_learn_prior(tmp_path, RIG, SETTINGS)
+    assert found.used == 2
+    assert found.learned is None
+    assert dict(found.left_out) == {
+        "earlier sessions of the same wearer": 1,
+        "contradicted or implausible": 1,
+        "of another rig": 1,
+        "not finished": 1,
+        "not solved": 1,
+        "not readable": 1,
+    }
+
+
+def test_enough_sessions_make_a_prior(tmp_path: Path, alignment: Alignment) -> None:
+    seen: list[str] = []
+    for number in range(MIN_SESSIONS):
+        _session(tmp_path, f"{number}", alignment, wearer=f"P{number}")
+    progress = Progress(lambda what, _share: seen.append(what))
+    found = run_learn_prior(tmp_path, RIG, SETTINGS, progress)
+    assert found.learned is not None
+    assert found.learned.sessions == found.used == MIN_SESSIONS
+    assert seen[0] == f"Reading session 1 of {MIN_SESSIONS}"
+    # All wearers here have the same eyes: the lab knows better than the default where they are.
+    lab, default = eye_prior(PriorSettings(learned=found.learned)), eye_prior(SETTINGS)
+    assert np.trace(lab.covariance_m2) < 0.7 * np.trace(default.covariance_m2)
+
+
+def test_results_without_observations_do_not_count(tmp_path: Path, alignment: Alignment) -> None:
+    with Session.create(tmp_path, RIG, {}, "old") as session:
+        session.save_alignment(alignment)
+        session.save_results({"version": 1, "eyes": {}})
+        session.finish()
+    with Session.create(tmp_path, RIG, {}, "damaged") as session:
+        session.save_alignment(alignment)
+        observed = {"H": np.eye(3).tolist(), "seen_m": [0.0] * 3, "covariance_m2": [[1.0]]}
+        session.save_results({"version": 2, "eyes": {}, "observed": [observed]})
+        session.finish()
+    found = run_learn_prior(tmp_path, RIG, SETTINGS)
+    assert dict(found.left_out) == {"solved by an older version": 1, "not readable": 1}
