@@ -260,6 +260,12 @@ class Alignment:
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
     """each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration."""
+    shape_change_m: float | None = None
+    """Change of the hand's shape from the cursor to t_b, rms, measured by the guard; None if it was
+    not."""
+    cursor_movement_m: float | None = None
+    hand_movement_m: float | None = None
+    """Movement of the hand during the frames from which each cloud was made; None if unknown."""
 
     __repr__ = brief
 

@@ -103,7 +103,7 @@ def match_hands(
         tree=cKDTree(cursor_m),
         rigid=fine,
         covariance=motion_covariance(hand, cursor, T_cursor_hand, _FINE),
-        shape=measure_shape_change(hand, cursor, T_cursor_hand, _COARSE),
+        shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE),
     )
 
 

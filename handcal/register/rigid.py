@@ -29,6 +29,8 @@ _PATCH_M = 0.015
 # Unknown place of a patch of outline, in distances between the points of both clouds: the outline
 # is known no better than it is sampled, and edges grow fat.
 _OUTLINE_GAPS = 0.5
+# Lower bound of each variance, so that exact clouds have one: 10 µm, and 10 µrad.
+_EXACT_M2 = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +194,7 @@ def motion_covariance(
     unknown_m = _OUTLINE_GAPS * float(np.median(apart_m))
     meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores.T @ scores
     meat += unknown_m**2 * outlines.T @ outlines
-    return np.asarray(inverse @ meat @ inverse)
+    return np.asarray(inverse @ meat @ inverse + _EXACT_M2 * np.eye(6))
 
 
 def _step(

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from handcal.geometry import invert, transform
 from handcal.register.rcicp import best_rigid
-from handcal.register.rigid import PAIRING_FACTOR, RigidSettings, registration_rows
+from handcal.register.rigid import RigidSettings, registration_rows
 from handcal.register.surface import Surface, cover, nearest
 from handcal.types import Float64, brief, freeze
 
@@ -27,6 +27,13 @@ _NODES_PER_POINT = 4
 # Weight of the prior that neighbouring nodes move alike, against the pairs of one node.
 _STIFFNESS = 0.1
 _STEPS = 3
+# Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
+# to simulated clouds (2.4 to 6.5).
+_NOISE_FACTOR = 4.5
+# Nodes as near as this to the one that moved most are told of together.
+_REGION_M = 0.035
+# A spread thumb reaches less far than this share of the fingers' reach.
+_THUMB_REACH = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +44,8 @@ class ShapeChange:
     """(K, 3); places spread over the cursor."""
     moved_m: Float64
     """(K, 3); how each moved relative to the whole hand, along the cursor's axes."""
+    toward_arm: Float64
+    """(3,); from the cursor's middle to its cut forearm; zero if none is cut."""
     noise_m: float
     """Root mean square that `moved_m` has without a change of shape."""
 
@@ -45,6 +54,7 @@ class ShapeChange:
     def __post_init__(self) -> None:
         freeze(self, "nodes_m", np.float64, None, 3)
         freeze(self, "moved_m", np.float64, None, 3)
+        freeze(self, "toward_arm", np.float64, 3)
 
     @property
     def rms_m(self) -> float:
@@ -100,14 +110,71 @@ def measure_shape_change(
         wanted = np.asarray(weighted @ (A @ moved.ravel() - rows.gap_m))
         moved = np.asarray(np.linalg.solve(normal, wanted).reshape(-1, 3), np.float64)
     left_m = A @ (moved - before).ravel() + rows.gap_m
-    variance_m2 = PAIRING_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
+    variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
     scatter = np.linalg.solve(normal, np.linalg.solve(normal, (weighted @ A).toarray()).T)
+    cut_m = points[cursor.near_cut]
     T_moved = best_rigid(nodes, nodes + moved)
     return ShapeChange(
         nodes_m=nodes,
         moved_m=transform(invert(T_moved), nodes + moved) - nodes,
+        toward_arm=(cut_m.mean(axis=0) if len(cut_m) else points.mean(axis=0))
+        - points.mean(axis=0),
         noise_m=float(np.sqrt(variance_m2 * np.trace(scatter) / count)),
     )
+
+
+def change_text(change: ShapeChange, R_D: Float64) -> str:
+    """Say in a few words where the hand's shape differs most, without a full stop.
+
+    Parts of the hand are told by their place in its outline alone, so "fingers" are not numbered,
+    and a folded thumb is not told from the palm.
+
+    Parameters
+    ----------
+    change : ShapeChange
+    R_D : (3, 3) float64
+        From the frame of the change to the depth camera's axes.
+    """
+    places = (change.nodes_m - change.nodes_m.mean(axis=0)) @ R_D.T
+    moved_m = change.moved_m @ R_D.T
+    up = -(R_D @ change.toward_arm)[:2]
+    up = up / np.linalg.norm(up) if np.linalg.norm(up) > 1e-9 else np.array([0.0, -1.0])
+    right = np.array([-up[1], up[0]])
+    across, along = places[:, :2] @ right, places[:, :2] @ up
+    size_m = np.linalg.norm(moved_m, axis=1)
+    worst = int(np.argmax(size_m))
+    near = np.linalg.norm(places - places[worst], axis=1) < _REGION_M
+    region = near & (size_m > 0.5 * size_m[worst])
+    part = _part(across, along, float(across[region].mean()), float(along[region].mean()))
+    side = np.sign(across[region].mean())
+    move = moved_m[region].mean(axis=0)
+    outward, upward = side * float(move[:2] @ right), float(move[:2] @ up)
+    ways = {
+        "further out": outward,
+        "further in": -outward,
+        "stretched further": upward,
+        "bent further": -upward,
+        "farther from you": float(move[2]),
+        "nearer to you": -float(move[2]),
+    }
+    way = max(ways, key=lambda name: ways[name])
+    return f"{part} {1e3 * size_m[region].mean():.0f} mm {way} than in the cursor"
+
+
+def _part(across: Float64, along: Float64, at_across: float, at_along: float) -> str:
+    """Name the part of the hand at a place, from the places of all nodes."""
+    reach = float(along.max())
+    sides = -float(across.min()), float(across.max())
+    thumb_sign = 1.0 if sides[1] > sides[0] else -1.0
+    tip = int(np.argmax(thumb_sign * across))
+    is_low = at_along < _THUMB_REACH * reach and along[tip] < _THUMB_REACH * reach
+    if is_low and thumb_sign * at_across > 0.5 * max(sides):
+        return "thumb"
+    if at_along > 0.35 * reach:
+        if abs(at_across) < 0.25 * max(sides):
+            return "middle fingers"
+        return "fingers on the right" if at_across > 0.0 else "fingers on the left"
+    return "wrist" if at_along < 0.6 * float(along.min()) else "palm"
 
 
 def _laplacian(nodes_m: Float64, tree: cKDTree) -> Float64:
