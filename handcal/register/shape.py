@@ -145,8 +145,8 @@ def change_text(change: ShapeChange, R_D: Float64) -> str:
     worst = int(np.argmax(size_m))
     near = np.linalg.norm(places - places[worst], axis=1) < _REGION_M
     region = near & (size_m > 0.5 * size_m[worst])
-    part = _part(across, along, float(across[region].mean()), float(along[region].mean()))
-    side = np.sign(across[region].mean())
+    part = _part(across, along, float(across[worst]), float(along[worst]))
+    side = np.sign(across[worst])
     move = moved_m[region].mean(axis=0)
     outward, upward = side * float(move[:2] @ right), float(move[:2] @ up)
     ways = {
@@ -164,14 +164,14 @@ def change_text(change: ShapeChange, R_D: Float64) -> str:
 def _part(across: Float64, along: Float64, at_across: float, at_along: float) -> str:
     """Name the part of the hand at a place, from the places of all nodes."""
     reach = float(along.max())
-    sides = -float(across.min()), float(across.max())
-    thumb_sign = 1.0 if sides[1] > sides[0] else -1.0
-    tip = int(np.argmax(thumb_sign * across))
-    is_low = at_along < _THUMB_REACH * reach and along[tip] < _THUMB_REACH * reach
-    if is_low and thumb_sign * at_across > 0.5 * max(sides):
+    wide = float(np.abs(across).max())
+    left, right = int(np.argmin(across)), int(np.argmax(across))
+    thumb = right if along[right] < along[left] else left
+    is_low = max(at_along, float(along[thumb])) < _THUMB_REACH * reach
+    if is_low and at_across * np.sign(across[thumb]) > 0.5 * wide:
         return "thumb"
     if at_along > 0.35 * reach:
-        if abs(at_across) < 0.25 * max(sides):
+        if abs(at_across) < 0.25 * wide:
             return "middle fingers"
         return "fingers on the right" if at_across > 0.0 else "fingers on the left"
     return "wrist" if at_along < 0.6 * float(along.min()) else "palm"

@@ -112,6 +112,8 @@ class Observation:
     second."""
     shape_text: str = ""
     """What changed most, in words."""
+    has_changed: bool = False
+    """True if that change exceeds the guard's limit."""
     is_over_limit: bool = False
     """True if the rotation or the change of shape exceeds the guard's limit."""
     segment_ms: float | None = None
@@ -533,6 +535,7 @@ class Calibration:
             rotation_rad=R_D_W @ rotation_W,
             shape_change_m=None if shape is None else shape.rms_m,
             shape_text="" if shape is None else change_text(shape, R_D_W),
+            has_changed=self._has_changed(shape),
             is_over_limit=is_over_limit,
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
