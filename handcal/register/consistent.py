@@ -1,4 +1,4 @@
-"""The default solver: register the hand rigidly to get pairs, then fit φ to the pairs.
+"""The default solver: register the hand rigidly, then fit φ to the registered pairs.
 
 A rotation of the hand between the two moments is a nuisance parameter of the hand, not of the eye.
 So is a change of its apparent size: bones do not grow, and the prior says so, but exact pairs may
@@ -11,15 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from handcal.display import update_matrix
 from handcal.geometry import transform
-from handcal.register.model import design
+from handcal.register.cut import common_cut
+from handcal.register.model import balance, design
 from handcal.register.rcicp import best_rotation
-from handcal.register.rigid import RigidResult, RigidSettings, register_rigid
+from handcal.register.rigid import RigidResult, RigidSettings, motion_covariance, register_rigid
+from handcal.register.shape import ShapeChange, measure_shape_change
 from handcal.register.surface import describe_surface, near_cut_edge, nearest
 from handcal.types import Bool, EyeShift, Float64
 
+# First a coarse registration, to cut both clouds alike, then a fine one.
+_COARSE = RigidSettings()
+_FINE = RigidSettings(max_points=4000, max_interior=1000)
 # Standard deviation of the hand's apparent change of size between cursor and alignment.
 _SIZE_SIGMA = 3e-4
 # Effective number of independent pairs: neighbours share the sensor's error.
@@ -29,12 +35,17 @@ _OUTLIER_MEDIANS = 3.0
 # Pairs are searched again while that lowers their mean square by more than this: once on measured
 # clouds, on exact ones until every point has found its counterpart.
 _GAIN = 0.01
-# The registration's residuals are not independent; fitted to 200 simulated alignments.
-_REGISTRATION_FACTOR = 4.5
+# Clouds of which this share is paired one to one hold the same points, as simulated ones may. Other
+# points measure nothing along the surface: pairing them would draw two clouds of one pixel grid
+# together by up to a pixel.
+_SAME_POINTS = 0.97
+# An error of φ, over the measured change of shape: which part of a bent hand is the hand, nobody
+# can tell. Fitted to pairs of frames of color_aligned_640.
+_SHAPE_SHARE = 1.4
 # Lower bound of a registration's error, whatever its residuals say, and the share of the hand's
 # movement by a rotation that becomes an error in every direction.
 _LEAST_SIGMA_M = 5e-5
-_TURNED_SHARE = 0.02
+_TURNED_SHARE = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,16 +53,23 @@ class HandMatch:
     """Cursor and hand registered rigidly; the same for both eyes."""
 
     cursor_m: Float64
+    """(M, 3); without what lies beyond the common cut."""
     hand_m: Float64
     """(N, 3); both clouds in one frame."""
     cursor_near_cut: Bool
-    """(N,)."""
+    """(M,)."""
+    hand_is_common: Bool
+    """(N,); False beyond the common cut."""
     spacing_m: float
     """Distance between neighbours in the thinned cursor."""
     tree: cKDTree
     """Surface of the cursor."""
     rigid: RigidResult
     """Its target is the cursor, its source the hand."""
+    covariance: Float64
+    """(6, 6); of `rigid`, see `motion_covariance`."""
+    shape: ShapeChange
+    """From the hand to the cursor."""
 
 
 def match_hands(
@@ -59,18 +77,33 @@ def match_hands(
     hand_m: Float64,
     cursor_cut: Bool | None,
     hand_cut: Bool | None,
-    settings: RigidSettings = RigidSettings(),
 ) -> HandMatch:
     """Register the hand at t_b to the cursor, (M, 3) and (N, 3) float64 in any common frame."""
-    cursor = describe_surface(cursor_m, cursor_cut, settings.max_points)
-    hand = describe_surface(hand_m, hand_cut, settings.max_points)
+    coarse = register_rigid(
+        describe_surface(hand_m, hand_cut, _COARSE.max_points),
+        describe_surface(cursor_m, cursor_cut, _COARSE.max_points),
+        _COARSE,
+    )
+    common, is_common = hand_m, np.ones(len(hand_m), np.bool_)
+    cut = common_cut(cursor_m, hand_m, cursor_cut, hand_cut, coarse.T_target_source)
+    if cut is not None:
+        kept, is_common, cursor_cut, hand_cut = cut
+        cursor_m, cursor_cut = cursor_m[kept], cursor_cut[kept]
+        common, hand_cut = hand_m[is_common], hand_cut[is_common]
+    cursor = describe_surface(cursor_m, cursor_cut, _FINE.max_points)
+    hand = describe_surface(common, hand_cut, _FINE.max_points)
+    fine = register_rigid(hand, cursor, _FINE, coarse.T_target_source)
+    T_cursor_hand = fine.T_target_source
     return HandMatch(
         cursor_m=cursor_m,
         hand_m=hand_m,
         cursor_near_cut=near_cut_edge(cursor_m, cursor_m, cursor_cut, cursor.spacing_m),
+        hand_is_common=is_common,
         spacing_m=cursor.spacing_m,
         tree=cKDTree(cursor_m),
-        rigid=register_rigid(hand, cursor, settings),
+        rigid=fine,
+        covariance=motion_covariance(hand, cursor, T_cursor_hand, _FINE),
+        shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE),
     )
 
 
@@ -94,27 +127,39 @@ def fit_match(
     T_back = np.asarray(np.linalg.inv(T_cursor))
     hand = transform(T_E, match.hand_m)
     cursor = transform(T_cursor, match.cursor_m)
-    shape = hand
-    expected = transform(T_cursor @ match.rigid.T_target_source, match.hand_m)
-    history: list[float] = []
-    while True:
-        gap_m, index = nearest(match.tree, transform(T_back, expected))
-        kept = ~match.cursor_near_cut[index]
+    registered = transform(T_cursor @ match.rigid.T_target_source, match.hand_m)
+    gap_m, index = nearest(match.tree, transform(T_back, registered))
+    kept = match.hand_is_common & ~match.cursor_near_cut[index]
+    kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
+    same_points = len(np.unique(index[kept])) > _SAME_POINTS * np.count_nonzero(kept)
+    history = [float(np.mean(gap_m[kept] ** 2))]
+    inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
+    R, unturned = _unturned(hand[kept], registered[kept])
+    rigid_fit_m, _ = _fit_pairs(unturned, hand[kept], distance_m, history[0] / 3.0)
+    shift_m = balance(unturned, hand[kept], rigid_fit_m, distance_m)
+    aspect_m = shift_m - rigid_fit_m
+    shape, paired = hand, hand[kept]
+    while same_points:
+        fitted = hand[kept]
+        _, partner = _unturned(shape[kept], cursor[index[kept]])
+        fit_m, factor = _fit_pairs(partner, fitted, distance_m, history[-1] / 3.0)
+        shape = transform(update_matrix(fit_m, distance_m), hand) / factor
+        R_next, _ = _unturned(shape[kept], cursor[index[kept]])
+        centre = shape[kept].mean(axis=0)
+        gap_m, index = nearest(match.tree, transform(T_back, centre + (shape - centre) @ R_next.T))
+        kept = match.hand_is_common & ~match.cursor_near_cut[index]
         kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
         error_m2 = float(np.mean(gap_m[kept] ** 2))
-        if history and error_m2 >= (1.0 - _GAIN) * history[-1]:
+        if error_m2 >= (1.0 - _GAIN) * history[-1]:
             break
         history.append(error_m2)
-        inliers, residuals_m, partner = kept, np.where(kept, gap_m, np.nan), cursor[index[kept]]
-        R = best_rotation(_centred(shape[kept]), _centred(partner))
-        unturned = partner.mean(axis=0) + _centred(partner) @ R
-        shift_m, factor = _fit_pairs(unturned, hand[kept], distance_m, error_m2 / 3.0)
-        shape = transform(update_matrix(shift_m, distance_m), hand) / factor
-        centre = shape[kept].mean(axis=0)
-        expected = centre + (shape - centre) @ R.T
+        inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
+        R, unturned, paired = R_next, partner, fitted
+        shift_m, aspect_m = fit_m, np.zeros(3)
     return EyeShift(
         shift_m=shift_m,
-        covariance_m2=_covariance(match, T_E, R, unturned, hand[inliers], distance_m),
+        covariance_m2=_covariance(match, T_E, R, unturned, paired, distance_m)
+        + np.outer(aspect_m, aspect_m),
         rms_m=float(np.sqrt(history[-1])),
         residuals_m=residuals_m,
         inlier_ratio=float(np.mean(inliers)),
@@ -152,20 +197,28 @@ def _covariance(
 ) -> Float64:
     """Return the covariance of φ from the uncertainty of the hand's displacement at its centroid.
 
-    It has two parts: the registration's own, and, if the hand returned rotated by R, the unknown
+    Its parts: the registration's own; if the hand returned rotated by R, the unknown
     centre of that rotation, which may be any point of the hand and moves the centroid by (I - R)
-    times its distance.
+    times its distance; the change of the hand's shape; and a lower bound.
     """
-    rigid_fit = match.rigid
-    scatter = np.linalg.inv(rigid_fit.information)[3:, 3:]
-    registration = _REGISTRATION_FACTOR * rigid_fit.history_m2[-1] * scatter
     R_E = T_E[:3, :3]
-    lever = np.eye(3) - R
+    turned_rad = Rotation.from_matrix(R).as_rotvec()
+    noise_rad2 = R_E @ match.covariance[:3, :3] @ R_E.T
+    # A rotation that noise explains is none.
+    surplus = 1.0 - 3.0 / max(float(turned_rad @ np.linalg.solve(noise_rad2, turned_rad)), 3.0)
+    lever = np.eye(3) - Rotation.from_rotvec(np.sqrt(surplus) * turned_rad).as_matrix()
     turned = lever @ np.cov(hand_m.T) @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
-    displacement = R_E @ registration @ R_E.T + turned + least_m2 * np.eye(3)
+    measured = match.covariance[3:, 3:] + _SHAPE_SHARE**2 * match.shape.scatter_m2
+    displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
     gain = np.linalg.inv(design(cursor_m, hand_m, distance_m, exact=True).mean(axis=0))
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
+
+
+def _unturned(shape: Float64, partner: Float64) -> tuple[Float64, Float64]:
+    """Return the rotation of paired points, and the partners without it, about their centroid."""
+    R = best_rotation(_centred(shape), _centred(partner))
+    return R, partner.mean(axis=0) + _centred(partner) @ R
 
 
 def _centred(points_m: Float64) -> Float64:

@@ -17,6 +17,8 @@ from handcal.display import update_matrix
 from handcal.geometry import transform
 from handcal.types import Float64
 
+_BALANCE_STEPS = 3
+
 
 def predict(hand_m: Float64, shift_m: Float64, distance_m: float, *, exact: bool) -> Float64:
     """Return the cursor points that `hand_m` covers, (N, 3), all in E0(t_b)."""
@@ -63,3 +65,37 @@ def fit_shift(cursor_m: Float64, hand_m: Float64, distance_m: float, *, exact: b
     """
     A = design(cursor_m, hand_m, distance_m, exact=exact).reshape(-1, 3)
     return np.asarray(np.linalg.solve(A.T @ A, A.T @ (cursor_m - hand_m).ravel()))
+
+
+def balance(cursor_m: Float64, hand_m: Float64, shift_m: Float64, distance_m: float) -> Float64:
+    """Return the φ, (3,), from which no small movement of the hand fits its cursor better.
+
+    An eye at φ sees the hand from another side than its cursor was made from. No movement makes
+    both agree everywhere; a wearer who overlays them by least squares in the image balances what
+    is left: ``Σ J_sᵀ (u_φ(s) - u_0(d)) = 0``, u on the focal plane and J_s its derivative in s.
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (N, 3) float64
+        Pairs, in E0(t_b), of a hand that is not rotated.
+    shift_m : (3,) float64
+        φ to start from.
+    distance_m : float
+        z(C0→S).
+    """
+    drawn = distance_m * cursor_m[:, :2] / cursor_m[:, 2:]
+    for _ in range(_BALANCE_STEPS):
+        ray = hand_m - shift_m
+        ratio = (distance_m - shift_m[2]) / ray[:, 2]
+        slope = ray[:, :2] / ray[:, 2:]
+        left = shift_m[:2] + ratio[:, None] * ray[:, :2] - drawn
+        by_hand = np.zeros((len(hand_m), 2, 3))
+        by_hand[:, 0, 0] = by_hand[:, 1, 1] = ratio
+        by_hand[:, :, 2] = -ratio[:, None] * slope
+        by_shift = -by_hand
+        by_shift[:, 0, 0] += 1.0
+        by_shift[:, 1, 1] += 1.0
+        by_shift[:, :, 2] -= slope
+        normal = np.einsum("nki,nkj->ij", by_hand, by_shift)
+        shift_m = shift_m - np.linalg.solve(normal, np.einsum("nki,nk->i", by_hand, left))
+    return shift_m

@@ -126,3 +126,17 @@ def nearest(
     """Return distances to, and indices of, the nearest `count` points, (N,) or (N, count)."""
     distance_m, index = tree.query(points_m, k=count, distance_upper_bound=within_m)
     return np.asarray(distance_m, dtype=np.float64), np.asarray(index, dtype=np.intp)
+
+
+def cover(points_m: Float64, radius_m: float) -> Indices:
+    """Return indices of points of which every other one is within `radius_m`.
+
+    They are chosen in the order of the points, so the axes of the frame do not matter.
+    """
+    left = np.arange(len(points_m))
+    chosen = []
+    while len(left):
+        chosen.append(left[0])
+        apart = points_m[left] - points_m[left[0]]
+        left = left[np.einsum("nd,nd->n", apart, apart) > radius_m**2]
+    return np.array(chosen, dtype=np.intp)

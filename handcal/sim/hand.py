@@ -62,6 +62,11 @@ class HandSettings:
     """Spacing of the grid for the skin."""
     side: Side | None = None
     """None lets the seed choose."""
+    thumb_out_rad: float = 0.0
+    spread_more: float = 0.0
+    curl_more_rad: float = 0.0
+    """Change of shape of the seed's hand: rotation of the thumb away from the index finger,
+    increase of the fingers' spread as a share of the mean one, and bend of each finger joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +124,11 @@ def make_hand(seed: int, settings: HandSettings | None = None) -> HandModel:
     length_m = settings.length_m + settings.length_sigma_m * np.clip(rng.normal(), -2.5, 2.5)
     m_per_mm = length_m / _REFERENCE_LENGTH_MM
     arm_axis = _direction(np.pi + rng.uniform(-0.15, 0.15), rng.uniform(-0.15, 0.15))
-    capsules = [*_forearm(arm_axis, settings.forearm_m / m_per_mm), *_palm(), *_fingers(rng)]
+    capsules = [
+        *_forearm(arm_axis, settings.forearm_m / m_per_mm),
+        *_palm(),
+        *_fingers(rng, settings),
+    ]
     vertices, triangles, normals = _skin(capsules, settings.grid_m / m_per_mm)
     side: Side = settings.side or ("left" if rng.random() < 0.5 else "right")
     colors = _skin_colors(vertices, normals, rng)
@@ -164,19 +173,20 @@ def _palm() -> list[_Capsule]:
     ]
 
 
-def _fingers(rng: np.random.Generator) -> list[_Capsule]:
+def _fingers(rng: np.random.Generator, settings: HandSettings) -> list[_Capsule]:
     """Return all phalanges, with the hand's spread and curl and small deviations per finger."""
-    spread = rng.uniform(0.6, 1.5)
+    spread = rng.uniform(0.6, 1.5) + settings.spread_more
     curl_rad = rng.uniform(0.02, 0.22)
     thickness = rng.normal(1.0, 0.04)
     capsules = []
     for finger, knuckle in _KNUCKLES_MM.items():
         bends = curl_rad * rng.uniform(0.7, 1.3) * np.array([1.0, 1.3, 0.8])
+        bends += settings.curl_more_rad
         turns = np.array([spread * _SPREAD_RAD[finger] + rng.normal(0.0, 0.02), 0.0, 0.0])
         radii = thickness * np.array(_RADII_MM[finger])
         capsules += _chain(knuckle, _PHALANGES_MM[finger], radii, turns, bends, 4)
     bends = np.array([0.35, -0.1, curl_rad * rng.uniform(0.7, 1.3)])
-    turns = np.array([rng.uniform(0.55, 0.85), -0.15, -0.1])
+    turns = np.array([rng.uniform(0.55, 0.85) + settings.thumb_out_rad, -0.15, -0.1])
     radii = thickness * np.array(_RADII_MM["thumb"])
     return capsules + _chain(_THUMB_BASE_MM, _PHALANGES_MM["thumb"], radii, turns, bends, 10)
 

@@ -32,6 +32,15 @@ class SensorSettings:
     edge_hole_ratio: float = 0.35
     edge_flying_ratio: float = 0.15
     """Shares of the pixels in that band without depth, and with a depth in between."""
+    fatten_px: int = 0
+    """Width by which near surfaces grow over what is behind them, half of the matching window; on a
+    D4xx 1 to 3 px."""
+    disparities: int | None = None
+    """Number of disparities that the matching tries, 126 on a D4xx: what is nearer than f B over
+    the largest of them, 0.44 m at 1280x720, has no depth. None: as many as needed."""
+    disparity_shift: int = 0
+    """Smallest disparity that it tries. A shift brings the nearest distance closer and loses what
+    is farther than f B over the shift."""
     depth_scale_m: float = 0.0001
     """Metres per unit."""
 
@@ -61,7 +70,11 @@ def sense_depth(
     """
     fB = focal_px * settings.baseline_m
     disparity = np.float32(fB) / depth_m
-    hidden = _hidden_from_the_right(disparity)
+    hidden = _not_tried(disparity, settings)
+    if settings.fatten_px:
+        window = np.ones((2 * settings.fatten_px + 1,) * 2, dtype=np.uint8)
+        disparity = np.asarray(cv2.dilate(disparity, window), dtype=np.float32)
+    hidden |= _hidden_from_the_right(disparity)
     hidden |= _blur_edges(disparity, rng, settings)
     disparity += settings.disparity_sigma_px * _correlated_noise(
         disparity.shape, settings.correlation_px, rng
@@ -72,6 +85,14 @@ def sense_depth(
     measured = np.asarray(cv2.divide(units, disparity, dtype=cv2.CV_16U), dtype=np.uint16)
     measured[hidden] = 0
     return measured
+
+
+def _not_tried(disparity: Float32, settings: SensorSettings) -> Bool:
+    """Return the pixels whose disparity is not among those that the matching tries."""
+    missed = disparity < settings.disparity_shift
+    if settings.disparities is not None:
+        missed |= disparity > settings.disparity_shift + settings.disparities
+    return np.asarray(missed)
 
 
 def _hidden_from_the_right(disparity: Float32) -> Bool:

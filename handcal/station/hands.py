@@ -14,6 +14,9 @@ from handcal.types import Float64, HandCloud
 
 _KEEP_S = 1.0
 """Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""
+_HOLD_M = 0.0015
+"""Frames in which the hand is this near belong to one hold: not one that still moves, nor one that
+is cut elsewhere."""
 _MEDIAN_STRIDE = 8
 """Every eighth point is enough for the median; all of them take half a millisecond."""
 
@@ -31,6 +34,10 @@ class PlacedHand:
     """(N, 3); the cloud's surface."""
     middle_W_m: Float64
     """(3,); its median, to a millimetre."""
+    frames: int = 1
+    """Number of frames from which the surface was made."""
+    movement_m: float = 0.0
+    """Movement of the hand during those frames."""
 
 
 class RecentHands:
@@ -111,6 +118,18 @@ class RecentHands:
         if is_long_enough and float(np.ptp(places, axis=0).max()) < self._steady_m:
             return self._placed[-1]
         return None
+
+    def held_at(self, hand: PlacedHand) -> list[PlacedHand]:
+        """Return the hands just before and at a hand, back to where it was elsewhere."""
+        held: list[PlacedHand] = []
+        for one in reversed(self._placed):
+            if one.t_host_ns > hand.t_host_ns:
+                continue
+            is_near = float(np.linalg.norm(one.middle_W_m - hand.middle_W_m)) < _HOLD_M
+            if not is_near or hand.t_host_ns - one.t_host_ns > self._steady_ns:
+                break
+            held.append(one)
+        return held[::-1]
 
     def placed_until_ns(self) -> int:
         """Return the time up to which every hand seen has been placed."""

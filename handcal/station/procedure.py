@@ -37,10 +37,12 @@ from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
+from handcal.register.shape import ShapeChange, change_text
 from handcal.session.facts import AlignmentFacts, CameraUsed
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
 from handcal.station.hands import PlacedHand, RecentHands
+from handcal.station.hold import merge_hold
 from handcal.types import (
     EYES,
     Alignment,
@@ -55,6 +57,8 @@ from handcal.types import (
 
 MAX_HAND_SET_SHIFT_M = 0.030
 """Limit of each component of a φ set by hand, beyond the eye box."""
+_SHAPE_EVERY_NS = 250_000_000
+"""A measurement of the shape takes half of a frame's time, and nobody reads faster."""
 
 
 class State(StrEnum):
@@ -106,8 +110,15 @@ class Observation:
     """The hand in this step's own frame, placed or not."""
     rotation_rad: Float64 | None = None
     """(3,); rotation from the cursor to the live hand, about D's axes, while aligning."""
+    shape_change_m: float | None = None
+    """Change of the hand's shape since the cursor, rms, while aligning; measured a few times a
+    second."""
+    shape_text: str = ""
+    """What changed most, in words."""
+    has_changed: bool = False
+    """True if that change exceeds the guard's limit."""
     is_over_limit: bool = False
-    """True if that rotation exceeds the guard's limit."""
+    """True if the rotation or the change of shape exceeds the guard's limit."""
     segment_ms: float | None = None
     guard_ms: float | None = None
     """Durations of these stages."""
@@ -176,6 +187,8 @@ class Calibration:
         self._cursor: PlacedHand | None = None
         self._cursor_id = 0
         self._guard: RotationGuard | None = None
+        self._shape: ShapeChange | None = None
+        self._shape_ns = 0
         self._confirmation: Confirmation | None = None
         self._items = NumberedItems[Alignment]("alignment", MAX_ALIGNMENTS)
         self._unstored: deque[Callable[[Session], object]] = deque()
@@ -267,7 +280,9 @@ class Calibration:
             self._items.next_number()
         except ValueError as error:
             raise ProcedureError(f"{error} in a session; start another") from error
+        hand = merge_hold(self._hands.held_at(hand), hand)
         self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
+        self._shape = None
         self._cursor = hand
         self._cursor_id += 1
         self._confirmation = None
@@ -529,16 +544,27 @@ class Calibration:
         assert self._guard is not None
         try:
             rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
+            if hand.t_host_ns - self._shape_ns > _SHAPE_EVERY_NS:
+                self._shape = self._guard.shape_change(hand.points_W_m, hand.cloud.is_cut)
+                self._shape_ns = hand.t_host_ns
         except HandError as error:
             return replace(observation, hand=None, problem=str(error))
-        is_over_limit = self._is_over_limit(rotation_W)
+        shape = self._shape
+        is_over_limit = self._is_over_limit(rotation_W) or self._has_changed(shape)
         self._link.send_live_hand(hand.points_W_m, is_over_limit)
+        R_D_W = hand.T_W_D[:3, :3].T
         return replace(
             observation,
-            rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
+            rotation_rad=R_D_W @ rotation_W,
+            shape_change_m=None if shape is None else shape.rms_m,
+            shape_text="" if shape is None else change_text(shape, R_D_W),
+            has_changed=self._has_changed(shape),
             is_over_limit=is_over_limit,
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
+
+    def _has_changed(self, shape: ShapeChange | None) -> bool:
+        return shape is not None and shape.rms_m > self._settings.guard.shape_limit_m
 
     def _judge(self, confirmation: Confirmation) -> None:
         """Accept or refuse a confirmation."""
@@ -554,8 +580,10 @@ class Calibration:
             return
         try:
             hand = self._hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
+            hand = merge_hold(self._hands.held_at(hand), hand)
             rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
             T_W_H = self._link.pose_at_host_ns(confirmation.t_host_ns)
+            shape = self._guard.shape_change(hand.points_W_m, hand.cloud.is_cut)
         except PosePendingError:
             self._confirmation = confirmation
             return
@@ -574,6 +602,15 @@ class Calibration:
                 angle_deg,
             )
             return
+        if self._has_changed(shape):
+            self.refused += 1
+            text = change_text(shape, hand.T_W_D[:3, :3].T)
+            self._refuse(
+                f"Your hand has changed its shape since the cursor was made: {text}. "
+                "Hold it as it was and confirm again, or make the cursor again.",
+                "shape changed",
+            )
+            return
         alignment = Alignment(
             cursor_m=self._cursor.points_W_m,
             hand_m=hand.points_W_m,
@@ -586,8 +623,12 @@ class Calibration:
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._shift_m),
         )
-        age_s = 1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns)
-        facts = AlignmentFacts(match_age_s=age_s)
+        facts = AlignmentFacts(
+            match_age_s=1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns),
+            cursor_moved_m=self._cursor.movement_m,
+            hand_moved_m=hand.movement_m,
+            shape_change_m=shape.rms_m,
+        )
         self._items.save(self._items.next_number(), alignment)
         self.state = State.ALIGNED
         self.refusal = ""
@@ -603,7 +644,7 @@ class Calibration:
         return float(np.linalg.norm(rotation)) > self._settings.guard.limit_rad
 
     def _clear_cursor(self) -> None:
-        self._cursor = self._guard = self._confirmation = None
+        self._cursor = self._guard = self._confirmation = self._shape = None
         self.refusal = ""
         # The wearer lowers the hand now: only a hand seen from here on can become a cursor.
         self._hands.clear()

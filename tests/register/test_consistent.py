@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal import solve_eye_shift
 from handcal.lab.bench.trials import mean_length_mm, trial_alignment, trial_hand
 from handcal.lab.study.trials import floor_error_m, solve_trial
 from handcal.register.solve import solve_alignment
@@ -158,3 +159,15 @@ def test_what_is_cut_is_no_inlier() -> None:
     assert solved.inlier_ratio == pytest.approx(in_common, abs=0.05)
     # Pairs of clouds that are sampled apart lie within a point spacing of one another.
     assert solved.rms_m < 0.003
+
+
+def test_one_grid_of_pixels_does_not_draw_clouds_together() -> None:
+    """Disjoint halves of one grid coincide after a step of a pixel: that is no movement."""
+    across, along = np.mgrid[0:80, 0:120].reshape(2, -1) * 0.001
+    depth_m = 0.5 + 0.1 * np.hypot(across - 0.04, along - 0.06) ** 2 / 0.06
+    wide = np.hypot((across - 0.04) / 0.04, (along - 0.06) / 0.06) < 1.0
+    points_m = np.column_stack([across - 0.04, along - 0.06, depth_m])[wide]
+    order = np.random.default_rng(0).permutation(len(points_m))
+    half = len(order) // 2
+    solved = solve_eye_shift(points_m[order[:half]], points_m[order[half:]], display_distance_m=2.0)
+    assert np.linalg.norm(solved.shift_m) < 0.0003

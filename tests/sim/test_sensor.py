@@ -72,3 +72,22 @@ def test_edges_have_holes_and_flying_pixels() -> None:
 def test_seed_decides_and_repeats() -> None:
     np.testing.assert_array_equal(_sense_m(_post(), seed=1), _sense_m(_post(), seed=1))
     assert (_sense_m(_post(), seed=1) != _sense_m(_post(), seed=2)).any()
+
+
+def test_near_things_grow_over_what_is_behind() -> None:
+    clean = replace(SETTINGS, edge_hole_ratio=0.0, edge_flying_ratio=0.0)
+    widths = [
+        int((_sense_m(_post(), replace(clean, fatten_px=px))[150] < 0.6).sum()) for px in (0, 2)
+    ]
+    holes = int((_sense_m(_post(), clean)[150] == 0).sum())
+    assert widths[1] - widths[0] == pytest.approx(4, abs=1)
+    assert holes > 0
+
+
+def test_the_nearest_distance_and_what_a_disparity_shift_does_to_it() -> None:
+    """A D415 at 1280x720 sees from 0.44 m on, or from 0.31 to 1.1 m with a shift of 50."""
+    ranged = replace(SETTINGS, disparities=126)
+    shifted = replace(ranged, disparity_shift=50)
+    for depth_m, plain, moved in [(0.33, 0, 1), (0.43, 0, 1), (0.45, 1, 1), (1.3, 1, 0)]:
+        assert (_sense_m(_wall(depth_m), ranged) > 0).mean() == plain
+        assert (_sense_m(_wall(depth_m), shifted) > 0).mean() == moved

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -25,7 +26,7 @@ from handcal.register.guard import RotationGuard
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
-from handcal.sim.hand import make_hand
+from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
@@ -83,9 +84,12 @@ def world() -> World:
 
 
 @cache
-def depth_of(pose: bytes | None) -> UInt16:
+def depth_of(pose: bytes | None, thumb_out_rad: float = 0.0) -> UInt16:
     T_D_hand = None if pose is None else np.frombuffer(pose).reshape(4, 4)
-    depth_m, _ = render(world(), np.eye(4), T_D_hand, CAMERA)
+    shaped = world()
+    if thumb_out_rad:
+        shaped = replace(shaped, hand=make_hand(1, HandSettings(thumb_out_rad=thumb_out_rad)))
+    depth_m, _ = render(shaped, np.eye(4), T_D_hand, CAMERA)
     # The focal length of the full-resolution image, whose noise the smaller one inherits.
     return sense_depth(depth_m, 2 * CAMERA.fx, np.random.default_rng(0), SENSOR)
 
@@ -113,7 +117,12 @@ class Stage:
         eventually(lambda: self._knows_pose(t_ns))
 
     def see(
-        self, T_D_hand: Float64 | None = T_D_HAND, T: Float64 = T_W_H, *, pose: bool = True
+        self,
+        T_D_hand: Float64 | None = T_D_HAND,
+        T: Float64 = T_W_H,
+        *,
+        pose: bool = True,
+        thumb_out_rad: float = 0.0,
     ) -> Observation:
         """Step with the next frame, of a hand or none."""
         self.t_ns += PERIOD_NS
@@ -121,7 +130,7 @@ class Stage:
         if pose:
             self.send_poses(T)
         t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
-        depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes())
+        depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad)
         return self.calibration.step(
             Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
         )
@@ -329,6 +338,28 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     assert stage.calibration.refused == 1
     assert stage.calibration.refusal == ""
     assert len(stage.calibration.alignments) == 1
+
+
+def test_a_hand_of_another_shape_is_refused_and_told(stage: Stage, session: Session) -> None:
+    stage.make_cursor()
+    seen = [stage.see(thumb_out_rad=0.4) for _ in range(5)][-1]
+    assert seen.is_over_limit
+    assert seen.shape_change_m is not None
+    assert seen.shape_change_m > SETTINGS.guard.shape_limit_m
+    assert re.fullmatch("thumb .* further out than in the cursor", seen.shape_text)
+    stage.press()
+    assert stage.see(thumb_out_rad=0.4).state is State.ALIGN
+    assert "changed its shape" in stage.calibration.refusal
+    assert events(session)[-1][1]["reason"] == "shape changed"
+    seen = stage.hold()
+    assert not seen.is_over_limit
+    stage.press()
+    assert stage.see().state is State.ALIGNED
+    facts = Session.open(session.path).alignment_facts[1]
+    assert facts.shape_change_m is not None
+    assert facts.shape_change_m < 0.001
+    assert facts.hand_moved_m is not None
+    assert facts.hand_moved_m < 0.001
 
 
 def test_a_confirmation_of_an_older_cursor_is_ignored(stage: Stage) -> None:

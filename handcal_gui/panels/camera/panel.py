@@ -254,6 +254,8 @@ def _age(age_ms: float | None) -> str:
 
 def _caption(seen: Observation) -> str:
     """Return a caption for the hand."""
+    if seen.has_changed:
+        return sentence(seen.shape_text)
     if seen.is_over_limit and seen.rotation_rad is not None:
         return f"Rotated by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
     return sentence(seen.problem)

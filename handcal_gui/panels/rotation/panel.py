@@ -25,6 +25,8 @@ _HISTORY_PERIOD_S = 0.2
 _HISTORY_LIMITS = 2.0
 """End of the history's scale in multiples of the limit, as for the dial."""
 _STRAIGHT_RAD = np.radians(2.0)
+# A smaller change of shape, rms, is not worth a word.
+_SHAPE_M = 0.0015
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _NO_CURSOR = "Make a cursor; the hand's rotation from it is then shown here."
 _TAKEN = "The alignment is confirmed."
@@ -78,16 +80,24 @@ class RotationPanel(QWidget):
             self._show_nothing("? No hand", sentence(observation.problem) or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
-        if angle_rad < _STRAIGHT_RAD and not observation.is_over_limit:
-            self._dial.show_angle(angle_rad, self._limit_rad, "✓ Hold still")
+        has_changed = observation.has_changed or (observation.shape_change_m or 0.0) > _SHAPE_M
+        shape = f"{sentence(observation.shape_text)}." if has_changed else ""
+        is_turned = angle_rad > self._limit_rad or (
+            observation.is_over_limit and not observation.has_changed
+        )
+        if not is_turned and (angle_rad < _STRAIGHT_RAD or observation.has_changed):
+            word = "▲ Another shape" if observation.has_changed else "✓ Hold still"
+            self._dial.show_angle(angle_rad, self._limit_rad, word)
             self._hand.show_turn("")
-            self._advice.setText(_STRAIGHT)
+            self._advice.setText(shape or _STRAIGHT)
             return
         word = "▲ Turn back" if observation.is_over_limit else "✓ Within limit"
         advice = turn_advice(observation.rotation_rad)
         self._dial.show_angle(angle_rad, self._limit_rad, word)
         self._hand.show_turn(advice.axis, positive=advice.angle_rad > 0)
-        self._advice.setText(f"{advice.text} by {abs(np.degrees(advice.angle_rad)):.0f}°.")
+        self._advice.setText(
+            f"{advice.text} by {abs(np.degrees(advice.angle_rad)):.0f}°. {shape}".strip()
+        )
 
     def _show_nothing(self, word: str, text: str) -> None:
         self._dial.show_angle(None, self._limit_rad, word)

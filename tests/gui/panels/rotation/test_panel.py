@@ -74,6 +74,21 @@ def test_a_strict_limit_is_reported_however_small(panel: RotationPanel, snapshot
     assert word(panel) == "▲ Turn back"
 
 
+def test_another_shape_is_told_beside_the_turn(panel: RotationPanel, snapshot: Make) -> None:
+    changed = {
+        "shape_change_m": 0.004,
+        "shape_text": "thumb 9 mm further out than in the cursor",
+        "has_changed": True,
+        "is_over_limit": True,
+    }
+    panel.show_snapshot(snapshot(observation=changed | {"rotation_rad": np.radians([0, 4, 0])}))
+    assert word(panel) == "▲ Another shape"
+    assert text(panel, "advice") == "Thumb 9 mm further out than in the cursor."
+    panel.show_snapshot(snapshot(observation=changed | {"rotation_rad": np.radians([0, 14, 0])}))
+    assert word(panel) == "▲ Turn back"
+    assert text(panel, "advice").endswith("by 14°. Thumb 9 mm further out than in the cursor.")
+
+
 def test_it_says_which_way_to_turn_and_how_far(panel: RotationPanel, snapshot: Make) -> None:
     rotation_deg = np.array([2.0, -1.0, 11.3])
     panel.show_snapshot(turned(snapshot, rotation_deg))

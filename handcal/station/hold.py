@@ -1,0 +1,71 @@
+"""One surface from the frames of a hold: its median, without flying pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from handcal.geometry import invert, transform
+from handcal.station.hands import PlacedHand
+
+# More frames take longer than the time between two frames, and lower the noise little.
+_MOST_FRAMES = 7
+# Another frame sees the surface at a point if it has one within this many point spacings.
+_REACH = 1.5
+# The surface is where at least this share of the frames sees it.
+_SEEN = 0.5
+
+
+def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand:
+    """Return the median surface of the frames of a hold, with the movement during it.
+
+    Each point of the reference stays on its ray, at the median of the depths that the frames
+    measure there, unless fewer than half of them see anything: then it is a flying pixel.
+
+    Parameters
+    ----------
+    hands : sequence of PlacedHand
+    reference : PlacedHand
+        One of them; time, pose, contour and mask are its own.
+    """
+    middles = np.array([hand.middle_W_m for hand in hands])
+    movement_m = float(np.linalg.norm(np.ptp(middles, axis=0)))
+    some = [hand for hand in hands if hand is not reference]
+    some = some[:: max(1, -(-len(some) // (_MOST_FRAMES - 1)))]
+    if not some:
+        return replace(reference, movement_m=movement_m)
+    T_D_W = invert(reference.T_W_D)
+    points_m = transform(T_D_W, reference.points_W_m)
+    rays = points_m[:, :2] / points_m[:, 2:]
+    apart, _ = cKDTree(rays).query(rays, k=2)
+    reach = _REACH * float(np.median(np.asarray(apart)[:, 1]))
+    depths_m = np.full((1 + len(some), len(points_m)), np.nan)
+    is_cut = np.zeros_like(depths_m, dtype=np.bool_)
+    depths_m[0], is_cut[0] = points_m[:, 2], reference.cloud.is_cut
+    for row, hand in enumerate(some, start=1):
+        seen_m = transform(T_D_W, hand.points_W_m)
+        found = cKDTree(seen_m[:, :2] / seen_m[:, 2:]).query(rays, distance_upper_bound=reach)
+        is_seen, index = np.isfinite(found[0]), np.asarray(found[1])
+        depths_m[row, is_seen] = seen_m[index[is_seen], 2]
+        is_cut[row, is_seen] = hand.cloud.is_cut[index[is_seen]]
+    measured = np.isfinite(depths_m)
+    kept = measured.mean(axis=0) >= _SEEN
+    median_m = np.nanmedian(depths_m[:, kept], axis=0)
+    merged_m = points_m[kept] * (median_m / points_m[kept, 2])[:, None]
+    colors = reference.cloud.colors
+    cloud = replace(
+        reference.cloud,
+        points_m=merged_m.astype(np.float32),
+        is_cut=(is_cut.sum(axis=0) >= _SEEN * measured.sum(axis=0))[kept],
+        colors=None if colors is None else colors[kept],
+    )
+    return replace(
+        reference,
+        cloud=cloud,
+        points_W_m=transform(reference.T_W_D, merged_m),
+        frames=1 + len(some),
+        movement_m=movement_m,
+    )
