@@ -160,7 +160,8 @@ def test_a_repaired_session_is_sound_and_holds_what_could_be_read(
     assert repaired.damaged == ()
     for part in ("rig", "settings", "alignments", "deleted_alignments", "trials", "notes", "facts"):
         assert canonical(getattr(repaired, part)) == canonical(getattr(record, part))
-    assert (repaired.results, repaired.is_finished) == (record.results, record.is_finished)
+    for part in ("results", "is_solved", "is_applied", "is_finished"):
+        assert getattr(repaired, part) == getattr(record, part)
 
 
 @pytest.mark.parametrize("line", range(1, 15))
@@ -250,6 +251,7 @@ def test_a_repaired_session_goes_on(
     repaired = repair_session(path, tmp_path / "repaired")
     assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
     assert list(repaired.alignments) == [3]
+    assert (repaired.results, repaired.is_solved) == (sound.results, False)
     assert repaired.events[0].time == sound.events[0].time
     with Session(repaired.path) as session:
         assert session.save_alignment(alignment) == 4

@@ -280,7 +280,7 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
         "created", "facts_saved", "cursor_made", "alignment_saved", "solved", "applied",
     ]  # fmt: skip
     assert record.facts.camera is not None
-    assert record.facts.camera.depth_intrinsics == RIG.depth_intrinsics
+    assert record.facts.camera.depth_intrinsics == CAMERA
     age_s = record.alignment_facts[1].match_age_s
     assert age_s is not None
     assert 0.0 <= age_s <= CalibrationSettings().match_tolerance_s
@@ -915,6 +915,28 @@ def test_a_calibration_goes_on_where_its_program_was_killed(stage: Stage, sessio
     assert (stage.calibration.alignments[3].drawn_shift_m["right"] == by_hand_m).all()
     record = Session.open(session.path)
     assert list(record.alignments) == [1, 2, 3]
+    session.close()
+
+
+def test_a_calibration_goes_on_with_what_is_left_of_a_damaged_session(
+    stage: Stage, session: Session
+) -> None:
+    for _ in range(2):
+        stage.align()
+        stage.calibration.solve()
+        stage.calibration.apply()
+        stage.calibration.wait_applied()
+    (session.path / "alignments/2.npz").write_bytes(b"nothing")
+    stage, session = resumed(stage, session)
+    assert stage.state() is State.ALIGNED  # solved with an alignment that is lost
+    stage.calibration.solve()
+    stage.calibration.apply()
+    stage.calibration.wait_applied()
+    stage.align()
+    assert list(stage.calibration.alignments) == [1, 3]
+    stage.calibration.delete_alignment(3)
+    record = Session.open(session.path)
+    assert (list(record.alignments), list(record.deleted_alignments)) == ([1], [3])
     session.close()
 
 
