@@ -239,7 +239,7 @@ def _read_results(
         if not is_old and results not in (None, state.results, *state.older_results):
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
-        used = "nothing was read" if is_old else "the journal's copy was read"
+        used = "nothing was read" if state.results is None else "the journal's copy was read"
         damaged.append(Damage(file.name, None, f"{error}; {used}"))
         return state.results
     return results if is_old else state.results
