@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
-from handcal.types import CameraIdentity, Frame, Intrinsics
+from handcal.types import CameraIdentity, Float32, Frame, Intrinsics
 
 
 class Camera(Protocol):
@@ -45,3 +45,18 @@ class Camera(Protocol):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None: ...
+
+
+@runtime_checkable
+class ExposesForHand(Protocol):
+    """A camera that can measure its exposure on the hand."""
+
+    def expose_for(self, points_m: Float32 | None) -> None:
+        """Take note of the hand in the newest frame.
+
+        Parameters
+        ----------
+        points_m : (N, 3) float32, optional
+            Its points in the depth camera's frame; None if none is seen.
+        """
+        ...

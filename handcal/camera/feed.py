@@ -8,10 +8,10 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from handcal.camera.camera import Camera
+from handcal.camera.camera import Camera, ExposesForHand
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Frame
+from handcal.types import CameraIdentity, Float32, Frame
 
 _RATE_WINDOW_S = 1.0
 
@@ -99,6 +99,11 @@ class CameraFeed(Closable):
             return None
         self._note(frame)
         return frame
+
+    def expose_for(self, points_m: Float32 | None) -> None:
+        """Tell a camera that can measure its exposure on the hand; see `ExposesForHand`."""
+        if isinstance(self._camera, ExposesForHand):
+            self._camera.expose_for(points_m)
 
     def close(self) -> None:
         """Close the camera; `read` opens it again, unless a recording has ended."""

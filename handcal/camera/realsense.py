@@ -22,11 +22,12 @@ from handcal.camera.sdk_frames import (
     intrinsics_of,
     with_color,
 )
-from handcal.camera.sdk_options import apply_options, depth_filter
+from handcal.camera.sdk_options import HandExposure, apply_options, depth_filter
 from handcal.camera.settings import Profile, RealSenseSettings
 from handcal.errors import CameraError, CameraTimeoutError
+from handcal.geometry import image_points, transform
 from handcal.io.closable import Closable
-from handcal.types import Frame
+from handcal.types import Float32, Frame
 
 _SIZES = ("1280x720", "848x480")
 _RATE_HZ = 30
@@ -59,15 +60,20 @@ class RealSenseCamera(Closable):
         self.identity = self._device.identity
         handle = handles[devices.index(self._device)]
         self._sensors: list[Any] = []
+        self._exposure: HandExposure | None = None
         self._syncer = librealsense().syncer(_QUEUE_FRAMES)
         self._filter = depth_filter(settings)
         try:
             streams = _choose_streams(handle, self._device, settings.profile)
-            (_, depth), (_, color) = streams
+            (_, depth), (color_sensor, color) = streams
             self.depth_intrinsics = intrinsics_of(depth)
+            self._color_intrinsics = intrinsics_of(color)
             self._T_C_D = extrinsics_between(depth, color)
             apply_options(handle, settings)
             self._start(streams)
+            if color_sensor.is_roi_sensor() and not settings.expose_whole_image:
+                size_px = self._color_intrinsics.width, self._color_intrinsics.height
+                self._exposure = HandExposure(color_sensor.as_roi_sensor(), size_px)
         except RuntimeError as error:
             self.close()
             raise CameraError(
@@ -88,8 +94,21 @@ class RealSenseCamera(Closable):
             return frame
         return with_color(frame, color, self._T_C_D)
 
+    def expose_for(self, points_m: Float32 | None) -> None:
+        """Measure the exposure of colour on the hand; see `ExposesForHand`."""
+        if self._exposure is None:
+            return
+        if points_m is None:
+            self._exposure.aim(None)
+            return
+        in_color = self._T_C_D, self._color_intrinsics
+        self._exposure.aim(lambda: image_points(transform(in_color[0], points_m), in_color[1]))
+
     def close(self) -> None:
         """Stop the device; safe to call twice."""
+        if self._exposure is not None:
+            self._exposure.restore()
+            self._exposure = None
         for sensor in self._sensors:
             with suppress(RuntimeError):  # it may have been unplugged
                 sensor.stop()

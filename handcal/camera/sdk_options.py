@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
+
+import numpy as np
 
 from handcal.camera.sdk_devices import librealsense
 from handcal.camera.settings import RealSenseSettings
 from handcal.errors import CameraError
+from handcal.types import Float64
+
+_AIM_S = 1.0
+_LOST_S = 3.0
+_SIDE_MIN_PX = 16
 
 
 def apply_options(device: Any, settings: RealSenseSettings) -> None:
@@ -34,6 +43,75 @@ def apply_options(device: Any, settings: RealSenseSettings) -> None:
         depth.set_option(option.enable_auto_exposure, 1.0)
     if settings.laser_power_mw is not None:
         _set(depth, option.laser_power, settings.laser_power_mw, "laser power", "mW")
+
+
+class HandExposure:
+    """Makes a sensor measure its automatic exposure on the hand.
+
+    The region follows the hand once a second. `restore` sets the sensor's own region again; so does
+    the absence of a hand for three seconds. A refusal by the sensor is ignored until the next time.
+
+    Parameters
+    ----------
+    sensor : object
+        With `get_region_of_interest` and `set_region_of_interest`, as the SDK's roi_sensor.
+    size_px : tuple of int
+        Width and height of its image.
+    clock_s : callable, optional
+        Returns the time in seconds.
+    """
+
+    def __init__(
+        self,
+        sensor: Any,
+        size_px: tuple[int, int],
+        clock_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._sensor = sensor
+        self._size_px = size_px
+        self._clock_s = clock_s
+        self._own: Any = None
+        self._aimed_s = -np.inf
+        self._seen_s = -np.inf
+
+    def aim(self, find_px: Callable[[], Float64] | None) -> None:
+        """Follow the hand.
+
+        Parameters
+        ----------
+        find_px : callable, optional
+            Returns the hand's points in the image, (N, 2) px; called once a second. None without a
+            hand.
+        """
+        now_s = self._clock_s()
+        if find_px is None:
+            if now_s - self._seen_s >= _LOST_S:
+                self.restore()
+            return
+        self._seen_s = now_s
+        if now_s - self._aimed_s < _AIM_S:
+            return
+        self._aimed_s = now_s
+        points_px = find_px()
+        last = np.array(self._size_px) - 1
+        low = np.floor(points_px.min(axis=0)).clip(0, last)
+        high = np.ceil(points_px.max(axis=0)).clip(0, last)
+        if (high - low < _SIDE_MIN_PX).any():
+            return
+        with suppress(RuntimeError):  # some firmware refuses it at times
+            if self._own is None:
+                self._own = self._sensor.get_region_of_interest()
+            region = librealsense().region_of_interest()
+            region.min_x, region.min_y = low.astype(int).tolist()
+            region.max_x, region.max_y = high.astype(int).tolist()
+            self._sensor.set_region_of_interest(region)
+
+    def restore(self) -> None:
+        """Set the sensor's own region, if another was set."""
+        if self._own is not None:
+            with suppress(RuntimeError):  # it may have been unplugged
+                self._sensor.set_region_of_interest(self._own)
+            self._own, self._aimed_s = None, -np.inf
 
 
 def depth_filter(settings: RealSenseSettings) -> Callable[[Any], Any]:

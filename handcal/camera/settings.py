@@ -26,6 +26,8 @@ class RealSenseSettings:
     """Exposure of the depth sensor in microseconds; None for automatic exposure."""
     laser_power_mw: float | None = None
     """Power of the projector."""
+    expose_whole_image: bool = False
+    """Measure the automatic exposure of colour on the whole image, not on the hand once found."""
     spatial_filter: bool = False
     temporal_filter: bool = False
     hole_filling: bool = False

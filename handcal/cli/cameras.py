@@ -45,6 +45,11 @@ REALSENSE_OPTIONS = (
         metavar="MW",
         help="power of the projector (default: unchanged)",
     ),
+    arg(
+        "--expose-whole-image",
+        action="store_true",
+        help="measure the exposure of colour on the whole image, not on the hand",
+    ),
     arg("--spatial-filter", action="store_true", help="apply the SDK's spatial filter to depth"),
     arg("--temporal-filter", action="store_true", help="apply the SDK's temporal filter to depth"),
     arg("--hole-filling", action="store_true", help="apply the SDK's hole filling to depth"),

@@ -60,6 +60,27 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
         raise FileError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+def write_new(path: Path, data: bytes) -> None:
+    """Write a file that nothing refers to yet, in place of a leftover, and sync file and folder.
+
+    This costs one sync less than `write_atomic`; a killed program may leave part of the file.
+
+    Raises
+    ------
+    FileError
+        If the folder is missing, not writable or full.
+    """
+    try:
+        path.unlink(missing_ok=True)
+        with path.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        sync_folder(path.parent)
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
 def sync_folder(path: Path) -> None:
     """Write the entries of a folder to the disk; OSError if that fails.
 

@@ -71,6 +71,8 @@ class SessionRecord:
     facts: SessionFacts = field(default_factory=SessionFacts)
     alignment_facts: Mapping[int, AlignmentFacts] = field(default_factory=dict)
     """Of each alignment, deleted ones too."""
+    last_alignment: int = 0
+    """Greatest number of an alignment, lost ones too; the next one is greater."""
     damaged: tuple[Damage, ...] = ()
     """Parts that are damaged; what they held is missing here, or was read from a copy."""
 
@@ -148,6 +150,7 @@ def read_session(
     )
     is_old = journal.version < JOURNAL_VERSION
     results = _read_results(path / "results.json", state, is_old, damaged)
+    is_complete = results is not None and len(alignments) == len(state.alignments.active)
     return SessionRecord(
         path=path,
         rig=rig,
@@ -160,8 +163,8 @@ def read_session(
         trials=trials,
         deleted_trials=deleted_trials,
         results=results,
-        is_solved=state.is_solved and results is not None,
-        is_applied=state.is_applied and results is not None,
+        is_solved=state.is_solved and is_complete,
+        is_applied=state.is_applied and is_complete,
         applied_shift_m=MappingProxyType(state.applied_shift_m),
         fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
         is_finished=state.is_finished,
@@ -169,6 +172,7 @@ def read_session(
         torn_bytes=journal.torn_bytes,
         facts=state.facts,
         alignment_facts=MappingProxyType(state.alignment_facts),
+        last_alignment=state.alignments.last(),
         damaged=tuple(damaged),
     )
 
@@ -235,7 +239,7 @@ def _read_results(
         if not is_old and results not in (None, state.results, *state.older_results):
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
-        used = "nothing was read" if is_old else "the journal's copy was read"
+        used = "nothing was read" if state.results is None else "the journal's copy was read"
         damaged.append(Damage(file.name, None, f"{error}; {used}"))
         return state.results
     return results if is_old else state.results

@@ -113,5 +113,9 @@ def _events(record: SessionRecord, folder: Path) -> Iterator[Event]:
             state.apply(event)
             yield event
     notes = sha256(record.notes.encode()) if record.notes else ""
-    rest = {"results": record.results, "notes_sha256": notes}
+    rest = {
+        "results": record.results,
+        "is_solved": record.is_solved,  # not if one of the alignments is lost
+        "notes_sha256": notes,
+    }
     yield happens_now(2, SessionEvent.UPGRADED, bound | rest)

@@ -37,6 +37,7 @@ from handcal.io.files import (
     sync_folder,
     write_atomic,
     write_json,
+    write_new,
 )
 from handcal.io.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
@@ -201,7 +202,7 @@ class Session(Closable):
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
         self._require_own()
-        write_atomic(alignment_path(self.path, number), data)
+        write_new(alignment_path(self.path, number), data)
         known = {} if facts is None else {"facts": facts_json(facts)}
         saved = {"number": number, "sha256": sha256(data), **known}
         self._append(SessionEvent.ALIGNMENT_SAVED, saved)

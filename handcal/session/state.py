@@ -77,9 +77,13 @@ class NumberedItems(Generic[Item]):
         self._kind = kind
         self._limit = limit
 
+    def last(self) -> int:
+        """Return the greatest number given so far; 0 if there is none."""
+        return max((self.taken, *self.active, *self.deleted))
+
     def next_number(self) -> int:
         """Return the number of the next item; ValueError if there are too many."""
-        number = 1 + max(self.taken, max((*self.active, *self.deleted), default=0))
+        number = 1 + self.last()
         if len(self.active) >= self._limit or number > _DELETED_LIMIT * self._limit:
             raise ValueError(f"no room for more than {self._limit} {self._kind}s")
         return number
@@ -190,6 +194,8 @@ class SessionState:
                 self._bind(data)
                 self.notes_sha256 = (data["notes_sha256"],)
                 self._set_results(data["results"])
+                if not data.get("is_solved", True):
+                    self.is_solved = self.is_applied = False
             case SessionEvent.REPAIRED:
                 self.alignments.has_gaps = self.trials.has_gaps = True
             case SessionEvent.NOTES_SAVED:

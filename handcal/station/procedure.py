@@ -478,6 +478,7 @@ class Calibration:
         """Restore the state of a session; a cursor or projections pending then are lost."""
         self._items.active = dict(record.alignments)
         self._items.deleted = dict(record.deleted_alignments)
+        self._items.taken = record.last_alignment
         self._shift_m |= record.applied_shift_m
         if record.is_solved:
             try:

@@ -140,6 +140,8 @@ class Station(Closable):
         try:
             if frame is not None:
                 observation = self.calibration.step(frame)
+                cloud = observation.cloud
+                self._feed.expose_for(None if cloud is None else cloud.points_m)
             if self.calibration.state is State.APPLYING:
                 self.calibration.poll_applied()
         except LinkError as error:

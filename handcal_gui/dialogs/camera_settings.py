@@ -72,6 +72,11 @@ class CameraSettingsDialog(QDialog):
             _AS_IT_IS,
             150,
         )
+        self._whole = _filter(
+            "wholeImage",
+            "For the whole image",
+            "Measures the exposure of colour on the whole image, not on the hand once found.",
+        )
         self._spatial = _filter("spatial", "Spatial", "Smooths each depth image, keeping edges.")
         self._temporal = _filter("temporal", "Temporal", "Averages over the last depth images.")
         self._holes = _filter("holes", "Hole filling", "Fills in depth where none was measured.")
@@ -86,6 +91,7 @@ class CameraSettingsDialog(QDialog):
             preset=self._preset.currentData() or None,
             exposure_us=self._exposure.value,
             laser_power_mw=self._laser.value,
+            expose_whole_image=self._whole.isChecked(),
             spatial_filter=self._spatial.isChecked(),
             temporal_filter=self._temporal.isChecked(),
             hole_filling=self._holes.isChecked(),
@@ -96,6 +102,7 @@ class CameraSettingsDialog(QDialog):
         self._preset.setCurrentIndex(self._preset.findData(settings.preset or ""))
         self._exposure.show_value(settings.exposure_us)
         self._laser.show_value(settings.laser_power_mw)
+        self._whole.setChecked(settings.expose_whole_image)
         self._spatial.setChecked(settings.spatial_filter)
         self._temporal.setChecked(settings.temporal_filter)
         self._holes.setChecked(settings.hole_filling)
@@ -108,6 +115,7 @@ class CameraSettingsDialog(QDialog):
         form.addRow("Image size", self._profile)
         form.addRow("Depth preset", self._preset)
         form.addRow("Exposure", self._exposure)
+        form.addRow("Exposure of colour", self._whole)
         form.addRow("Laser power", self._laser)
         form.addRow("Depth filters", filters)
         form.addRow("", paragraph(text="Filters smooth and invent depth: calibrate without them."))

@@ -9,7 +9,7 @@ import pytest
 from handcal.camera.feed import CameraFeed, FeedSettings
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Frame, Intrinsics
+from handcal.types import CameraIdentity, Float32, Frame, Intrinsics
 
 CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)
 SETTINGS = FeedSettings(read_s=0.01, silent_s=0.03, reopen_s=0.05)
@@ -130,3 +130,21 @@ def test_a_recording_without_a_frame_is_named_and_not_opened_all_the_time() -> N
         assert [feed.read() for _ in range(3)] == [None, None, None]
         assert feed.status.problem == "the recording has ended without a frame"
     assert len(opened) == 1
+
+
+def test_a_camera_that_can_expose_for_the_hand_is_told_of_it() -> None:
+    told: list[object] = []
+
+    class Exposing(Scripted):
+        def expose_for(self, points_m: Float32 | None) -> None:
+            told.append(points_m)
+
+    hand = np.zeros((1, 3), np.float32)
+    for camera in (Exposing([1]), Scripted([1])):
+        feed = CameraFeed(lambda camera=camera: camera, SETTINGS)  # type: ignore[misc]
+        feed.expose_for(hand)  # not open yet
+        read_frame(feed)
+        feed.expose_for(hand)
+        feed.expose_for(None)
+    assert len(told) == 2
+    assert told[0] is hand

@@ -14,8 +14,8 @@ from handcal.camera.feed import CameraFeed, FeedSettings
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.settings import RealSenseSettings
 from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import rigid
-from handcal.types import Frame
+from handcal.geometry import image_points, rigid, transform
+from handcal.types import Float64, Frame
 
 PlugIn = Callable[..., Any]
 
@@ -126,3 +126,28 @@ def test_a_device_plugged_in_again_goes_on(plug_in: PlugIn) -> None:
         plug_in(sizes=((848, 480),))
         read_until(lambda frame: frame is not None)
         assert feed.status.problem == ""
+
+
+def test_the_hand_is_exposed_where_the_colour_camera_sees_it(plug_in: PlugIn) -> None:
+    class Exposure:
+        aimed: list[Float64] = []  # noqa: RUF012
+        restored = 0
+
+        def aim(self, find_px: Callable[[], Float64]) -> None:
+            self.aimed.append(find_px())
+
+        def restore(self) -> None:
+            self.restored += 1
+
+    plug_in()
+    stand_in = Exposure()
+    with RealSenseCamera() as camera:
+        camera.expose_for(None)  # the software device has no such region: nothing happens
+        camera._exposure = stand_in  # type: ignore[assignment]
+        frame = read_pair(camera)
+        point_m = np.array([[0.02, -0.01, 0.5]], np.float32)
+        camera.expose_for(point_m)
+        assert frame.color_intrinsics is not None
+        expected = image_points(transform(frame.T_C_D, point_m), frame.color_intrinsics)
+        assert stand_in.aimed[0] == pytest.approx(expected)
+    assert stand_in.restored == 1

@@ -15,6 +15,7 @@ from handcal.io.files import (
     remove_leftovers,
     write_atomic,
     write_json,
+    write_new,
     write_ply,
 )
 
@@ -77,6 +78,15 @@ def test_only_leftovers_are_removed(tmp_path: Path) -> None:
     (tmp_path / ".b.0123456789abcdef").mkdir()
     remove_leftovers(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == kept | {".b.0123456789abcdef"}
+
+
+def test_a_new_file_takes_the_place_of_a_leftover(tmp_path: Path) -> None:
+    path = tmp_path / "1.npz"
+    for data in (b"a long leftover", b"new"):
+        write_new(path, data)
+        assert path.read_bytes() == data
+    with pytest.raises(FileError, match=r"cannot write .*: No such file"):
+        write_new(tmp_path / "gone" / "1.npz", b"")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="makes a pipe in a folder")

@@ -90,40 +90,78 @@ def damaged_bytes(data: bytes, kind: str, share: float, bit: int) -> bytes:
     return bytes(changed)
 
 
-@given(
+ANY_DAMAGE = (
     st.sampled_from(FILES),
     st.sampled_from(["truncated", "bit", "zeros", "digit"]),
     st.floats(0, 1),
     st.integers(0, 7),
 )
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_no_damage_is_silent_or_costs_the_rest(
-    sound: SessionRecord, tmp_path: Path, name: str, kind: str, share: float, bit: int
-) -> None:
-    path = tmp_path / "session"
+ONE_FOLDER = [HealthCheck.function_scoped_fixture]
+
+
+def spoil(sound: SessionRecord, path: Path, name: str, *damage: Any) -> SessionRecord | None:
+    """Copy the session to `path` with one damage, and read it; None if its journal is empty."""
     shutil.rmtree(path, ignore_errors=True)
     shutil.copytree(sound.path, path)
     file = path / name
-    file.write_bytes(damaged_bytes(file.read_bytes(), kind, share, bit))
+    file.write_bytes(damaged_bytes(file.read_bytes(), *damage))
     if name == "journal.jsonl" and b"\n" not in file.read_bytes():
         with pytest.raises(FileError, match="does not begin as the journal"):
             Session.open(path)
+        return None
+    return Session.open(path)
+
+
+def check_damage(sound: SessionRecord, path: Path, name: str, *damage: Any) -> None:
+    """Check that one damage is named, and costs only itself."""
+    record = spoil(sound, path, name, *damage)
+    if record is None:
         return
-    record = Session.open(path)
     if not record.damaged and not record.torn_bytes:
         assert contents(record) == contents(sound)
     if name != "journal.jsonl":
         assert {damage.file for damage in record.damaged} <= {name}
         kept = {*sound.alignments, *sound.deleted_alignments}
         lost = kept - {*record.alignments, *record.deleted_alignments}
-        assert lost <= {int(file.stem)} if file.suffix == ".npz" else not lost
-    assert check_session(path).state == ("damaged" if record.damaged else "sound")
+        assert lost <= ({int(Path(name).stem)} if name.endswith(".npz") else set())
+
+
+@given(*ANY_DAMAGE)
+@settings(deadline=None, suppress_health_check=ONE_FOLDER)
+def test_no_damage_is_silent_or_costs_the_rest(
+    sound: SessionRecord, tmp_path: Path, name: str, kind: str, share: float, bit: int
+) -> None:
+    check_damage(sound, tmp_path / "session", name, kind, share, bit)
+
+
+@pytest.mark.campaign
+@given(*ANY_DAMAGE)
+@settings(deadline=None, suppress_health_check=ONE_FOLDER, max_examples=3000)
+def test_no_damage_of_thousands_is_silent(
+    sound: SessionRecord, tmp_path: Path, name: str, kind: str, share: float, bit: int
+) -> None:
+    check_damage(sound, tmp_path / "session", name, kind, share, bit)
+
+
+@given(*ANY_DAMAGE)
+@settings(deadline=None, suppress_health_check=ONE_FOLDER, max_examples=15)
+def test_a_repaired_session_is_sound_and_holds_what_could_be_read(
+    sound: SessionRecord, tmp_path: Path, name: str, kind: str, share: float, bit: int
+) -> None:
+    path = tmp_path / "session"
+    record = spoil(sound, path, name, kind, share, bit)
+    assert check_session(path).state == (
+        "none" if record is None else "damaged" if record.damaged else "sound"
+    )
+    if record is None:
+        return
     shutil.rmtree(tmp_path / "repaired", ignore_errors=True)
     repaired = repair_session(path, tmp_path / "repaired")
     assert repaired.damaged == ()
     for part in ("rig", "settings", "alignments", "deleted_alignments", "trials", "notes", "facts"):
         assert canonical(getattr(repaired, part)) == canonical(getattr(record, part))
-    assert (repaired.results, repaired.is_finished) == (record.results, record.is_finished)
+    for part in ("results", "is_solved", "is_applied", "is_finished"):
+        assert getattr(repaired, part) == getattr(record, part)
 
 
 @pytest.mark.parametrize("line", range(1, 15))
@@ -213,6 +251,7 @@ def test_a_repaired_session_goes_on(
     repaired = repair_session(path, tmp_path / "repaired")
     assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
     assert list(repaired.alignments) == [3]
+    assert (repaired.results, repaired.is_solved) == (sound.results, False)
     assert repaired.events[0].time == sound.events[0].time
     with Session(repaired.path) as session:
         assert session.save_alignment(alignment) == 4

@@ -991,6 +991,28 @@ def test_a_calibration_goes_on_where_its_program_was_killed(stage: Stage, sessio
     session.close()
 
 
+def test_a_calibration_goes_on_with_what_is_left_of_a_damaged_session(
+    stage: Stage, session: Session
+) -> None:
+    for _ in range(2):
+        stage.align()
+        stage.calibration.solve()
+        stage.calibration.apply()
+        stage.calibration.wait_applied()
+    (session.path / "alignments/2.npz").write_bytes(b"nothing")
+    stage, session = resumed(stage, session)
+    assert stage.state() is State.ALIGNED  # solved with an alignment that is lost
+    stage.calibration.solve()
+    stage.calibration.apply()
+    stage.calibration.wait_applied()
+    stage.align()
+    assert list(stage.calibration.alignments) == [1, 3]
+    stage.calibration.delete_alignment(3)
+    record = Session.open(session.path)
+    assert (list(record.alignments), list(record.deleted_alignments)) == ([1], [3])
+    session.close()
+
+
 def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
     server: HeadsetServer, session: Session, alignment: Alignment
 ) -> None:

@@ -15,6 +15,7 @@ ALL_SET = RealSenseSettings(
     preset="high_accuracy",
     exposure_us=12_000.0,
     laser_power_mw=0.0,
+    expose_whole_image=True,
     spatial_filter=True,
     temporal_filter=True,
     hole_filling=True,
@@ -43,7 +44,7 @@ def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
         left.click()
         assert number.isEnabled()
         number.setValue(value)
-    for name in ("spatial", "temporal", "holes"):
+    for name in ("wholeImage", "spatial", "temporal", "holes"):
         box = dialog.findChild(QCheckBox, name)
         assert isinstance(box, QCheckBox)
         box.click()
