@@ -2,6 +2,7 @@
 
 import multiprocessing.process
 import os
+import platform
 import subprocess
 from collections.abc import Callable, Generator, Sequence
 from functools import cache
@@ -21,6 +22,8 @@ from handcal.types import EYES, Alignment, Eye
 # A busy machine fails no test.
 hypothesis.settings.register_profile("handcal", deadline=None)
 hypothesis.settings.load_profile("handcal")
+
+platform.platform()  # starts a process the first time, which a quick test may not
 
 _IN_REAL_TIME = {
     "qtbot", "display", "live", "studio", "server", "raw_server", "client", "process", "begun",

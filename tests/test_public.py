@@ -24,7 +24,7 @@ from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.camera import simulated_frame
 from handcal.types import EYES, METHODS, Eye, EyeShift
-from tests.helpers import ROOT
+from tests.helpers import ROOT, write_thin_session
 
 THE_TEN_LINES = """
 import handcal
@@ -155,8 +155,8 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_solves_a_session(session: SessionRecord, method: Any) -> None:
-    results = handcal.solve(session, method=method)
+def test_every_method_solves_a_session(tmp_path: Path, method: Any) -> None:
+    results = handcal.solve(handcal.open_session(write_thin_session(tmp_path)), method=method)
     assert results.method == method
     assert str(results).startswith(f"{method}, 2 alignments: left φ = (")
 

@@ -26,7 +26,7 @@ _POLL_MS = 50
 
 
 class LiveCameras(QWidget):
-    """KnownSessions a choice for each camera, and shows simultaneous images of all of them.
+    """Offers a choice for each camera, and shows simultaneous images of all of them.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.types import EYES, Eye
+from tests.helpers import write_small_rig
 
 SEED = 3
 
@@ -34,9 +35,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def run(folder: Path) -> subprocess.CompletedProcess[str]:
-    options = f"--seed {SEED} --eyes each --loss 0.3 --reorder 0.2 --output runs --json new/it.json"
+    write_small_rig(folder / "rig.yaml")
+    options = f"--rig rig.yaml --seed {SEED} --eyes each --loss 0.3 --reorder 0.2"
+    files = "--output runs --json new/it.json"
     return subprocess.run(
-        [sys.executable, "-m", "handcal", "demo", *options.split()],
+        [sys.executable, "-m", "handcal", "demo", *options.split(), *files.split()],
         cwd=folder,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         capture_output=True,

@@ -20,6 +20,7 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
+from tests.helpers import write_small_rig
 
 pytestmark = pytest.mark.process
 
@@ -54,12 +55,13 @@ def picture(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.mark.parametrize("command", ["segment", "demo", "solve", "export", "doctor"])
 def test_a_command_writes_nothing_but_its_output(
-    command: str, picture: list[str], tmp_path: Path
+    command: str, picture: list[str], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     output = tmp_path / "output"
+    rig = write_small_rig(tmp_path_factory.mktemp("rig") / "rig.yaml")
     words = {
         "segment": ["segment", *picture, "--output", str(output)],
-        "demo": ["demo", "--alignments", "1", "--output", str(output)],
+        "demo": ["demo", "--alignments", "1", "--output", str(output), "--rig", str(rig)],
         "solve": ["solve", str(EXAMPLE)],
         "export": ["export", str(EXAMPLE), "--output", str(output)],
         "doctor": ["doctor"],

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import handcal
-from tests.helpers import ROOT
+from tests.helpers import ROOT, write_thin_session
 
 pytestmark = pytest.mark.process
 
@@ -64,8 +64,8 @@ def test_a_frame_of_ones_own_is_segmented(tmp_path: Path) -> None:
     assert not (tmp_path / "b/frame").exists()
 
 
-def test_methods_are_compared() -> None:
-    said = run("03_compare_methods.py")
+def test_methods_are_compared(tmp_path: Path) -> None:
+    said = run("03_compare_methods.py", "--session", write_thin_session(tmp_path))
     rows = [line.split() for line in said.splitlines()[2:]]
     assert [row[:2] for row in rows] == [
         [method, eye]

@@ -29,7 +29,7 @@ _RAIL_PX = 24 * SPACING_PX
 
 
 class EvaluationWindow(QDialog):
-    """KnownSessions evaluations, one of which can run at a time; closing cancels it.
+    """Offers evaluations, one of which can run at a time; closing cancels it.
 
     Parameters
     ----------
