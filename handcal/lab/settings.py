@@ -1,4 +1,4 @@
-"""Settings of the studies and tests that can be ordered, all of which can be stored as JSON.
+"""Settings of studies and tests; all can be stored as JSON.
 
 Paths are texts, empty where there is none.
 """
@@ -13,7 +13,7 @@ from handcal.errors import FileError
 from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]
-"""``quick`` runs few trials, to see that everything works; its results are not meaningful."""
+"""``quick`` runs few trials, as a smoke test; its results are not meaningful."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +42,8 @@ class MethodComparisonSettings:
     output: str = "results/study-methods"
     size: Size = "full"
     noise_wearers: int = 0
-    """Simulated wearers for a search of the noise with which the paper's method errs as published;
-    0 for no search."""
+    """Simulated wearers for a search of the noise with which the paper's method has its published
+    error; 0 for no search."""
 
 
 @dataclass(frozen=True, slots=True)

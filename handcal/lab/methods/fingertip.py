@@ -6,9 +6,9 @@ using a Leap Motion controller" (3DUI): 25 alignments for each eye, solved as in
 
 Jun & Kim 2016, "A calibration method for optical see-through head-mounted displays with a depth
 camera" (VR): after a full calibration when the camera is mounted, a simplified one for each wearer,
-8 alignments according to Hu et al. 2021. Both publications are known to us only second hand, and
-the equations of this one not at all: here the simplified calibration keeps the offline display and
-solves for the eye.
+8 alignments according to Hu et al. 2021. We know both publications only from others, and not the
+equations of the latter: here the simplified calibration keeps the offline display and solves for
+the eye.
 """
 
 from __future__ import annotations

@@ -32,43 +32,45 @@ Projections: TypeAlias = Mapping[Eye, Float64]
 
 PAPER = "rcICP (the paper's), 1"
 HANDCAL_BOTH, HANDCAL_EACH = "handcal, both eyes,", "handcal, each eye,"
-"""With the number of alignments behind."""
+"""Followed by the number of alignments."""
 
 _SPAAM_COUNTS = 6, 12, 25
 _STEREO_COUNTS = 12, 25
 _HAND_COUNTS = 1, 2, 3, 5
 _MPAAM_CUBES = 4
 _JUN_COUNT, _MOSER_COUNT = 8, 25
-# "Within a time less than 10 seconds" (Hu et al. 2021); handcal's own is below a tenth.
+# "Within a time less than 10 seconds" (Hu et al. 2021); handcal takes less than 0.1 s.
 _PAPER_SOLVES_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class MethodSettings:
-    """Settings of the wearers on whom methods are compared."""
+    """Settings of the simulated wearers with whom methods are compared."""
 
     wearers: int = 100
     eye_distance_sigmas_m: tuple[float, ...] = (0.0, 0.002)
-    """Populations: how far eye distances vary from the rig's. 0 is a headset set to its wearer."""
+    """Standard deviation of each population's eye distances from the rig's; 0 for a headset that is
+    adjusted to its wearer."""
     noise_scale: float = 1.0
-    """Errors of an overlay, in those of `WearerSettings`. Set so that the paper's own method errs
-    as in the paper (`handcal.lab.study.wearer_noise`)."""
+    """Scale of the placement errors of `WearerSettings`. With the default, the paper's method has
+    its published error (`handcal.lab.study.wearer_noise`)."""
     points: int = 1500
-    """Of each cloud of the hand."""
+    """Number of points of each cloud."""
     depth_sigma_m: float = 0.001
-    """Of each of its points."""
+    """Standard deviation of each point's depth."""
     hands: int = 10
     """Number of different hands."""
     pointing_sigma_arcmin: float = 5.9
-    """Of a tracked point against crosshairs, about each of two axes: what 11 recorded SPAAM
-    calibrations leave, tracker included (`handcal.lab.study.recorded`)."""
+    """Standard deviation of pointing at crosshairs, about each of two axes, including the tracker:
+    the residual of 11 recorded SPAAM calibrations (`handcal.lab.study.recorded`)."""
     fingertip_sigma_m: float = 0.003
-    """Of a tracked fingertip, each axis, beyond that. An assumption."""
+    """Additional standard deviation of a tracked fingertip, each axis; an assumption."""
     corner_sigma_m: float = 0.001
-    """Of a tracked cube's corner, each axis. An assumption."""
+    """Standard deviation of a tracked cube's corner, each axis; an assumption."""
     eye_tracker_sigma_m: tuple[float, float, float] = (0.0021, 0.0008, 0.002)
-    """Of a tracked eye, E axes: x and y as far as those recordings differ from the eye that their
-    alignments tell, without what is common to all; z an assumption."""
+    """Standard deviation of a tracked eye, E axes. x and y: deviation of the tracked eyes of those
+    recordings from the eyes solved from their alignments, without the common offset; z is an
+    assumption."""
     seed: int = 1
 
 
@@ -82,12 +84,12 @@ class MethodCalibration:
 
     method: str
     alignments: int
-    """The wearer's, for both eyes together."""
+    """Number of alignments, for both eyes together."""
     wearer_s: float
-    """Of the wearer's time."""
+    """Time that the wearer needs."""
     projections: Projections | None
-    """each (3, 4); None if the method refused the alignments. One that puts the target behind an
-    eye counts as refused too."""
+    """(3, 4) each; None if the method refused the alignments. A projection that puts the target
+    behind an eye counts as refused, too."""
 
 
 def methods_study(settings: MethodSettings) -> Study:
@@ -148,7 +150,7 @@ def target_errors(wearer: StudyWearer, projections: Projections, depth_m: float)
     errors: dict[str, Any] = {}
     rays = []
     for eye in EYES:
-        P = wearer.sees(eye)
+        P = wearer.true_projection(eye)
         drawn_px = project(projections[eye], corners_m)
         error_px = np.linalg.norm(drawn_px - project(P, corners_m), axis=1)
         for corner, arcmin in enumerate(arcmin_from_px(wearer.rig.eyes[eye], error_px), 1):
@@ -210,7 +212,7 @@ def _seconds(alignments: int, *, by_hand: bool = False) -> float:
 def _by_points(
     wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
 ) -> Iterator[MethodCalibration]:
-    """SPAAM, Stereo-SPAAM, fingertips, and INDICA."""
+    """Calibrate by SPAAM, Stereo-SPAAM, fingertips, and INDICA."""
     sigma_arcmin = settings.pointing_sigma_arcmin
     for count in _SPAAM_COUNTS:
         pairs = {eye: align_points(wearer, rng, count, [eye], sigma_arcmin, 0.0) for eye in EYES}
@@ -230,7 +232,7 @@ def _by_points(
 def _by_fingertips(
     wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings
 ) -> Iterator[MethodCalibration]:
-    """SPAAM of fingertips, and the eye alone from some of them."""
+    """Calibrate by SPAAM from fingertips, and solve the eye alone from some of them."""
     tips = {
         eye: align_points(
             wearer,
@@ -259,7 +261,7 @@ def _by_fingertips(
 
 
 def _spaam(pairs: Mapping[Eye, tuple[Float64, Mapping[Eye, Float64]]]) -> Projections | None:
-    """Return both eyes' SPAAM, or None if it refuses one."""
+    """Return SPAAM's projections of both eyes; None if it refuses one."""
     try:
         return {
             eye: solve_spaam(points_m, pixels[eye]) for eye, (points_m, pixels) in pairs.items()
@@ -285,7 +287,7 @@ def _by_cubes(
     placement: WearerSettings,
     settings: MethodSettings,
 ) -> Iterator[MethodCalibration]:
-    """MPAAM with each of its maps, of the same alignments."""
+    """Calibrate by MPAAM with each of its maps, from the same alignments."""
     cubes = [
         align_cube(wearer, rng, placement, settings.corner_sigma_m) for _ in range(_MPAAM_CUBES)
     ]
@@ -305,7 +307,7 @@ def _by_both_eyes(
     placement: WearerSettings,
     settings: MethodSettings,
 ) -> Iterator[MethodCalibration]:
-    """Run the paper's method, and handcal with both eyes open: the first alignment is the same."""
+    """Calibrate by the paper's method and by handcal, with both eyes open, from the same start."""
     fused = _align_in_turn(wearer, rng, [EYES] * max(_HAND_COUNTS), placement, settings)
     for count, (alignment, shift_m) in enumerate(fused, 1):
         if count == 1:
@@ -325,7 +327,7 @@ def _by_each_eye(
     placement: WearerSettings,
     settings: MethodSettings,
 ) -> Iterator[MethodCalibration]:
-    """Handcal with one eye open at a time: as many alignments of each."""
+    """Calibrate by handcal with one eye open at a time, with equally many alignments of each."""
     order: list[tuple[Eye, ...]] = [("left",), ("right",)] * max(_HAND_COUNTS)
     for done, (_, shift_m) in enumerate(_align_in_turn(wearer, rng, order, placement, settings), 1):
         count, half = divmod(done, 2)
@@ -342,7 +344,7 @@ def _align_in_turn(
     placement: WearerSettings,
     settings: MethodSettings,
 ) -> Iterator[tuple[Alignment, Mapping[Eye, Float64]]]:
-    """Yield each alignment, and φ fused of all so far, with which the next cursor is drawn."""
+    """Yield each alignment, and φ fused from all so far, with which the next cursor is drawn."""
     solved: list[tuple[Alignment, Mapping[Eye, EyeShift]]] = []
     shift_m: dict[Eye, Float64] = dict.fromkeys(EYES, np.zeros(3))
     for eyes in order:

@@ -36,10 +36,10 @@ _CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179
 
 @dataclass(frozen=True, slots=True)
 class NoiseSettings:
-    """Settings of the simulated alignments, and their numbers.
+    """Settings and numbers of the simulated alignments.
 
-    Where a section varies something else, clouds are as a sensor gives them: sampled apart, with
-    `depth_sigma_m` of noise, the hand turned by `angle_deg`, φ uniform within ± 10 mm.
+    Whatever a section does not vary has these values: clouds sampled independently, with noise of
+    `depth_sigma_m`, the hand rotated by `angle_deg`, φ uniform within ± 10 mm.
     """
 
     seed: int = 1
@@ -47,21 +47,21 @@ class NoiseSettings:
     """Alignments of each value, for ``consistent`` and ``icp``."""
     linear_trials: int = 20
     paper_trials: int = 8
-    """The first so many of them, but for the section of hand shapes, are solved by ``linear``, and
-    by ``paper``, which is slow."""
+    """Number of these that are also solved by ``linear``, and by ``paper``, which is slow; not in
+    the section of hand shapes."""
     hands: int = 20
     """Number of people, each with several alignments; the errors of one person are correlated."""
     points: int = 1000
-    """Of each cloud."""
+    """Number of points of each cloud."""
     depth_sigma_m: float = 0.001
     angle_deg: float = 3.0
     coarse_deg: tuple[float, ...] = tuple(5.0 * i for i in range(13))
     fine_deg: tuple[float, ...] = tuple(float(i) for i in range(21))
     """Rotations of the paper's two figures."""
     kept_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 20.0)
-    """Rotations of a hand that keeps its size, as the paper's does not quite."""
+    """Rotations of a hand of constant size; that of the paper's simulation changes a little."""
     shift_max_m: tuple[float, ...] = (0.005, 0.010, 0.015, 0.020, 0.030)
-    """Each component of φ is uniform within ± these."""
+    """Limits of φ: each component is uniform within ± the value."""
     depth_sigmas_m: tuple[float, ...] = (0.0, 0.0005, 0.001, 0.002, 0.004)
     """Standard deviations of each point's depth."""
     forearms_m: tuple[float, ...] = (0.0, 0.02, 0.04, 0.06, 0.08)
@@ -70,9 +70,9 @@ class NoiseSettings:
     """Points of each cloud."""
     shapes: int = 24
     shape_trials: int = 20
-    """Hands of other people, and how often each is aligned."""
+    """Number of other people's hands, and of alignments of each."""
     slips: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)
-    """Errors of a wearer who looks through the displays, as a multiple of the usual."""
+    """Placement errors of a wearer who looks through the displays, as multiples of the default."""
 
 
 QUICK_NOISE = NoiseSettings(
@@ -93,26 +93,26 @@ QUICK_NOISE = NoiseSettings(
 )
 """Smoke-test settings: results are not meaningful."""
 
-_Making: TypeAlias = "tuple[AlignmentSettings, float]"
+_Scenario: TypeAlias = "tuple[AlignmentSettings, float]"
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseSection:
-    """A part of the study, in which one thing varies."""
+    """A part of the study, in which one value varies."""
 
     name: str
     values: Callable[[NoiseSettings], Sequence[float]]
     """Returns its values from the settings."""
-    making: Callable[[NoiseSettings, float], _Making] | None
-    """From settings and value, how alignments are made, and their rotation in degrees; None for
-    those that a wearer makes."""
+    scenario: Callable[[NoiseSettings, float], _Scenario] | None
+    """Returns the settings of the alignments and their rotation in degrees, given settings and
+    value; None for alignments that a simulated wearer makes."""
     label: str
     """Name of the value that varies, with the unit in which it is shown."""
     scale: float = 1.0
-    """From a value to that unit."""
+    """Factor from a value to that unit."""
 
 
-def _measured(settings: NoiseSettings, **changes: Any) -> _Making:
+def _measured(settings: NoiseSettings, **changes: Any) -> _Scenario:
     usual = AlignmentSettings(
         count=settings.points, resample=True, depth_sigma_m=settings.depth_sigma_m
     )
@@ -186,7 +186,7 @@ def noise_study(settings: NoiseSettings) -> Study:
 
 
 def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
-    """Simulate one alignment and solve it by every method that uses this trial number.
+    """Simulate one alignment and solve it by every method that uses this trial.
 
     Returns
     -------
@@ -203,8 +203,8 @@ def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
     rng = np.random.default_rng([settings.seed, trial])
     solved = (
         _solve_wearer(settings, float(case["value"]), rng, hand, trial, methods)
-        if section.making is None
-        else _solve(*section.making(settings, float(case["value"])), rng, hand, methods)
+        if section.scenario is None
+        else _solve(*section.scenario(settings, float(case["value"])), rng, hand, methods)
     )
     rows: list[StudyRow] = []
     for method, iterations, error_m in solved:
@@ -217,14 +217,14 @@ _Solved: TypeAlias = Iterator[tuple[str, int, Float64]]
 
 
 def _solve(
-    making: AlignmentSettings,
+    scenario: AlignmentSettings,
     angle_deg: float,
     rng: np.random.Generator,
     hand: int,
     methods: Sequence[Method],
 ) -> _Solved:
-    made = simulate_alignment(rng, study_hand(hand), np.radians(angle_deg), making, _CAMERA)
-    yield FLOOR, 0, floor_error_m(made, exact=making.exact)
+    made = simulate_alignment(rng, study_hand(hand), np.radians(angle_deg), scenario, _CAMERA)
+    yield FLOOR, 0, floor_error_m(made, exact=scenario.exact)
     for method in methods:
         found = solve_trial(made, method)
         yield method, found.iterations, found.shift_m - made.shift_m

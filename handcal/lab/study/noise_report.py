@@ -164,7 +164,7 @@ def _lead(points: Sequence[_Point]) -> str:
 
 
 def _published(points: Sequence[_Point]) -> Table:
-    """Return the paper's findings beside those of this study."""
+    """Return the paper's findings and those of this study."""
     reach = f"within {LINE_MM:g} mm up to"
     rows = [
         (f"{method}: {what} {reach}", published, f"{_reach_deg(points, method, mean):g}°")

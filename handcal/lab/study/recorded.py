@@ -66,20 +66,20 @@ class RecordedResult:
     alignments: int
     spaam_px: float
     authors_spaam_px: float
-    """Of SPAAM on its own alignments, ours and the authors'."""
+    """Error of SPAAM on its own alignments, by our code and by the authors'."""
     difference_px: float
-    """Largest difference, in x or y, between the markers drawn with the two."""
+    """Largest difference, in x or y, between the markers drawn with both."""
     base_px: float
-    """Of the base recording's SPAAM, as it is."""
+    """Error of the base recording's SPAAM, unchanged."""
     recycled_px: float
     full_px: float
-    """Of INDICA's two setups."""
+    """Errors of INDICA's two setups."""
     pointing_sigma_px: float
     pointing_sigma_arcmin: float
     """Residual of SPAAM about each axis, with its 11 unknowns taken into account."""
     eye_miss_mm: tuple[float, float, float]
-    """From the eye that best explains the alignments through the base's display to the tracked eye:
-    right, along pixel rows downward, away from the eye. The last is hardly determined."""
+    """Offset of the tracked eye from the eye that fits the alignments best through the base's
+    display: right, down along the pixel rows, away from the eye. The last is hardly determined."""
 
 
 def read_recordings(folder: Path) -> RecordedSet:
@@ -189,10 +189,11 @@ def _forward(P: Float64, points_m: Float64) -> Float64:
 
 
 def _choose_eye(candidates_m: Float64) -> Float64:
-    """Return the eye of the tracker's candidates, which come in pairs of which one is wrong.
+    """Return the eye among the tracker's candidates, which come in pairs of which one is wrong.
 
-    As the authors do: two clusters by medians and city-block distances; the tighter one's median.
-    They start at random, here from the two halves along the longest axis. z points to the eye.
+    As in the authors' code: the median of the tighter of two clusters, by medians and city-block
+    distances. Theirs start at random, these from the two halves along the longest axis. z points to
+    the eye.
     """
     offsets = candidates_m - np.median(candidates_m, axis=0)
     axis = np.linalg.svd(offsets - offsets.mean(axis=0))[2][0]
@@ -221,7 +222,7 @@ def _table(path: Path, columns: int) -> Float64:
 
 
 def _archived(path: Path, count: int) -> Float64:
-    """Return the last numbers of a file of Ubitrack's, a Boost text archive.
+    """Return the last numbers of a file by Ubitrack, a Boost text archive.
 
     A pose is a quaternion x, y, z, w and a position, with two counters between.
     """

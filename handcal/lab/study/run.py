@@ -37,8 +37,8 @@ class Study:
     cases: Sequence[Case]
     trial: Callable[[Any, Case], list[StudyRow]]
     """Gives the rows of one case from `settings` and the case, its random numbers from these alone.
-    A function of a module, so that other processes can import it; no number in its rows is NaN or
-    infinite."""
+    Must be a function of a module, so that other processes can import it; its rows must not contain
+    NaN or infinity."""
 
 
 def run_study(
@@ -49,7 +49,7 @@ def run_study(
     scheduler: str | None = None,
     progress: Progress = Progress(),
 ) -> list[StudyRow]:
-    """Run the cases of a study that are left, and return the rows of all cases in their order.
+    """Run the remaining cases of a study, and return the rows of all cases in their order.
 
     The rows do not depend on the number of workers. Completed chunks of cases are kept in `folder`,
     so that a study that was cancelled or killed can be resumed; ``rows.csv`` there holds all rows.
@@ -100,7 +100,7 @@ def run_study(
 
 @contextmanager
 def resumable() -> Iterator[None]:
-    """Say, where the block is cancelled, that the study can be resumed."""
+    """Add to a cancellation in the block that the study can be resumed."""
     try:
         yield
     except CancelledError:

@@ -31,12 +31,12 @@ def holds_study(folder: Path) -> bool:
 
 
 def free_of_studies(folder: Path) -> Path:
-    """Return a folder that other results may go into.
+    """Return a folder that may take other results.
 
     Raises
     ------
     FileError
-        If it is that of a study, whose report would be replaced.
+        If it is the folder of a study, whose report would be replaced.
     """
     if holds_study(folder):
         raise FileError(f"{folder} holds a study; choose another folder for the results")
@@ -93,7 +93,7 @@ class StudyFolder:
             )
 
     def has_chunk(self, number: int) -> bool:
-        """Return at once whether a chunk is there, complete or damaged."""
+        """Return whether a chunk exists, complete or damaged, without reading it."""
         return self._file(number).exists()
 
     def read_chunk(self, number: int) -> list[list[StudyRow]] | None:

@@ -1,4 +1,4 @@
-"""Studies that can be ordered: run, or resumed, and reported."""
+"""Studies on simulated wearers: run or resumed, and reported."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class StudyResult:
     files: tuple[Path, ...]
     """The report as PDF and as HTML."""
     noise: NoiseFit | None = None
-    """The noise that was searched for; None without a search."""
+    """Result of the search for the noise; None without a search."""
 
 
 def run_noise_study(settings: NoiseStudySettings, progress: Progress) -> StudyResult:
@@ -45,7 +45,7 @@ def run_method_comparison(settings: MethodComparisonSettings, progress: Progress
     Raises
     ------
     HandcalError
-        If no noise makes the paper's method err as published.
+        If the paper's method has its published error at no noise.
     """
     study = method_cases(settings)
     if not settings.noise_wearers:

@@ -1,4 +1,4 @@
-"""One simulated alignment: the hand of the person, and the solution of each method."""
+"""One simulated alignment: the person's hand, and the solution by each method."""
 
 from __future__ import annotations
 

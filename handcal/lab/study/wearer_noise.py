@@ -1,7 +1,7 @@
-"""Search of the wearers' errors with which the paper's method errs as in the paper's user test.
+"""Search for the placement errors with which the paper's method has its published error.
 
-A method comparison is only as good as its simulated wearers. Their overlay errors are multiples of
-`WearerSettings`' errors: across, in size and in rotation alike.
+A method comparison is only as good as its simulated wearers. All their placement errors, lateral,
+in depth and in rotation, are those of `WearerSettings` times one scale.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ class NoiseFit:
     """The result of the search."""
 
     scale: float
-    """Errors of an overlay in those of `WearerSettings`."""
+    """Scale of the placement errors of `WearerSettings`."""
     mean_arcmin: float
     sd_arcmin: float
-    """The paper's method with it, over all corners of all wearers."""
+    """Error of the paper's method at this scale, over all corners of all wearers."""
     mean_by_scale: dict[float, float]
-    """The mean at every scale tried, in arcmin."""
+    """Mean error at each scale tried, in arcmin."""
 
 
 def fit_noise(settings: MethodSettings, wearers: int, progress: Progress = Progress()) -> NoiseFit:
-    """Search for the scale at which the paper's method errs by 10.79′ on the mean.
+    """Search for the scale at which the paper's method has a mean error of 10.79′.
 
     By Brent's method; a wearer's errors differ between scales only in size. Eye
     distances are the rig's, as the paper's headset was set to its users.

@@ -1,4 +1,4 @@
-"""A simulated wearer who does what each calibration method asks: hands, points, a cube.
+"""A simulated wearer who makes the alignments of each calibration method: hands, points, a cube.
 
 Alignments and their errors are simulated by rays through the displays, without any method's
 equations.
@@ -46,19 +46,19 @@ class StudyWearer:
         """Return the transform from the headset to an eye's E."""
         return view_of_eye(self.rig.eyes[eye], np.eye(4))
 
-    def sees(self, eye: Eye) -> Float64:
+    def true_projection(self, eye: Eye) -> Float64:
         """Return the true projection (3, 4) of an eye: pixels from points in H."""
         return eye_projection(self.rig.eyes[eye], self.true_shift_m[eye]) @ self.T_E_H(eye)
 
     def eye_m(self, eye: Eye) -> Float64:
-        """Return where an eye is, in H."""
+        """Return the position of an eye in H."""
         T_H_E = invert(self.T_E_H(eye))
         eye_m: Float64 = transform(T_H_E, self.true_shift_m[eye][None])[0]
         return eye_m
 
 
 def draw_wearer(rng: np.random.Generator, hand_seed: int, placement: WearerSettings) -> StudyWearer:
-    """Draw a wearer: where the headset sits, and the eyes behind it."""
+    """Draw a wearer: the position of the headset, and the eyes behind it."""
     return StudyWearer(example_rig(), study_hand(hand_seed), draw_eyes(rng, placement))
 
 
@@ -71,7 +71,7 @@ def align_hand(
     points: int,
     depth_sigma_m: float,
 ) -> Alignment:
-    """Let the wearer overlay the hand on its cursor with some eyes open; the guard refuses turns.
+    """Let the wearer overlay the hand on its cursor, rotated by no more than the guard allows.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ def align_hand(
     drawn_shift_m : mapping of eye to (3,) float64
         φ that the cursor is drawn with.
     placement : WearerSettings
-        How far overlays miss.
+        Placement errors.
     points : int
-        Of each cloud.
+        Number of points of each cloud.
     depth_sigma_m : float
-        Of each point.
+        Standard deviation of each point's depth.
     """
     error = draw_placement_error(rng, placement)
     while np.linalg.norm(error.rotation_rad) > GuardSettings().limit_rad:
@@ -112,8 +112,8 @@ def align_points(
 ) -> tuple[Float64, dict[Eye, Float64]]:
     """Let the wearer align a tracked point with crosshairs all over the display, within reach.
 
-    With several eyes open the crosshairs are fused: each eye errs for itself, so that the depth
-    errs by the disparity. Every alignment is at a depth of its own, from 0.35 to 0.70 m.
+    With both eyes open the crosshairs are fused: the errors of the eyes are independent, and their
+    disparity is an error in depth. Each alignment has its own depth, from 0.35 to 0.70 m.
 
     Parameters
     ----------
@@ -121,11 +121,11 @@ def align_points(
     rng : numpy.random.Generator
     count : int
     eyes : sequence of eye
-        Open ones.
+        The open eyes.
     pointing_sigma_arcmin : float
-        About each of two axes.
+        Standard deviation about each of two axes.
     tracking_sigma_m : float
-        Of the tracked point, each axis.
+        Standard deviation of the tracked point, each axis.
 
     Returns
     -------
@@ -139,7 +139,9 @@ def align_points(
     for eye in eyes:
         focal_px = wearer.rig.eyes[eye].K[0, 0]
         sigma_px = focal_px * np.radians(pointing_sigma_arcmin / 60.0)
-        pixels[eye] = project(wearer.sees(eye), points_m) + rng.normal(0.0, sigma_px, (count, 2))
+        pixels[eye] = project(wearer.true_projection(eye), points_m) + rng.normal(
+            0.0, sigma_px, (count, 2)
+        )
     return points_m + rng.normal(0.0, tracking_sigma_m, points_m.shape), pixels
 
 
@@ -156,9 +158,9 @@ def align_cube(
     wearer : StudyWearer
     rng : numpy.random.Generator
     placement : WearerSettings
-        Errors of the overlay, the same as those of a hand.
+        Placement errors, as for a hand.
     tracking_sigma_m : float
-        Of each corner, each axis.
+        Standard deviation of each corner, each axis.
 
     Returns
     -------
@@ -205,7 +207,7 @@ def _point_on_displays(
         ray = np.linalg.solve(P[:, :3], [*(rng.uniform(0.05, 0.95, 2) * size_px), 1.0])
         point_E_m = wearer.true_shift_m[eyes[0]] + depth_m * ray / ray[2]
         point_m = transform(T_H_E, point_E_m[None])
-        seen_px = np.array([project(wearer.sees(eye), point_m)[0] for eye in eyes])
+        seen_px = np.array([project(wearer.true_projection(eye), point_m)[0] for eye in eyes])
         if ((seen_px >= 0.0) & (seen_px <= size_px)).all():
             return np.asarray(point_m[0])
 

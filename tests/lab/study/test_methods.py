@@ -92,7 +92,7 @@ def test_both_populations_have_the_same_wearers() -> None:
 
 def test_target_errors_of_the_truth_are_none() -> None:
     wearer, _ = study_wearer(ERRORLESS, CASE)
-    errors = target_errors(wearer, {eye: wearer.sees(eye) for eye in EYES}, 0.5)
+    errors = target_errors(wearer, {eye: wearer.true_projection(eye) for eye in EYES}, 0.5)
     assert max(errors.values()) < 1e-6
 
 
@@ -119,7 +119,9 @@ def test_a_wrong_eye_distance_is_seen_in_depth() -> None:
 
 def test_a_projection_that_puts_the_target_behind_the_eye_counts_as_refused() -> None:
     wearer, _ = study_wearer(ERRORLESS, CASE)
-    behind = MethodCalibration("behind", 1, 1.0, {eye: -wearer.sees(eye) for eye in EYES})
+    behind = MethodCalibration(
+        "behind", 1, 1.0, {eye: -wearer.true_projection(eye) for eye in EYES}
+    )
     rows = method_rows(wearer, behind, CASE)
     assert [row["refused"] for row in rows] == [True] * 3
 
@@ -129,7 +131,7 @@ def test_points_are_on_the_displays_and_err_as_told() -> None:
     rng = np.random.default_rng(1)
     points_m, pixels = align_points(wearer, rng, 400, EYES, 6.0, 0.0)
     for eye in EYES:
-        off_px = pixels[eye] - project(wearer.sees(eye), points_m)
+        off_px = pixels[eye] - project(wearer.true_projection(eye), points_m)
         sigma_arcmin = 60.0 * np.degrees(off_px.std() / wearer.rig.eyes[eye].K[0, 0])
         assert sigma_arcmin == pytest.approx(6.0, rel=0.1)
     assert np.linalg.norm(solve_spaam(points_m, pixels["left"])) == pytest.approx(1.0)
@@ -140,7 +142,7 @@ def test_a_cube_covers_its_counterpart() -> None:
     tracked_m, shown_m = align_cube(wearer, np.random.default_rng(1), placement, 0.0)
     offline = rendered(wearer, dict.fromkeys(EYES, np.zeros(3)))
     for eye in EYES:
-        seen_px = project(wearer.sees(eye), tracked_m)
+        seen_px = project(wearer.true_projection(eye), tracked_m)
         drawn_px = project(offline[eye], shown_m)
         # A cube cannot cover both eyes' images: the eye distance is not the rig's.
         assert np.linalg.norm(seen_px - drawn_px, axis=1).mean() < 25.0
