@@ -40,10 +40,19 @@ def docstrings(source: str) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.value.value
 
 
+def names(source: str) -> Iterator[tuple[int, str]]:
+    """Yield line and words of the name of each function and class."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.lineno, node.name.replace("_", " ")
+
+
 def complaints(source: str, kind: str) -> list[str]:
     """Return what is not plain in a text of a kind: ``package``, ``tests`` or ``text``."""
     documented = [] if kind == "text" else list(docstrings(source))
     searched = documented if kind == "tests" else [(1, source)]
+    if kind == "package":
+        searched = [*searched, *names(source)]
     found = [
         (line, f"begins with {match[1]}")
         for line, text in documented
@@ -77,6 +86,7 @@ def test_files_are_in_plain_english() -> None:
         ),
         ('"""However."""', "package", []),
         ("# Lest it end.", "package", ["1: says 'Lest'"]),
+        ("\ndef _begin_anew(): ...", "package", ["2: says 'anew'"]),
         ("# Lest it end.", "tests", []),
         ("x = 1\ny = (\n    'it is '\n    'told'\n)", "package", ["3: says 'is told'"]),
         ("It is so\nlong. It is so long as it is.", "text", ["1: says 'so long'"]),
