@@ -213,7 +213,7 @@ class TrialsPanel(QWidget):
         self._depth.currentIndexChanged.connect(self._request_target)
         self._shows_target.setToolTip(
             "Draw the target for this eye, at this distance straight ahead, until a cursor is made "
-            "or the session finished"
+            "or the session is finished"
         )
         self._shows_target.toggled.connect(self._request_target)
 
