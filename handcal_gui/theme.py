@@ -243,7 +243,7 @@ def _palette(shades: _Shades) -> QPalette:
     return palette
 
 
-@lru_cache(maxsize=512)  # half the time of opening a window
+@lru_cache(maxsize=512)  # a quarter of the time of opening a window
 def _draw(svg: bytes, size_px: int) -> QImage:
     image = QImage(size_px, size_px, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)

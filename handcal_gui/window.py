@@ -29,7 +29,6 @@ from PySide6.QtWidgets import (
     QStackedWidget,
     QStatusBar,
     QTabWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -47,6 +46,7 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.banner import Banner
+from handcal_gui.widgets.layouts import vbox
 
 Page = Literal["start", "live", "review"]
 _LAYOUT_VERSION = 1
@@ -135,10 +135,12 @@ class MainWindow(QMainWindow):
         for page in self._pages.values():
             self._stack.addWidget(_scrollable(page))
         middle = QWidget()
-        layout = QVBoxLayout(middle)
-        layout.setContentsMargins(SPACING_PX // 2, SPACING_PX // 2, SPACING_PX // 2, 0)
-        layout.addWidget(self.banner)
-        layout.addWidget(self._stack, 1)
+        vbox(
+            self.banner,
+            (self._stack, 1),
+            on=middle,
+            margins=(SPACING_PX // 2, SPACING_PX // 2, SPACING_PX // 2, 0),
+        )
         self.setCentralWidget(middle)
         self._bar = wizard.bar
         self.setStatusBar(_Strip(self._bar))

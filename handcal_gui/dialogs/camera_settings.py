@@ -11,13 +11,13 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFormLayout,
     QSpinBox,
-    QVBoxLayout,
     QWidget,
 )
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import choice, hbox, paragraph, whole_number, with_name
+from handcal_gui.widgets.fields import choice, fill_row, paragraph, whole_number, with_name
+from handcal_gui.widgets.layouts import vbox
 
 _AS_IT_IS = "Keep the camera's setting"
 _PROFILES: dict[Profile, str] = {
@@ -109,7 +109,7 @@ class CameraSettingsDialog(QDialog):
 
     def _lay_out(self) -> None:
         filters = QWidget()
-        hbox(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
+        fill_row(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
         form = QFormLayout()
         form.setSpacing(SPACING_PX)
         form.addRow("Image size", self._profile)
@@ -128,11 +128,7 @@ class CameraSettingsDialog(QDialog):
         restore.clicked.connect(lambda: self._show(RealSenseSettings()))
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addLayout(form)
-        layout.addWidget(buttons)
+        vbox(form, buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
 
 
 class _OwnNumber(QWidget):
@@ -157,7 +153,7 @@ class _OwnNumber(QWidget):
             QCheckBox(left), f"{number.objectName()}Left", f"{label}: {left}", number.toolTip()
         )
         self._left.toggled.connect(number.setDisabled)
-        hbox(self, number, self._left, grows=self._left)
+        fill_row(self, number, self._left, grows=self._left)
 
     @property
     def value(self) -> float | None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from handcal.export.export import ExportSettings, export_session
 from handcal.progress import Progress
@@ -16,6 +16,7 @@ from handcal_gui.dialogs.export_progress import ExportProgress
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button
+from handcal_gui.widgets.layouts import hbox, vbox
 
 Export = Callable[..., tuple[Path, ...]]
 
@@ -157,13 +158,5 @@ class ExportDialog(QDialog):
         self._close.setEnabled(True)
 
     def _lay_out(self) -> None:
-        buttons = QHBoxLayout()
-        buttons.setSpacing(SPACING_PX)
-        buttons.addStretch(1)
-        for one in (self._back, self._close, self._export):
-            buttons.addWidget(one)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addWidget(self._pages, 1)
-        layout.addLayout(buttons)
+        buttons = hbox(1, self._back, self._close, self._export, spacing=SPACING_PX)
+        vbox((self._pages, 1), buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)

@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, Format
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import number, with_name
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
@@ -112,9 +113,4 @@ class ExportChoices(QWidget):
         form.addRow("Far plane (OpenGL, Unity)", self._far)
         form.addRow("Export to", self._folder)
         form.addRow("", QLabel(f"The folder {self._name} is created there."))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(3 * SPACING_PX)
-        layout.addLayout(formats)
-        layout.addLayout(form)
-        layout.addStretch(1)
+        vbox(formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)

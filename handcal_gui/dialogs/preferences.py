@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import choice
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
@@ -46,11 +47,7 @@ class PreferencesDialog(QDialog):
             one.setIcon(QIcon())  # like all other buttons
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addWidget(self._calibration)
-        layout.addWidget(buttons)
+        vbox(self._calibration, buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
 
     def preferences(self) -> Preferences:
         """Return the preferences with the values shown."""

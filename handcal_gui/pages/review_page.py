@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
@@ -43,18 +44,16 @@ class ReviewPage(QWidget):
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)
         close.clicked.connect(self.close_requested)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self._export)
-        buttons.addWidget(self._resume)
-        buttons.addStretch()
-        buttons.addWidget(close)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addWidget(self._title)
-        layout.addLayout(self._facts)
-        layout.addLayout(buttons)
-        layout.addStretch()
+        buttons = hbox(self._export, self._resume, 0, close)
+        vbox(
+            self._title,
+            self._facts,
+            buttons,
+            0,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=2 * SPACING_PX,
+        )
 
     def show_session(self, record: SessionRecord, results: Results | None, note: str = "") -> None:
         """Show a session and, if it has been solved, its results.

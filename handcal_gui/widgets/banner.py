@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.sentence import sentence
 
 
@@ -31,11 +32,13 @@ class Banner(QWidget):
         close.setToolTip("Close this message (Esc)")
         close.clicked.connect(self.clear)
         self._close = close
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2)
-        layout.addWidget(self._icon)
-        layout.addWidget(self._text, 1)
-        layout.addWidget(close)
+        hbox(
+            self._icon,
+            (self._text, 1),
+            close,
+            on=self,
+            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
+        )
         follow_theme(self, self._refresh)
 
     @property

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
     QDoubleSpinBox,
-    QHBoxLayout,
     QLabel,
     QPushButton,
     QSizePolicy,
@@ -20,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.widgets.layouts import hbox
 
 Field = TypeVar("Field", bound=QWidget)
 Spin = TypeVar("Spin", bound=QAbstractSpinBox)
@@ -101,14 +101,10 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
     return label
 
 
-def hbox(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
+def fill_row(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
     """Lay out widgets in a row without margins, from the left; one of them may stretch."""
-    layout = QHBoxLayout(row)
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setSpacing(SPACING_PX)
-    for widget in widgets:
-        layout.addWidget(widget, 1 if widget is grows else 0)
-    layout.addStretch(0)
+    items = [(widget, 1 if widget is grows else 0) for widget in widgets]
+    hbox(*items, 0, on=row, margins=0, spacing=SPACING_PX)
 
 
 def _settle(field: Spin) -> Spin:

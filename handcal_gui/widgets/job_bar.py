@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLabel, QProgressBar, QWidget
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import button, hbox, with_name
+from handcal_gui.widgets.fields import button, fill_row, with_name
 
 _WHOLE = 1000
 
@@ -38,7 +38,7 @@ class JobBar(QWidget):
         self._bar.setFixedWidth(20 * SPACING_PX)
         self._cancel = button("cancel", "Cancel")
         self._cancel.clicked.connect(self.cancel)
-        hbox(self, self._bar, self._doing, self._cancel, grows=self._doing)
+        fill_row(self, self._bar, self._doing, self._cancel, grows=self._doing)
         self._refresh()
         self.setMinimumHeight(self._cancel.sizeHint().height())
 

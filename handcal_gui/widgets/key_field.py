@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from handcal_gui.widgets.fields import button, hbox, with_name
+from handcal_gui.widgets.fields import button, fill_row, with_name
 
 
 class KeyField(QWidget):
@@ -22,7 +22,7 @@ class KeyField(QWidget):
         self._reveal = button("showKey", "Show", "Show the pairing key")
         self._reveal.setCheckable(True)
         copy = button("copyKey", "Copy", "Copy the pairing key")
-        hbox(self, self._key, self._reveal, copy, grows=self._key)
+        fill_row(self, self._key, self._reveal, copy, grows=self._key)
         self.setFocusProxy(self._key)
         self._reveal.toggled.connect(self._show)
         copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))

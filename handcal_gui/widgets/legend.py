@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QLineF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.number_label import NumberLabel
 
 _SAMPLE_PX = (22, 14)
@@ -50,12 +51,7 @@ class LegendEntry(QWidget):
         self._name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._number = NumberLabel(f"{self.objectName()}-number", widest, tooltip)
         self._number.setVisible(bool(widest))
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(self._sample)
-        layout.addWidget(self._name)
-        layout.addWidget(self._number)
+        hbox(self._sample, self._name, self._number, on=self, margins=0, spacing=SPACING_PX // 2)
 
     @property
     def text(self) -> str:

@@ -7,7 +7,7 @@ from typing import Literal
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
-from handcal_gui.widgets.fields import button, hbox
+from handcal_gui.widgets.fields import button, fill_row
 
 INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
 """File filter for a camera's intrinsics."""
@@ -54,7 +54,7 @@ class PathField(QWidget):
                 text = f"{one.capitalize()}…" if kind == "either" else "Choose…"
                 buttons.append(button(f"{one}Choice", text, f"Choose {name.lower()}"))
                 buttons[-1].clicked.connect(ask)
-        hbox(self, self._line, *buttons, grows=self._line)
+        fill_row(self, self._line, *buttons, grows=self._line)
         self.setFocusProxy(self._line)
 
     @property

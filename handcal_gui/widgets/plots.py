@@ -6,9 +6,10 @@ from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
+from handcal_gui.widgets.layouts import vbox
 
 pg.setConfigOptions(antialias=True)
 
@@ -52,9 +53,7 @@ class Plot(QWidget):
         for side, label in (("bottom", x_label), ("left", y_label)):
             self.item.getAxis(side).enableAutoSIPrefix(False)
             self.item.setLabel(side, label)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._view)
+        vbox(self._view, on=self, margins=0)
         follow_theme(self, self._recolor)
 
     def sizeHint(self) -> QSize:

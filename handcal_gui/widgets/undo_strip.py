@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+from PySide6.QtWidgets import QToolButton, QWidget
 
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.session_rows import Deletion
 
 
@@ -42,11 +43,7 @@ class UndoStrip(QWidget):
         policy = self._button.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self._button.setSizePolicy(policy)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._text)
-        layout.addWidget(self._button)
+        hbox(self._text, self._button, on=self, margins=0, spacing=SPACING_PX)
         self.show_deletions([])
 
     def show_deletions(self, deletions: Sequence[Deletion]) -> None:

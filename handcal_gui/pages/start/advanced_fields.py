@@ -11,7 +11,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import hbox, number, whole_number, with_name
+from handcal_gui.widgets.fields import fill_row, number, whole_number, with_name
 
 
 class AdvancedFields(QWidget):
@@ -38,7 +38,7 @@ class AdvancedFields(QWidget):
         )
         self._loop = with_name(QCheckBox("Loop"), "loop", help_text="Starts again at the end.")
         playback = QWidget()
-        hbox(playback, self._real_time, self._loop, grows=self._loop)
+        fill_row(playback, self._real_time, self._loop, grows=self._loop)
         self._calibration.add_row("Recordings", playback)
         self._seed = whole_number(
             "seed", 0, 999_999, "Seed of the simulated wearer, hand and room."

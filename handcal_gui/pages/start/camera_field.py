@@ -11,7 +11,7 @@ from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
 from handcal.station.settings import Source, StationSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
-from handcal_gui.widgets.fields import button, choice, hbox, with_name
+from handcal_gui.widgets.fields import button, choice, fill_row, with_name
 from handcal_gui.widgets.path_field import PathField
 
 _SOURCES: dict[Source, str] = {
@@ -46,12 +46,12 @@ class CameraField(QWidget):
             "Image size, preset, exposure, laser power and filters.",
         )
         camera = QWidget()
-        hbox(camera, self._serial, edit, grows=self._serial)
+        fill_row(camera, self._serial, edit, grows=self._serial)
         self._recording = PathField("Recording", "either", _PATTERN)
         details = QStackedWidget()
         for page in (QWidget(), camera, self._recording):  # in the order of _SOURCES
             details.addWidget(page)
-        hbox(self, self._source, details, grows=details)
+        fill_row(self, self._source, details, grows=details)
         self._source.currentIndexChanged.connect(details.setCurrentIndex)
         self._source.currentIndexChanged.connect(self.changed)
         self._serial.textChanged.connect(self.changed)

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from handcal_gui.theme import SPACING_PX, follow_theme, icon, scale_font
 from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.layouts import vbox
 
 
 class Card(QFrame):
@@ -35,11 +36,7 @@ class Card(QFrame):
         head.addWidget(paragraph(text=hint), 1, 0, 1, 2)
         self.body = QVBoxLayout()
         self.body.setSpacing(SPACING_PX)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addLayout(head)
-        layout.addLayout(self.body, 1)
+        vbox(head, (self.body, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
         follow_theme(self, self._refresh)
 
     def _refresh(self) -> None:

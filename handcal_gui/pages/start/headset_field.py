@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from handcal.station.settings import HeadsetKind, StationSettings
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import choice, hbox, whole_number, with_name
+from handcal_gui.widgets.fields import choice, fill_row, whole_number, with_name
 from handcal_gui.widgets.key_field import KeyField
 
 _HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
@@ -42,16 +42,16 @@ class HeadsetField(QWidget):
         self._port = whole_number("port", 1, 65535, "UDP port that the headset connects to.")
         self._address = QWidget()
         address = (QLabel("at"), self._host, QLabel("port"), self._port)
-        hbox(self._address, *address, grows=self._host)
+        fill_row(self._address, *address, grows=self._host)
         self._key = KeyField()
         self._key.set_key(pairing_key)
         self._pairing = QWidget()
-        hbox(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
+        fill_row(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)
         first = QWidget()
-        hbox(first, self._headset, self._address, grows=self._address)
+        fill_row(first, self._headset, self._address, grows=self._address)
         layout.addWidget(first)
         layout.addWidget(self._pairing)
         self._headset.currentIndexChanged.connect(self._show_fitting)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit
+from PySide6.QtWidgets import QComboBox, QLineEdit
 
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.doctor import Finding, Health
@@ -18,6 +18,7 @@ from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
+from handcal_gui.widgets.layouts import hbox
 
 Check = Callable[[StationSettings, str], Mapping[Part, Finding]]
 
@@ -195,11 +196,7 @@ class NewCalibration(Card):
         self._problem.setText(why)
 
     def _lay_out(self) -> None:
-        last = QHBoxLayout()
-        last.setSpacing(SPACING_PX)
-        last.addWidget(self._problem, 1)
-        last.addWidget(self._cancel)
-        last.addWidget(self._button)
+        last = hbox((self._problem, 1), self._cancel, self._button, spacing=SPACING_PX)
         self.body.addWidget(self._form)
         self.body.addLayout(last)
         self.body.addStretch(1)

@@ -11,13 +11,13 @@ from PySide6.QtWidgets import (
     QListWidgetItem,
     QPushButton,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
 from handcal_gui.pages.start.session_entries import Entry
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.fields import button, paragraph, with_name
+from handcal_gui.widgets.layouts import vbox
 
 
 class SessionList(QWidget):
@@ -56,11 +56,9 @@ class SessionList(QWidget):
         self._button.clicked.connect(self._choose)
         self._empty = paragraph("empty", empty)
         self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(self._empty, 1)
-        layout.addWidget(self._list, 1)
+        layout = vbox(
+            (self._empty, 1), (self._list, 1), on=self, margins=0, spacing=SPACING_PX // 2
+        )
         self._buttons = QHBoxLayout()
         self._buttons.addStretch(1)
         self._buttons.addWidget(self._button)

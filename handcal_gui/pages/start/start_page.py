@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QWidget
 
 from handcal.station.preflight import check_station
 from handcal_gui.engine.latest_job import LatestJob
@@ -18,6 +18,7 @@ from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button
+from handcal_gui.widgets.layouts import vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
@@ -157,11 +158,7 @@ class StartPage(QWidget):
     def _lay_out(self) -> None:
         title = QLabel("handcal")
         scale_font(title, 2.0, is_bold=True)
-        right = QVBoxLayout()
-        right.setSpacing(2 * SPACING_PX)
-        right.addWidget(self._resume, 1)
-        right.addWidget(self._open, 1)
-        right.addWidget(self._evaluate)
+        right = vbox((self._resume, 1), (self._open, 1), self._evaluate, spacing=2 * SPACING_PX)
         grid = QGridLayout(self)
         grid.setContentsMargins(*4 * (3 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)

@@ -17,7 +17,7 @@ from handcal_gui.pages.start.advanced_fields import AdvancedFields
 from handcal_gui.pages.start.camera_field import CameraField
 from handcal_gui.pages.start.headset_field import HeadsetField
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, hbox
+from handcal_gui.widgets.fields import button, fill_row
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
 
@@ -105,7 +105,7 @@ class StationForm(QWidget):
 
     def _lay_out(self, wearer: QWidget) -> None:
         rig = QWidget()
-        hbox(rig, self._rig, self._calibrate_rig, grows=self._rig)
+        fill_row(rig, self._rig, self._calibrate_rig, grows=self._rig)
         fields: dict[Part, QWidget] = {
             "camera": self._camera,
             "headset": self._headset,

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -17,6 +16,7 @@ from handcal.types import EyePlan
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.steps import PLANS, STEPS, Precondition, Step, Wizard, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
+from handcal_gui.widgets.layouts import hbox, vbox
 
 _MOST_CHECKS = 3
 
@@ -97,15 +97,8 @@ class WizardPanel(QWidget):
         )
         plan_label = QLabel("E&yes")
         plan_label.setBuddy(self._plan)
-        plan = QHBoxLayout()
-        plan.addWidget(self._title)
-        plan.addStretch()
-        plan.addWidget(plan_label)
-        plan.addWidget(self._plan)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._rail)
+        plan = hbox(self._title, 0, plan_label, self._plan)
+        layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addSpacing(SPACING_PX)
         layout.addLayout(plan)
         layout.addWidget(self._sentence)
@@ -172,11 +165,7 @@ class _CheckRow(QWidget):
         super().__init__()
         self._icon = QLabel()
         self._text = QLabel(wordWrap=True)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._icon)
-        layout.addWidget(self._text, 1)
+        hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
         self.setMinimumHeight(3 * SPACING_PX)
 
     def show_check(self, check: Precondition | None) -> None:

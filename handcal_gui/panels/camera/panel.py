@@ -12,10 +12,8 @@ from PySide6.QtWidgets import (
     QBoxLayout,
     QComboBox,
     QFileDialog,
-    QHBoxLayout,
     QLabel,
     QMessageBox,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -32,6 +30,7 @@ from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.sentence import sentence
 
@@ -108,19 +107,14 @@ class CameraPanel(QWidget):
         write_atomic(path, bytes(buffer.data().data()))
 
     def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.addWidget(self._mode)
-        top.addStretch()
+        top = hbox(self._mode, 0)
         freeze = tool_button()
         freeze.setDefaultAction(self._freeze)
         freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         top.addWidget(freeze)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (SPACING_PX,))
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(top)
-        layout.addWidget(self._pictures, 1)
-        layout.addWidget(self._status)
+        vbox(
+            top, (self._pictures, 1), self._status, on=self, margins=SPACING_PX, spacing=SPACING_PX
+        )
 
     def _draw_icons(self) -> None:
         self._freeze.setIcon(icon("pause"))
@@ -151,11 +145,9 @@ class _Pictures(QWidget):
         self._depth = ImageView("Depth image", lambda depth: self._depth_colors.colorize(depth))
         self._legend = DepthLegend()
         self._depth_side = QWidget()
-        depth_layout = QHBoxLayout(self._depth_side)
-        depth_layout.setContentsMargins(0, 0, 0, 0)
-        depth_layout.setSpacing(SPACING_PX // 2)
-        depth_layout.addWidget(self._depth, 1)
-        depth_layout.addWidget(self._legend)
+        hbox(
+            (self._depth, 1), self._legend, on=self._depth_side, margins=0, spacing=SPACING_PX // 2
+        )
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(SPACING_PX)
@@ -223,20 +215,17 @@ class _Status(QWidget):
         self._dropped = NumberLabel(
             "camera-dropped", "99999", "Frames missing from the camera's own count since it started"
         )
-        row = QHBoxLayout()
-        row.setSpacing(SPACING_PX // 2)
-        row.addWidget(self._rate)
-        row.addStretch()
-        row.addWidget(QLabel("Age"))
-        row.addWidget(self._age)
-        row.addStretch()
-        row.addWidget(QLabel("Dropped"))
-        row.addWidget(self._dropped)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(self._name)
-        layout.addLayout(row)
+        row = hbox(
+            self._rate,
+            0,
+            QLabel("Age"),
+            self._age,
+            0,
+            QLabel("Dropped"),
+            self._dropped,
+            spacing=SPACING_PX // 2,
+        )
+        vbox(self._name, row, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_status(CameraStatus(UNKNOWN), None)
 
     def show_status(self, camera: CameraStatus, age_ms: float | None) -> None:

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QWidget
 
 from handcal.geometry import invert, transform
 from handcal.register.pairs import matched_pairs
@@ -16,6 +16,7 @@ from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.orbit import Direction
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN
@@ -157,13 +158,15 @@ class CloudPanel(QWidget):
         legend.setSpacing(2 * SPACING_PX)
         legend.addWidget(self._cursor)
         legend.addWidget(self._hand, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(controls)
-        layout.addWidget(self._view, 1)
-        layout.addWidget(self._scale)
-        layout.addLayout(legend)
+        vbox(
+            controls,
+            (self._view, 1),
+            self._scale,
+            legend,
+            on=self,
+            margins=SPACING_PX,
+            spacing=SPACING_PX,
+        )
 
     def _show(self, cursor: _Cloud | None, hand: _Cloud | None, text: str) -> None:
         if hand is None:

@@ -12,13 +12,13 @@ from PySide6.QtWidgets import (
     QLabel,
     QRadioButton,
     QSlider,
-    QVBoxLayout,
     QWidget,
 )
 
 from handcal.display import DrawnMove
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.numbers import signed
 
 _SLIDER_MAX_MM = 15.0
@@ -61,13 +61,15 @@ class EyeShiftEditor(QWidget):
         self._fields = [self._make_field(title, axis, 1e3 * limit_m) for axis in range(3)]
         self._sliders = [self._make_slider(title, axis) for axis in range(3)]
         self._effects = {name: _number_label(tooltip) for name, tooltip in _EFFECTS.items()}
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(self.chosen)
-        layout.addLayout(self._lay_out_components())
-        layout.addLayout(self._lay_out_effects())
-        layout.addStretch(1)
+        vbox(
+            self.chosen,
+            self._lay_out_components(),
+            self._lay_out_effects(),
+            1,
+            on=self,
+            margins=0,
+            spacing=SPACING_PX // 2,
+        )
 
     def show_shift(self, shift_m: Float64) -> None:
         """Show φ, (3,), metres; nothing is emitted."""

@@ -30,6 +30,7 @@ from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, sa
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
@@ -326,9 +327,7 @@ class FineTunePanel(QWidget):
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.setWidget(body)
-        outer = QVBoxLayout(self)
-        outer.setContentsMargins(0, 0, 0, 0)
-        outer.addWidget(area, 1)
+        outer = vbox((area, 1), on=self, margins=0)
         status = _row(self._sign, self._status)
         status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX)
         outer.addLayout(status)

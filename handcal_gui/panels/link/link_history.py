@@ -6,11 +6,12 @@ from collections import deque
 from math import nan
 
 import numpy as np
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.link.rates import LinkRates
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.plots import Plot
 
 _LASTS_S = 30.0
@@ -36,11 +37,7 @@ class LinkHistory(QWidget):
         self._latency_line = self._latency.add_line("live")
         self._lost_line = self._loss.add_line("live")
         self._lost_inbound_line = self._loss.add_line("cursor", dashed=True)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._latency)
-        layout.addWidget(self._loss)
+        hbox(self._latency, self._loss, on=self, margins=0, spacing=SPACING_PX)
         self.setFixedHeight(_HEIGHT_PX)
 
     def add(self, t_s: float, latency_ms: float | None, rates: LinkRates | None) -> None:

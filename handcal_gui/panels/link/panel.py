@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -22,6 +21,7 @@ from handcal_gui.panels.link.link_history import LinkHistory
 from handcal_gui.panels.link.link_table import RATES_S, LinkTable
 from handcal_gui.panels.link.pairing_box import PairingBox
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.sentence import sentence
 
 _PERIOD_S = 0.25
@@ -119,18 +119,18 @@ class LinkPanel(QWidget):
         top.addWidget(self._state, 1)
         top.addWidget(self._restart, 0, Qt.AlignmentFlag.AlignTop)
         content = QWidget()
-        rows = QVBoxLayout(content)
-        rows.setContentsMargins(*4 * (SPACING_PX,))
-        rows.setSpacing(SPACING_PX)
-        rows.addLayout(top)
-        rows.addWidget(self._table)
-        rows.addWidget(self._history)
-        rows.addWidget(self._pairing)
-        rows.addStretch()
+        vbox(
+            top,
+            self._table,
+            self._history,
+            self._pairing,
+            0,
+            on=content,
+            margins=SPACING_PX,
+            spacing=SPACING_PX,
+        )
         area = QScrollArea()
         area.setWidget(content)
         area.setWidgetResizable(True)
         area.setFrameShape(QFrame.Shape.NoFrame)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(area)
+        vbox(area, on=self, margins=0)

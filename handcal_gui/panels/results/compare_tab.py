@@ -8,17 +8,16 @@ from typing import Literal
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
-    QHBoxLayout,
     QLabel,
     QProgressBar,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from handcal.register.results import Results
 from handcal.types import METHODS, Method, Rig
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import comparison_rows
 
@@ -129,21 +128,9 @@ class CompareTab(QWidget):
     def _lay_out(self) -> None:
         label = QLabel("Compare &with")
         label.setBuddy(self._methods)
-        row = QHBoxLayout()
-        row.setSpacing(SPACING_PX)
-        row.addWidget(label)
-        row.addWidget(self._methods, 1)
-        row.addWidget(self._compare)
-        busy_row = QHBoxLayout()
-        busy_row.setSpacing(SPACING_PX)
-        busy_row.addWidget(self._progress, 1)
-        busy_row.addWidget(self._cancel)
-        layout = QVBoxLayout(self)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(row)
-        layout.addLayout(busy_row)
-        layout.addWidget(self._status)
-        layout.addWidget(self.table, 1)
+        row = hbox(label, (self._methods, 1), self._compare, spacing=SPACING_PX)
+        busy_row = hbox((self._progress, 1), self._cancel, spacing=SPACING_PX)
+        vbox(row, busy_row, self._status, (self.table, 1), on=self, spacing=SPACING_PX)
 
 
 def _keep_space(widget: QWidget) -> None:

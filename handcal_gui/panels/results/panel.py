@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
@@ -17,6 +17,7 @@ from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
@@ -142,21 +143,12 @@ class ResultsPanel(QWidget):
         self._stack.addWidget(tabs)
 
     def _eyes_tab(self) -> QWidget:
-        cards = QHBoxLayout()
-        cards.setSpacing(SPACING_PX)
-        for card in self._cards.values():
-            cards.addWidget(card, 1)
+        cards = hbox(*((card, 1) for card in self._cards.values()), spacing=SPACING_PX)
         tab = QWidget()
-        layout = QVBoxLayout(tab)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(cards)
-        layout.addWidget(self._numbers, 1)
+        vbox(cards, (self._numbers, 1), on=tab, spacing=SPACING_PX)
         return tab
 
     def _alignments_tab(self) -> QWidget:
         tab = QWidget()
-        layout = QVBoxLayout(tab)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._alignments, 1)
-        layout.addWidget(self._another)
+        vbox((self._alignments, 1), self._another, on=tab, spacing=SPACING_PX)
         return tab

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
 from handcal.geometry import transform
 from handcal.register.results import Results
 from handcal.types import Alignment, Eye, EyeShift
 from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
 
@@ -30,11 +31,7 @@ class ResidualsTab(QWidget):
         self._map = ResidualMap()
         note = QLabel("The hand as seen from the eye; × marks points without a partner (outliers).")
         note.setWordWrap(True)
-        layout = QVBoxLayout(self)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._choice)
-        layout.addWidget(self._map, 1)
-        layout.addWidget(note)
+        vbox(self._choice, (self._map, 1), note, on=self, spacing=SPACING_PX)
 
     def show_results(self, results: Results, alignments: Mapping[int, Alignment]) -> None:
         """Show the first alignment's map, and offer all alignments with available clouds."""

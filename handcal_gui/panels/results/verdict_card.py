@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPalette
-from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
 from handcal.types import Eye, Verdict
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
@@ -36,12 +37,14 @@ class VerdictCard(QFrame):
         self._reason.setWordWrap(True)
         self._reason.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         self._reason.setMinimumHeight(_REASON_LINES * self._reason.fontMetrics().lineSpacing())
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(QLabel(EYE_NAMES[eye]))
-        layout.addWidget(self._word)
-        layout.addWidget(self._reason, 1)
+        vbox(
+            QLabel(EYE_NAMES[eye]),
+            self._word,
+            (self._reason, 1),
+            on=self,
+            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
+            spacing=SPACING_PX // 2,
+        )
         self.show_verdict(None)
         follow_theme(self, self._recolor)
 

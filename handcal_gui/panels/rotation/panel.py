@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.register.guard import turn_advice
 from handcal.station.hands import PlacedHand
@@ -16,6 +16,7 @@ from handcal.types import Float64
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence
 
@@ -131,17 +132,16 @@ class RotationPanel(QWidget):
             self._refusals.setText(f"Refused: {procedure.refused}. {procedure.refusal}")
 
     def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.setSpacing(SPACING_PX)
-        top.addWidget(self._dial, 3)
-        top.addWidget(self._hand, 2)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (SPACING_PX,))
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addLayout(top, 3)
-        layout.addWidget(self._advice)
-        layout.addWidget(self._plot, 2)
-        layout.addWidget(self._refusals)
+        top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)
+        vbox(
+            (top, 3),
+            self._advice,
+            (self._plot, 2),
+            self._refusals,
+            on=self,
+            margins=SPACING_PX,
+            spacing=SPACING_PX // 2,
+        )
 
 
 def _text_label(name: str, scale: float = 1.0) -> QLabel:

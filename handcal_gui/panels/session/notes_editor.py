@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, QTimer, Signal
-from PySide6.QtWidgets import QLabel, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QPlainTextEdit, QWidget
 
 from handcal.session.session import MAX_NOTES_CHARACTERS
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import vbox
 
 SAVE_MS = 800
 
@@ -40,11 +41,7 @@ class NotesEditor(QWidget):
         self._timer.setSingleShot(True)
         self._timer.setInterval(SAVE_MS)
         self._timer.timeout.connect(self._save)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(self._edit)
-        layout.addWidget(self._state)
+        vbox(self._edit, self._state, on=self, margins=0, spacing=SPACING_PX // 2)
 
     def show_saved(self, session: Path, notes: str) -> None:
         """Set the saved notes; the text being edited is replaced only for another session."""

@@ -8,10 +8,8 @@ from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -21,6 +19,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.session.notes_editor import NotesEditor
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
 from handcal_gui.widgets.session_rows import (
@@ -154,15 +153,7 @@ class SessionPanel(QWidget):
         self._tabs.addTab(self._alignments, "Alignments")
         self._tabs.addTab(self._trials, "Trials")
         self._tabs.addTab(self._notes, "Notes")
-        buttons = QHBoxLayout()
-        buttons.setSpacing(SPACING_PX)
-        buttons.addWidget(self._strip, 1)
-        buttons.addWidget(self._open_folder)
-        buttons.addWidget(self._inspect)
-        buttons.addWidget(self._export)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(form)
-        layout.addWidget(self._tabs, 1)
-        layout.addLayout(buttons)
+        buttons = hbox(
+            (self._strip, 1), self._open_folder, self._inspect, self._export, spacing=SPACING_PX
+        )
+        vbox(form, (self._tabs, 1), buttons, on=self, margins=SPACING_PX, spacing=SPACING_PX)

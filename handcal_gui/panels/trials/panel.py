@@ -9,10 +9,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QHBoxLayout,
     QLabel,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,6 +23,7 @@ from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
@@ -214,7 +213,7 @@ class TrialsPanel(QWidget):
         self._depth.currentIndexChanged.connect(self._request_target)
         self._shows_target.setToolTip(
             "Draw the target for this eye, at this distance straight ahead, until a cursor is made "
-            "or the session finished"
+            "or the session is finished"
         )
         self._shows_target.toggled.connect(self._request_target)
 
@@ -233,11 +232,7 @@ class TrialsPanel(QWidget):
         hint = QLabel(text=_HOW, wordWrap=True)
         record = QToolButton()
         record.setDefaultAction(self.record_action)
-        choices = QHBoxLayout()
-        choices.setSpacing(SPACING_PX)
-        for widget in (self._eyes, self._depth, record):
-            choices.addWidget(widget)
-        choices.addStretch(1)
+        choices = hbox(self._eyes, self._depth, record, 1, spacing=SPACING_PX)
         tabs = RecordTabs()
         for page, title in (
             (self._table, "Trials"),
@@ -245,13 +240,15 @@ class TrialsPanel(QWidget):
             (self._plot, "Plot"),
         ):
             tabs.addTab(page, title)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(hint)
-        layout.addLayout(choices)
-        layout.addWidget(self._shows_target)
-        layout.addWidget(self._message)
-        layout.addWidget(tabs, 1)
-        layout.addWidget(self._summary)
-        layout.addWidget(self._strip)
+        vbox(
+            hint,
+            choices,
+            self._shows_target,
+            self._message,
+            (tabs, 1),
+            self._summary,
+            self._strip,
+            on=self,
+            margins=SPACING_PX,
+            spacing=SPACING_PX,
+        )

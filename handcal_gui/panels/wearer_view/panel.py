@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QWidget
 
 from handcal.station.snapshot import Snapshot
 from handcal.station.wearer_view import EyeView, Overlay
 from handcal.types import EYES, Eye
 from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
@@ -81,12 +82,7 @@ class WearerViewPanel(QWidget):
             eyes.addWidget(column, 1)
         for entry in self._entries.values():
             legend.addWidget(entry)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(SPACING_PX, SPACING_PX, SPACING_PX, SPACING_PX)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(options)
-        layout.addLayout(eyes, 1)
-        layout.addLayout(legend)
+        vbox(options, (eyes, 1), legend, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 
 class _EyeColumn(QWidget):
@@ -100,13 +96,15 @@ class _EyeColumn(QWidget):
         self._now = _ErrorRow("Now", _ERROR.format("the headset draws it"))
         self._before = _ErrorRow("Before", _ERROR.format("drawn before calibration (φ = 0)"))
         self._now.emphasise()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(self._title)
-        layout.addWidget(self.canvas, 1)
-        layout.addWidget(self._now)
-        layout.addWidget(self._before)
+        vbox(
+            self._title,
+            (self.canvas, 1),
+            self._now,
+            self._before,
+            on=self,
+            margins=0,
+            spacing=SPACING_PX // 2,
+        )
         self.show_view(None, "", is_solved=False)
 
     def show_view(self, view: EyeView | None, message: str, *, is_solved: bool) -> None:
@@ -135,12 +133,7 @@ class _ErrorRow(QWidget):
         self.setToolTip(tooltip)
         self._px = NumberLabel("error-px", "999.9 px", tooltip, _NUMBER_SCALE)
         self._arcmin = NumberLabel("error-arcmin", "999.9′", tooltip, _NUMBER_SCALE)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
-        layout.addWidget(QLabel(name), 1)
-        layout.addWidget(self._px)
-        layout.addWidget(self._arcmin)
+        hbox((QLabel(name), 1), self._px, self._arcmin, on=self, margins=0, spacing=SPACING_PX // 2)
 
     def emphasise(self) -> None:
         """Emphasise this row."""

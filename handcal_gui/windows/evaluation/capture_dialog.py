@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
@@ -24,6 +24,7 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.evaluation.capture_list import CaptureList
@@ -180,24 +181,18 @@ class CaptureDialog(PreparationDialog):
     def _lay_out(self) -> None:
         scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
-        middle = QHBoxLayout()
-        middle.setSpacing(2 * SPACING_PX)
-        middle.addWidget(self._camera, 1)
-        middle.addWidget(self._list)
-        foot = QHBoxLayout()
-        foot.setSpacing(SPACING_PX)
-        foot.addWidget(self._start)
-        foot.addWidget(self._take)
-        foot.addWidget(self._bar, 1)
-        foot.addWidget(self._close)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self.form)
-        layout.addLayout(middle, 1)
-        layout.addWidget(self._instruction)
-        layout.addWidget(self._found)
-        layout.addLayout(foot)
+        middle = hbox((self._camera, 1), self._list, spacing=2 * SPACING_PX)
+        foot = hbox(self._start, self._take, (self._bar, 1), self._close, spacing=SPACING_PX)
+        vbox(
+            self.form,
+            (middle, 1),
+            self._instruction,
+            self._found,
+            foot,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=SPACING_PX,
+        )
         self.resize(QGuiApplication.primaryScreen().availableSize().boundedTo(_FIRST_SIZE))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.errors import HandcalError
 from handcal.station.doctor import Finding, Health
@@ -18,6 +18,7 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.windows.evaluation.results_view import ResultsView
 from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Readiness
@@ -185,17 +186,17 @@ class EvaluationPage(QWidget):
         return self._readiness.finding if self._readiness else None
 
     def _lay_out(self, question: str) -> None:
-        row = QHBoxLayout()
-        row.setSpacing(2 * SPACING_PX)
-        row.addWidget(self._button)
+        row = hbox(self._button, spacing=2 * SPACING_PX)
         if self._prepare is not None:
             row.addWidget(self._prepare)
         row.addWidget(self._bar, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(paragraph("question", question))
-        layout.addWidget(self.form)
-        layout.addLayout(row)
-        layout.addWidget(self._found)
-        layout.addWidget(self._results, 1)
+        vbox(
+            paragraph("question", question),
+            self.form,
+            row,
+            self._found,
+            (self._results, 1),
+            on=self,
+            margins=0,
+            spacing=SPACING_PX,
+        )

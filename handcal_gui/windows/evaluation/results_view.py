@@ -6,14 +6,15 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QPalette
-from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.report.document import Figure, Report, Table
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import button, hbox, paragraph, with_name
+from handcal_gui.widgets.fields import button, fill_row, paragraph, with_name
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.evaluation.work import Outcome
@@ -82,14 +83,9 @@ class ResultsView(QWidget):
         ):
             buttons.append(button(name, text, help_text=help_text))
             buttons[-1].clicked.connect(lambda _checked=False, file=file: self._open(file))
-        hbox(foot, self._path, *buttons, grows=self._path)
+        fill_row(foot, self._path, *buttons, grows=self._path)
         shown = QWidget()
-        layout = QVBoxLayout(shown)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._lead)
-        layout.addWidget(self._tabs, 1)
-        layout.addWidget(foot)
+        vbox(self._lead, (self._tabs, 1), foot, on=shown, margins=0, spacing=SPACING_PX)
         self._stack = QStackedLayout(self)
         self._stack.addWidget(self._empty)
         self._stack.addWidget(shown)
@@ -123,9 +119,7 @@ def _figure_page(title: str, figure: Figure, picture: UInt8) -> QWidget:
 
 def _page(view: QWidget, caption: str) -> QWidget:
     page = QWidget()
-    layout = QVBoxLayout(page)
-    layout.setSpacing(SPACING_PX)
-    layout.addWidget(view, 1)
+    layout = vbox((view, 1), on=page, spacing=SPACING_PX)
     if caption:
         layout.addWidget(paragraph("caption", caption))
     return page

@@ -10,18 +10,17 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QLabel,
     QListWidget,
     QListWidgetItem,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
 
 _FIRST_SIZE = QSize(1240, 860)
@@ -127,12 +126,5 @@ class EvaluationWindow(QDialog):
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
         self._rail.setFixedWidth(_RAIL_PX)
-        right = QVBoxLayout()
-        right.setSpacing(SPACING_PX)
-        right.addWidget(self._title)
-        right.addWidget(self._stack, 1)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addWidget(self._rail)
-        layout.addLayout(right, 1)
+        right = vbox(self._title, (self._stack, 1), spacing=SPACING_PX)
+        hbox(self._rail, (right, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)

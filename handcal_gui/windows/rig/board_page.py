@@ -10,10 +10,8 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QMessageBox,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -30,7 +28,7 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (
     button,
     choice,
-    hbox,
+    fill_row,
     number,
     paragraph,
     whole_number,
@@ -38,6 +36,7 @@ from handcal_gui.widgets.fields import (
 )
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.project import RigProject
 
 _KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": "Checkerboard"}
@@ -189,9 +188,9 @@ class BoardPage(QWidget):
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()
-        hbox(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
-        hbox(paper, self._paper, self._pdf, self._picture, grows=self._picture)
-        hbox(rig, self._rig, self._begin, grows=self._rig)
+        fill_row(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
+        fill_row(paper, self._paper, self._pdf, self._picture, grows=self._picture)
+        fill_row(rig, self._rig, self._begin, grows=self._rig)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
@@ -205,10 +204,7 @@ class BoardPage(QWidget):
             ("Paper", paper),
         ):
             form.addRow(label, field)
-        left = QVBoxLayout()
-        left.setSpacing(SPACING_PX)
-        left.addLayout(form)
-        left.addWidget(self._found)
+        left = vbox(form, self._found, spacing=SPACING_PX)
         left.addSpacing(2 * SPACING_PX)
         left.addWidget(
             paragraph(
@@ -218,11 +214,7 @@ class BoardPage(QWidget):
         )
         left.addWidget(rig)
         left.addStretch(1)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(3 * SPACING_PX)
-        layout.addLayout(left, 1)
-        layout.addWidget(self._preview, 1)
+        hbox((left, 1), (self._preview, 1), on=self, margins=0, spacing=3 * SPACING_PX)
 
 
 def _draw(board: Board) -> UInt8:

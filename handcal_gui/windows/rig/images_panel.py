@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
@@ -16,6 +16,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.coverage_map import CoverageMap
 from handcal_gui.windows.rig.shot_list import ShotList
 from handcal_gui.windows.rig.shot_view import ShotView
@@ -142,30 +143,13 @@ class ImagesPanel(QWidget):
         self._hint.setVisible(not self.shots)
 
     def _lay_out(self) -> None:
-        side = QVBoxLayout()
-        side.setSpacing(SPACING_PX)
-        side.addWidget(self._count)
-        for shown in self._maps:
-            side.addWidget(shown)
-        side.addStretch(1)
+        side = vbox(self._count, *self._maps, 1, spacing=SPACING_PX)
         split = QSplitter(Qt.Orientation.Horizontal)
         split.setChildrenCollapsible(False)
         split.addWidget(self._list)
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
-        row = QHBoxLayout()
-        row.setSpacing(2 * SPACING_PX)
-        row.addWidget(split, 1)
-        row.addLayout(side)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._hint)
-        layout.addWidget(self._trouble)
-        layout.addLayout(row, 1)
-        self._buttons = QHBoxLayout()
-        self._buttons.setSpacing(SPACING_PX)
-        for one in (self._take, self._again):
-            self._buttons.addWidget(one)
-        self._buttons.addWidget(self.bar, 1)
+        row = hbox((split, 1), side, spacing=2 * SPACING_PX)
+        layout = vbox(self._hint, self._trouble, (row, 1), on=self, margins=0, spacing=SPACING_PX)
+        self._buttons = hbox(self._take, self._again, (self.bar, 1), spacing=SPACING_PX)
         layout.addLayout(self._buttons)

@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLineEdit,
     QTabWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -26,6 +25,7 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.finding_list import FindingList
@@ -149,12 +149,7 @@ class ResultPage(QWidget):
 
     def _lay_out(self) -> None:
         compare = QWidget()
-        inside = QVBoxLayout(compare)
-        inside.setSpacing(SPACING_PX)
-        inside.addWidget(self._other)
-        inside.addWidget(self._compared)
-        inside.addWidget(self._differences, 1)
-        inside.addStretch(0)
+        vbox(self._other, self._compared, (self._differences, 1), 0, on=compare, spacing=SPACING_PX)
         tabs = QTabWidget(documentMode=True)
         tabs.addTab(self._findings, "Check")
         tabs.addTab(self._numbers, "Numbers")
@@ -167,9 +162,4 @@ class ResultPage(QWidget):
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
         foot.addWidget(self._use)
         foot.addWidget(self._save)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addLayout(form)
-        layout.addWidget(tabs, 1)
-        layout.addLayout(foot)
+        vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)

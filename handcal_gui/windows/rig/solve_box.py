@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
@@ -14,6 +14,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import main_button
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.rows import COLUMNS
@@ -89,16 +90,9 @@ class SolveBox(QWidget):
     def _lay_out(self) -> None:
         left = QVBoxLayout()
         left.setSpacing(SPACING_PX)
-        row = QHBoxLayout()
-        row.setSpacing(2 * SPACING_PX)
-        row.addWidget(self.button)
-        row.addWidget(self.bar, 1)
+        row = hbox(self.button, (self.bar, 1), spacing=2 * SPACING_PX)
         left.addLayout(row)
         left.addWidget(self._verdict)
         left.addWidget(self._worst)
         left.addStretch(1)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * SPACING_PX)
-        layout.addLayout(left, 1)
-        layout.addWidget(self._table)
+        hbox((left, 1), self._table, on=self, margins=0, spacing=2 * SPACING_PX)

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QTabWidget, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
@@ -106,10 +107,7 @@ class StepPage(QWidget):
         dialog.open()
 
     def _lay_out(self, panels: Mapping[str, ImagesPanel]) -> None:
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self.form)
+        layout = vbox(self.form, on=self, margins=0, spacing=SPACING_PX)
         if len(panels) == 1:
             layout.addWidget(self.panels[0], 1)
         else:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QDialog, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QWidget
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.take_board import keep_imager, keep_images, see_board
@@ -22,6 +22,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 
@@ -179,15 +180,19 @@ class TakeDialog(QDialog):
         self._take.setEnabled(self.shown_images is not None and not self._bar.is_busy)
 
     def _lay_out(self) -> None:
-        foot = QHBoxLayout()
-        foot.setSpacing(SPACING_PX)
-        for widget in (self._start, self._take, self._by_itself):
-            foot.addWidget(widget)
-        foot.addWidget(self._bar, 1)
-        foot.addWidget(self._close)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._cameras, 1)
-        layout.addWidget(self._found)
-        layout.addLayout(foot)
+        foot = hbox(
+            self._start,
+            self._take,
+            self._by_itself,
+            (self._bar, 1),
+            self._close,
+            spacing=SPACING_PX,
+        )
+        vbox(
+            (self._cameras, 1),
+            self._found,
+            foot,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=SPACING_PX,
+        )

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QListWidget,
     QListWidgetItem,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -22,6 +21,7 @@ from handcal.types import RIG_PARTS, RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, with_name
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
 from handcal_gui.windows.rig.project import RigProject
@@ -187,22 +187,7 @@ class RigWizard(QDialog):
         head.setSpacing(2 * SPACING_PX)
         head.addWidget(self._title)
         head.addWidget(self._purpose, 1, Qt.AlignmentFlag.AlignBottom)
-        foot = QHBoxLayout()
-        foot.setSpacing(SPACING_PX)
-        foot.addStretch(1)
-        for one in (self._back, self._next, self._close):
-            foot.addWidget(one)
-        right = QVBoxLayout()
-        right.setSpacing(SPACING_PX)
-        right.addLayout(head)
-        right.addWidget(self._stack, 1)
-        right.addLayout(foot)
-        row = QHBoxLayout()
-        row.setSpacing(2 * SPACING_PX)
-        row.addWidget(self._rail)
-        row.addLayout(right, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(*4 * (2 * SPACING_PX,))
-        layout.setSpacing(SPACING_PX)
-        layout.addWidget(self._banner)
-        layout.addLayout(row, 1)
+        foot = hbox(1, self._back, self._next, self._close, spacing=SPACING_PX)
+        right = vbox(head, (self._stack, 1), foot, spacing=SPACING_PX)
+        row = hbox(self._rail, (right, 1), spacing=2 * SPACING_PX)
+        vbox(self._banner, (row, 1), on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
