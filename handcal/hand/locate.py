@@ -195,7 +195,8 @@ def _within(view: DepthView, box: Box) -> Float32:
             (view.box[1], height, (box[1] + box[3]) / 2, _BOX_SIGMA * (box[3] - box[1])),
         )
     )
-    return down.astype(np.float32)[:, None] * across.astype(np.float32)
+    within: Float32 = down.astype(np.float32)[:, None] * across.astype(np.float32)
+    return within
 
 
 def _seen_part(parts: _Parts, within: Float32) -> int | None:
