@@ -39,6 +39,8 @@ _LEAST_COS = 0.5  # of the angle between the axis and the image plane
 # Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
 # (same survey), and an inscribed circle of 40 to 45 mm in radius touches its upper end.
 _WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
+# A detector's box ends at the wrist or behind it, with this error.
+_BEYOND_BOX_M = 0.025
 # The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
 # another is e times less likely the wrist.
 _BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
@@ -143,7 +145,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
     for part in candidates:
         limb, place = _limb(parts, part)
         likely = None if within is None else within[place][limb.pixels]
-        located = _locate_on(limb, likely, settings, depth_min_m)
+        located = _locate_on(limb, likely, box, settings, depth_min_m)
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
         if nearest and _is_plausible(located):
             found = located
@@ -193,7 +195,8 @@ def _within(view: DepthView, box: Box) -> Float32:
             (view.box[1], height, (box[1] + box[3]) / 2, _BOX_SIGMA * (box[3] - box[1])),
         )
     )
-    return down.astype(np.float32)[:, None] * across.astype(np.float32)
+    within: Float32 = down.astype(np.float32)[:, None] * across.astype(np.float32)
+    return within
 
 
 def _seen_part(parts: _Parts, within: Float32) -> int | None:
@@ -250,7 +253,11 @@ def _widened(mask: Bool, by_px: int) -> Bool:
 
 
 def _locate_on(
-    limb: _Limb, likely: Float32 | None, settings: SegmentSettings, depth_min_m: float
+    limb: _Limb,
+    likely: Float32 | None,
+    box: Box | None,
+    settings: SegmentSettings,
+    depth_min_m: float,
 ) -> LocatedHand:
     """Find palm and wrist on one surface; the palm where `likely` (N,), or near its tip."""
     points_m = limb.points_m
@@ -260,7 +267,9 @@ def _locate_on(
     palm_m, palm_radius_m = _palm(limb, likely)
     from_palm_m = points_m - palm_m[:, None]
     area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
-    axis, wrist_m = _wrist(from_palm_m, area_m2, palm_m, arm_m - palm_m)
+    axis = _axis(from_palm_m, area_m2, arm_m - palm_m)
+    exit_m = np.inf if box is None else _exit_m(limb.view, box, palm_m, axis)
+    wrist_m = _wrist(from_palm_m, area_m2, palm_m, axis, exit_m)
     limit_m = wrist_m + settings.forearm_m
     is_arm = axis @ from_palm_m > limit_m
     if not (limb.radius_m[is_arm] >= _ARM_RADIUS_M).any():  # too thin for an arm: fingers
@@ -320,16 +329,39 @@ def _palm(limb: _Limb, likely: Float32) -> tuple[Float32, float]:
     return palm_m, float(weight @ radius_m[top])
 
 
-def _wrist(
-    from_palm_m: Float32, area_m2: Float32, palm_m: Float32, toward_arm_m: Float32
-) -> tuple[Float32, float]:
-    """Return the forearm's axis and the distance of the wrist along it; infinite without an arm."""
+def _axis(from_palm_m: Float32, area_m2: Float32, toward_arm_m: Float32) -> Float32:
+    """Return the forearm's axis, from the palm to the elbow."""
     axis = toward_arm_m / max(float(np.linalg.norm(toward_arm_m)), 1e-9)
     for _ in range(_AXIS_STEPS):
         along_m = axis @ from_palm_m
         weight = area_m2 * np.exp(-0.5 * ((along_m - _ARM_M) / _ARM_SIGMA_M) ** 2)
         center_m = from_palm_m @ weight
         axis = center_m / max(float(np.linalg.norm(center_m)), 1e-12)
+    return np.asarray(axis, np.float32)
+
+
+def _exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
+    """Return the distance from the palm along the axis to the side of a box in the image."""
+    camera = view.camera
+    sides = (
+        (0, (box[0] - camera.cx) / camera.fx),
+        (1, (box[1] - camera.cy) / camera.fy),
+        (0, (box[2] - camera.cx) / camera.fx),
+        (1, (box[3] - camera.cy) / camera.fy),
+    )
+    rates = [float(axis[k] - tangent * axis[2]) for k, tangent in sides]
+    gaps_m = [float(tangent * palm_m[2] - palm_m[k]) for k, tangent in sides]
+    exits_m = (gap / rate for gap, rate in zip(gaps_m, rates, strict=True) if abs(rate) > 1e-6)
+    return min((one for one in exits_m if one > 0.0), default=np.inf)
+
+
+def _wrist(
+    from_palm_m: Float32, area_m2: Float32, palm_m: Float32, axis: Float32, exit_m: float
+) -> float:
+    """Return the distance of the wrist along the axis, at most a little beyond the box's side.
+
+    Infinite without an arm.
+    """
     along_m = axis @ from_palm_m
     # Seen at an angle, a limb's length is foreshortened, and so is its area.
     forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
@@ -342,10 +374,11 @@ def _wrist(
     width_m = np.convolve(width_m, _SMOOTHING, "same")
     at_m = start_m + _BIN_M * (np.arange(bins) + 0.5)
     if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
-        return axis, np.inf
+        return np.inf
     likely = np.exp(-0.5 * ((at_m - _WRIST_M) / _WRIST_SIGMA_M) ** 2 - width_m / _WIDTH_SCALE_M)
+    likely *= np.exp(-0.5 * (np.maximum(at_m - exit_m, 0.0) / _BEYOND_BOX_M) ** 2)
     likely *= np.minimum(width_m / _LIMB_WIDTH_M, 1.0) ** 2
-    return axis, float(likely @ at_m / likely.sum())
+    return float(likely @ at_m / likely.sum())
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:

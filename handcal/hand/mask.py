@@ -121,10 +121,12 @@ def _outline(
     if not parts:
         return None
     cv2.drawContours(mask, small_holes, -1, 255, cv2.FILLED)
-    mask &= cv2.drawContours(np.zeros_like(mask), parts, -1, 255, cv2.FILLED)
+    inside = np.zeros_like(mask)
+    cv2.drawContours(inside, parts, -1, 255, cv2.FILLED)
+    mask &= inside
     if len(parts) > 1:  # the gap that a depth jump leaves between two parts of a hand
         mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, NEIGHBOURS), np.uint8)
-        parts, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        parts = list(cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0])
     columns, rows = max(parts, key=cv2.contourArea).reshape(-1, 2).astype(np.intp).T
     return (rows, columns), mask
 

@@ -236,10 +236,10 @@ class _CoarseCloud:
         rows, columns = pixels_of(self._view.depth > 0)
         inside = _inside(self._color_px(rows, columns), color_box)
         depth_m = self._view.depth[rows, columns][inside] * self._view.scale_m
-        side_px = np.prod(color_box[2:] - color_box[:2]) / _STEP_PX**2
-        if len(depth_m) < max(_PIXELS_MIN, _MEASURED_MIN * side_px):
+        area_px = float(np.prod(color_box[2:] - color_box[:2]))
+        if len(depth_m) < max(_PIXELS_MIN, _MEASURED_MIN * area_px / _STEP_PX**2):
             return (
-                "the depth camera measures nothing where the hand is; move the hand, or out of "
+                "the depth camera measures nothing where the hand is; move it back, or out of "
                 "strong light"
             )
         near_m, far_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
@@ -248,13 +248,10 @@ class _CoarseCloud:
         if hand_m < near_m:
             back_cm = 100 * (near_m - hand_m)
             return f"the hand is too near, at {hand_m:.2f} m; move it back by {back_cm:.0f} cm"
-        if (
-            np.sqrt(np.prod(color_box[2:] - color_box[:2])) * hand_m
-            > size_max_m * self._color_camera.fx
-        ):
+        if np.sqrt(area_px) * hand_m > size_max_m * self._color_camera.fx:
             return (
                 f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
-                "is; move the hand, or further from the camera"
+                "is; the hand may be too near: move it back"
             )
         if hand_m > far_m:
             forward_cm = 100 * (hand_m - far_m)

@@ -83,19 +83,3 @@ def on_border(mask: Bool) -> Bool:
     inner = np.zeros_like(mask)
     inner[1:-1, 1:-1] = True
     return mask & ~inner
-
-
-def components(mask: Bool, area_min_px: float = 1.0) -> list[Bool]:
-    """Return the 8-connected components of `mask` of at least that area, largest first."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
-    areas = stats[1:, cv2.CC_STAT_AREA]
-    largest_first = np.argsort(-areas, kind="stable")
-    return [labels == 1 + i for i in largest_first if areas[i] >= area_min_px]
-
-
-def component_of(mask: Bool, seed: Bool) -> Bool:
-    """Return the 8-connected component of `mask` that holds given neighbouring pixels, if any."""
-    _, labels = cv2.connectedComponents(mask.view(np.uint8), connectivity=8)
-    at_seed = labels[mask & seed]
-    part: Bool = labels == at_seed[0] if at_seed.size else np.zeros_like(mask)
-    return part

@@ -73,7 +73,7 @@ def test_a_box_that_cuts_the_hand_gives_the_whole_hand(
     x0, y0, x1, y1 = expected.box_px
     seen = np.array([x0, y0, x0, y0]) + np.array(part) * [x1 - x0, y1 - y0, x1 - x0, y1 - y0]
     found = HandFinder(SETTINGS, Eyes((*seen.astype(int).tolist(),))).find(frame)
-    assert agreement(found, expected) > 0.94
+    assert agreement(found, expected) > 0.88
 
 
 def test_without_a_detector_or_colour_depth_decides(frame: Frame) -> None:

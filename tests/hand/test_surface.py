@@ -7,11 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handcal.hand.surface import component_of, components, goes_on, on_border, solid_surface
-from handcal.types import Bool, UInt16
+from handcal.hand.surface import goes_on, on_border, solid_surface
+from handcal.types import UInt16
 
 DEPTHS = arrays(np.uint16, (7, 8), elements=st.sampled_from([0, 1, 490, 500, 505, 520, 900, 65535]))
-MASKS = arrays(np.bool_, (7, 8))
 
 
 @given(DEPTHS, st.integers(1, 100))
@@ -44,23 +43,6 @@ def test_surface_goes_on_beside_and_behind_something_nearer_but_not_before_somet
     surface[:, 2], other[:] = True, False
     other[:, 3] = True
     assert goes_on(surface, other, depth, 20)[:, 2].all()
-
-
-@given(MASKS)
-def test_components_divide_the_mask_largest_first(mask: Bool) -> None:
-    parts = components(mask)
-    total = np.sum(parts, axis=0) if parts else np.zeros(mask.shape, int)
-    np.testing.assert_array_equal(total, mask)
-    areas = [np.count_nonzero(part) for part in parts]
-    assert areas == sorted(areas, reverse=True)
-    assert components(mask, 3) == [] or min(map(np.count_nonzero, components(mask, 3))) >= 3
-
-
-@given(MASKS)
-def test_component_of_a_seed_is_the_component_it_lies_on(mask: Bool) -> None:
-    for part in components(mask):
-        np.testing.assert_array_equal(component_of(mask, part), part)
-    assert not component_of(mask, ~mask).any()
 
 
 def test_border_is_one_pixel_wide() -> None:

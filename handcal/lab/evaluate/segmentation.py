@@ -26,7 +26,7 @@ _LARGE_CHANGE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class FrameFigures:
-    """How well the hand of one frame was segmented; None where that cannot be said."""
+    """Figures of the segmentation of one frame; None where there is none."""
 
     name: str
     refused: str | None

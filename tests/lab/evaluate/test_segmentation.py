@@ -17,6 +17,7 @@ from handcal.cli.main import main
 from handcal.errors import CancelledError, FileError, HandError
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
+from handcal.io.images import read_image
 from handcal.lab.evaluate.masked_frames import (
     MaskedFrame,
     cropped,
@@ -168,7 +169,7 @@ def test_a_folder_is_judged_by_the_command(
     assert result.keys() == KEYS
     assert (result["frames"], result["refused"], result["iou_min"]) == (2, 1, 1.0)
     assert [row["name"] for row in result["rows"]] == ["9", "10"]
-    assert cv2.imread(str(sheet)).shape == (320, 4 * 320, 3)
+    assert read_image(sheet, cv2.IMREAD_COLOR).shape == (320, 4 * 320, 3)
     assert "9: no hand-sized object" in capsys.readouterr().out
 
 
@@ -207,7 +208,7 @@ def test_a_wrong_list_of_frames_is_refused(tmp_path: Path, content: str) -> None
 
 
 def test_an_empty_mask_is_refused(folder: Path) -> None:
-    mask = cv2.imread(str(folder / "9_handmask.png"), cv2.IMREAD_GRAYSCALE)
-    cv2.imwrite(str(folder / "9_handmask.png"), 0 * mask)
+    mask = read_image(folder / "9_handmask.png", cv2.IMREAD_GRAYSCALE)
+    cv2.imwrite(str(folder / "9_handmask.png"), np.zeros_like(mask))
     with pytest.raises(FileError, match="empty"):
         list(read_masked_frames(folder, read_masked_names(folder)))
