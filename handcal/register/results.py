@@ -161,7 +161,7 @@ def results_json(results: Results) -> dict[str, Any]:
             eye: _shift_json(shift)
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
             | {"benefit": asdict(results.benefits[eye])}
-            | {"advice": asdict(results.advice[eye]) if eye in results.advice else None}
+            | {"advice": _advice_json(results.advice.get(eye))}
             for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
@@ -180,6 +180,10 @@ def results_json(results: Results) -> dict[str, Any]:
             for shifts in results.alignments.values()
         ],
     }
+
+
+def _advice_json(advice: Advice | None) -> dict[str, Any] | None:
+    return None if advice is None else asdict(advice) | {"eyes": list(advice.eyes)}
 
 
 def _shift_json(shift: EyeShift) -> dict[str, Any]:
