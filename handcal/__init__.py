@@ -4,7 +4,7 @@
 >>> session = handcal.open_session("resources/example_session")
 >>> results = handcal.solve(session)
 >>> print(results.eyes["left"])
-φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm; rms 1.43 mm, 97 % inliers, converged
+φ = (-4.07 ± 0.75, +0.91 ± 0.69, +2.27 ± 1.82) mm; rms 1.43 mm, 97 % inliers, converged
 
 Lengths are in metres, angles in radians, axes OpenCV's; `handcal.types` names the frames.
 """

@@ -327,7 +327,7 @@ class EyeShift:
 
 
 def phi_text(shift: EyeShift) -> str:
-    """Return φ ± σ in one line: ``φ = (-3.78 ± 0.72, +0.69 ± 0.75, +2.32 ± 1.81) mm``."""
+    """Return φ ± σ in one line: ``φ = (-4.07 ± 0.75, +0.91 ± 0.69, +2.27 ± 1.82) mm``."""
     return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
 
 

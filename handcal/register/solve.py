@@ -84,7 +84,7 @@ def solve_eye_shift(
     ...     hand_cut=alignment.hand_is_cut,
     ... )
     >>> print(shift)
-    φ = (-4.04 ± 0.34, +0.68 ± 0.43, +0.29 ± 0.71) mm; rms 1.43 mm, 97 % inliers, converged
+    φ = (-4.37 ± 0.40, +1.00 ± 0.28, +0.17 ± 0.74) mm; rms 1.43 mm, 97 % inliers, converged
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")

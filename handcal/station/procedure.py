@@ -114,7 +114,7 @@ class Observation:
     """Change of the hand's shape since the cursor, rms, while aligning; measured a few times a
     second."""
     shape_text: str = ""
-    """What changed most, in words."""
+    """The part that changed most, in words."""
     has_changed: bool = False
     """True if that change exceeds the guard's limit."""
     is_over_limit: bool = False
@@ -546,7 +546,9 @@ class Calibration:
         try:
             rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
             if hand.t_host_ns - self._shape_ns > _SHAPE_EVERY_NS:
-                self._shape = self._guard.shape_change(hand.points_W_m, hand.cloud.is_cut)
+                self._shape = self._guard.shape_change(
+                    hand.points_W_m, hand.cloud.is_cut, is_live=True
+                )
                 self._shape_ns = hand.t_host_ns
         except HandError as error:
             return replace(observation, hand=None, problem=str(error))

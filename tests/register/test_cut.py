@@ -20,7 +20,7 @@ def along_the_arm(points_m: Float64, is_cut: Bool) -> Float64:
     """Return the distance of points inside the cut edge, along the forearm."""
     toward = points_m[is_cut].mean(axis=0) - points_m.mean(axis=0)
     place: Float64 = points_m @ (toward / np.linalg.norm(toward))
-    return place.max() - place
+    return np.asarray(place.max() - place)
 
 
 def cut_further_up(made: SimulatedAlignment, by_m: float, cloud: str) -> SimulatedAlignment:

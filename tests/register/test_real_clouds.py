@@ -27,10 +27,11 @@ def _pixels(phi_m: Float64, points_m: Float64) -> Float64:
 def _overlay(cursor_m: Float64, phi_m: Float64) -> Float64:
     """Return the movement that puts a hand under its own cursor, drawn for φ = 0."""
     wanted = _pixels(np.zeros(3), cursor_m)
-    found = least_squares(
-        lambda moved_m: 1e3 * (_pixels(phi_m, cursor_m + moved_m) - wanted).ravel(), np.zeros(3)
-    )
-    return np.asarray(found.x)
+
+    def apart(moved_m: Float64) -> Float64:
+        return 1e3 * (_pixels(phi_m, cursor_m + moved_m) - wanted).ravel()
+
+    return np.asarray(least_squares(apart, np.zeros(3)).x)
 
 
 def _clouds(folder: Path, every: int) -> list[tuple[Float64, Bool]]:
