@@ -21,6 +21,8 @@ from handcal.link.server import LinkStatistics
 from handcal.progress import Progress
 from handcal.register.solve import solve_alignment
 from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.station.evidence import Contradiction
+from handcal.station.faults import Fault
 from handcal.station.procedure import Calibration, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
@@ -46,6 +48,8 @@ class DemoSettings:
     """Share of the link's datagrams lost, and reordered, in each direction."""
     worn_rig: str = ""
     """Path of the rig that the wearer really looks through; empty: the rig of the calibration."""
+    fault: Fault = ""
+    """Fault of the camera or the headset; empty: none."""
 
 
 def run_demo(
@@ -78,17 +82,22 @@ def run_demo(
         seed=settings.seed,
         loss=settings.loss,
         reorder=settings.reorder,
+        fault=settings.fault,
         sessions=str(output),
     )
     with Station(station_settings, "Simulated wearer") as station:
         progress.at(0.0, "Connecting to the virtual headset")
-        observations = _follow_plan(station, settings, progress)
+        try:
+            observations = _follow_plan(station, settings, progress)
+        except ContradictedError as error:
+            return _contradicted(station, settings, error.contradiction)
         statistics = _delivered(station)
         station.finish()
     calibration, rig = station.calibration, station.rig
     return {
         "seed": settings.seed,
         "session": str(station.session.path),
+        "alignments": len(calibration.alignments),
         **_judge(calibration, station, settings),
         "guard": {
             "rejected": calibration.refused,
@@ -103,6 +112,43 @@ def run_demo(
             "acked": statistics.acked,
         },
         "timing_ms": _timing(calibration, rig, observations),
+    }
+
+
+class ContradictedError(HandcalError):
+    """Evidence that forbids to go on."""
+
+    def __init__(self, contradiction: Contradiction) -> None:
+        super().__init__(contradiction.text)
+        self.contradiction = contradiction
+
+
+def _require_no_contradiction(calibration: Calibration, seen: Observation) -> None:
+    """Raise ContradictedError if no alignment can be taken, now or at all."""
+    found = [*calibration.evidence.contradictions]
+    if seen.contradiction is not None:
+        found.append(seen.contradiction)
+    if found and not calibration.alignments:
+        raise ContradictedError(found[0])
+
+
+def _contradicted(
+    station: Station, settings: DemoSettings, contradiction: Contradiction
+) -> dict[str, Any]:
+    """Return the report of a calibration that ended without an alignment."""
+    station.session.save_facts(evidence=(contradiction.name,), contradictions=(contradiction.text,))
+    return {
+        "seed": settings.seed,
+        "session": str(station.session.path),
+        "alignments": 0,
+        "eyes": {
+            eye: {
+                "verdict": "contradicted",
+                "reason": contradiction.text,
+                "evidence": [contradiction.name],
+            }
+            for eye in EYES
+        },
     }
 
 
@@ -134,6 +180,7 @@ def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -
                 raise HandcalError(snapshot.problem)
             if snapshot.observation is not None:
                 observations.append(snapshot.observation)
+                _require_no_contradiction(calibration, snapshot.observation)
                 if until(snapshot.observation):
                     return
         raise HandcalError(f"{complaint} within {_PATIENCE_S:.0f} s")
@@ -142,7 +189,10 @@ def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -
         which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
         label = f"Alignment {number + 1} of {len(plan)}, {which}"
         progress.at((number + 0.1) / len(plan), f"{label}: waiting for a steady hand")
-        watch(lambda seen: seen.is_steady, "the wearer did not hold the hand still")
+        watch(
+            lambda seen: seen.is_steady and calibration.is_applied,
+            "the wearer did not hold the hand still",
+        )
         calibration.make_cursor(eyes)
         progress.at((number + 0.3) / len(plan), f"{label}: wearer aligns")
         watch(lambda seen: seen.state is State.ALIGNED, "the wearer did not align the hand")
@@ -175,6 +225,7 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
                 "error_mm": float(1e3 * np.linalg.norm(shift.shift_m - truth_m[eye])),
                 "verdict": results.verdicts[eye].name,
                 "reason": results.verdicts[eye].reason,
+                "evidence": [one.name for one in calibration.evidence.contradictions],
             }
             for eye, shift in results.eyes.items()
         },

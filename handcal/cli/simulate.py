@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
+from typing import Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, number
 from handcal.io.files import make_folder
+from handcal.station.faults import Fault
 
+FAULTS = [fault for fault in get_args(Fault) if fault]
+_CONTRADICTED = 3
 _SEED = number(int, 0, 2**32 - 1)
 _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
@@ -55,6 +60,11 @@ _LINK = (
         metavar="FILE",
         help="true rig of the simulated headset (default: the same as --rig)",
     ),
+    arg(
+        "--fault",
+        choices=FAULTS,
+        help="a fault that must not be accepted; depth-bias is seen if the rig has a depth check",
+    ),
     json=True,
 )
 def demo(arguments: argparse.Namespace) -> None:
@@ -68,11 +78,14 @@ def demo(arguments: argparse.Namespace) -> None:
         loss=arguments.loss,
         reorder=arguments.reorder,
         worn_rig=str(arguments.worn_rig or ""),
+        fault=arguments.fault or "",
     )
     with show_progress() as progress:
         rig = _rig_path(arguments.rig)
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
     save(arguments.json, result)
+    if result["alignments"] == 0:
+        _say_contradictions(result)
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "error, mm", "verdict")
     for eye, found in result["eyes"].items():
         triples = [triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
@@ -87,6 +100,16 @@ def demo(arguments: argparse.Namespace) -> None:
         f"largest rotation accepted: {guard['accepted_deg']:.1f}°\n"
         f"Session: {result['session']}"
     )
+    if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
+        sys.exit(_CONTRADICTED)
+
+
+def _say_contradictions(result: dict[str, Any]) -> None:
+    """Say why there is no result, and end."""
+    for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
+        console.print(f"contradicted: {reason}", markup=False)
+    console.print(f"Session: {result['session']}", markup=False)
+    sys.exit(_CONTRADICTED)
 
 
 @command(
@@ -135,6 +158,11 @@ def demo(arguments: argparse.Namespace) -> None:
         help="stop after this time (default: run until terminated)",
     ),
     arg(
+        "--stale",
+        action="store_true",
+        help="fault: keep drawing with the projections of the wearer before",
+    ),
+    arg(
         "--as-device",
         action="store_true",
         help="no simulated wearer: print what is shown, confirm on Enter",
@@ -162,6 +190,7 @@ def headset(arguments: argparse.Namespace) -> None:
         ),
         clock_offset_s=arguments.clock_offset_ms / 1e3,
         duration_s=arguments.duration_s,
+        is_stale=arguments.stale,
         has_wearer=not arguments.as_device,
     )
     run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -38,6 +38,20 @@ class SyntheticSettings:
     clock_drift: float = 20e-6
     """The camera's clock shows ``(1 + clock_drift) t + clock_offset_s`` at host time t."""
     sensor: SensorSettings = field(default_factory=SensorSettings)
+    freeze_after_s: float = np.inf
+    """Fault: from this time on every frame repeats the last picture, with running time stamps."""
+    focal_scale: float = 1.0
+    """Fault: another camera, whose focal length is that of `depth_intrinsics` times this."""
+    depth_bias_m: float = 0.0
+    """Fault: added to every measured depth."""
+
+
+CAMERA_FAULTS: Mapping[str, SyntheticSettings] = {
+    "frozen-camera": SyntheticSettings(freeze_after_s=1.5),
+    "other-camera": SyntheticSettings(focal_scale=1.04),
+    "depth-bias": SyntheticSettings(depth_bias_m=0.02),
+}
+"""Settings of a camera with a fault, by its name."""
 
 
 class SyntheticCamera(Closable):
@@ -67,10 +81,19 @@ class SyntheticCamera(Closable):
         seed: int = 0,
         settings: SyntheticSettings | None = None,
     ) -> None:
-        self.depth_intrinsics = replace(depth_intrinsics, distortion=())
+        self._settings = settings or SyntheticSettings()
+        self.depth_intrinsics = replace(
+            depth_intrinsics,
+            fx=self._settings.focal_scale * depth_intrinsics.fx,
+            fy=self._settings.focal_scale * depth_intrinsics.fy,
+            distortion=(),
+        )
+        if self._settings.focal_scale != 1.0:
+            self.identity = replace(self.identity, serial_number="another one")
         self._world = world
         self._scene = scene
-        self._settings = settings or SyntheticSettings()
+        self._opened_s: float | None = None
+        self._frozen: Frame | None = None
         self._rng = np.random.default_rng(seed)
         self._index = 0
         self._next_s = time.monotonic()
@@ -109,15 +132,19 @@ class SyntheticCamera(Closable):
     def _expose(self, state: SceneState) -> Frame:
         settings, world = self._settings, self._world
         color_intrinsics, T_C_D = self.depth_intrinsics, np.eye(4)
+        if self._opened_s is None:
+            self._opened_s = time.monotonic()
+        if self._frozen is not None and time.monotonic() - self._opened_s > settings.freeze_after_s:
+            return self._repeat(self._frozen, state)
         depth_m, color = render(world, state.T_W_D, state.T_W_hand, self.depth_intrinsics)
         if not settings.aligned:
             color_intrinsics, T_C_D = _COLOR, _T_C_D
             _, color = render(world, state.T_W_D @ invert(T_C_D), state.T_W_hand, _COLOR)
-        depth = sense_depth(depth_m, self.depth_intrinsics.fx, self._rng, settings.sensor)
-        clock_rate = 1.0 + settings.clock_drift
+        biased_m = np.where(depth_m > 0.0, depth_m + settings.depth_bias_m, depth_m)
+        depth = sense_depth(biased_m, self.depth_intrinsics.fx, self._rng, settings.sensor)
         frame = Frame(
             index=self._index,
-            t_camera_ns=round(state.t_ns * clock_rate + 1e9 * settings.clock_offset_s),
+            t_camera_ns=self._camera_ns(state),
             t_host_ns=time.monotonic_ns(),
             depth=depth,
             depth_scale_m=settings.sensor.depth_scale_m,
@@ -127,7 +154,22 @@ class SyntheticCamera(Closable):
             T_C_D=T_C_D,
         )
         self._index += 1
+        self._frozen = frame
         return frame
+
+    def _repeat(self, frame: Frame, state: SceneState) -> Frame:
+        """Return the same picture again, as if it were new."""
+        self._index += 1
+        return replace(
+            frame,
+            index=self._index,
+            t_camera_ns=self._camera_ns(state),
+            t_host_ns=time.monotonic_ns(),
+        )
+
+    def _camera_ns(self, state: SceneState) -> int:
+        clock_rate = 1.0 + self._settings.clock_drift
+        return round(state.t_ns * clock_rate + 1e9 * self._settings.clock_offset_s)
 
     def close(self) -> None:
         """Stop; safe to call twice."""

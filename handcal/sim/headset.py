@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -30,6 +30,8 @@ from handcal.sim.hand import make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings
 from handcal.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
+
+_FORMER_SHIFT_M = (0.006, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,8 @@ class HeadsetSettings:
     duration_s: float | None = None
     """Time after which to end; None to run until stopped."""
     name: str = "Virtual headset"
+    is_stale: bool = False
+    """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
 
@@ -111,6 +115,8 @@ def run_headset(
         while not is_stopped() and not client.dismissed and next_s < end_s:
             t_ns = time.monotonic_ns()
             state = client.state()
+            if settings.is_stale:
+                state = _as_before(state, rig)
             action = act(state, t_ns / 1e9 - start_s)
             if scene is not None:
                 scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
@@ -128,6 +134,15 @@ def run_headset(
                 )
             next_s = max(next_s + 1.0 / settings.rate_hz, now_s)
             time.sleep(next_s - now_s)
+
+
+def _as_before(state: HeadsetState, rig: Rig) -> HeadsetState:
+    """Return what a headset shows that still draws with the last wearer's φ."""
+    stale = {
+        eye: replace(one, P=projection_matrix(rig.eyes[eye], _FORMER_SHIFT_M))
+        for eye, one in state.projections.items()
+    }
+    return replace(state, projections=stale)
 
 
 def _as_wearer(wearer: Wearer, rig: Rig) -> Callable[[HeadsetState, float], WearerAction]:

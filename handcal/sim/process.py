@@ -37,6 +37,8 @@ class VirtualHeadset(Closable):
         Seed of the wearer.
     loss, reorder : float
         Share of the datagrams lost, and reordered, in each direction.
+    is_stale : bool
+        Fault: it keeps drawing with the projections of the wearer before.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class VirtualHeadset(Closable):
         worn_rig_path: Path,
         loss: float = 0.0,
         reorder: float = 0.0,
+        is_stale: bool = False,
     ) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
         options = {
@@ -63,6 +66,7 @@ class VirtualHeadset(Closable):
         }
         command = [*program_command(), "headset"]
         command += [str(part) for option in options.items() for part in option]
+        command += ["--stale"] if is_stale else []
         self._process = subprocess.Popen(  # noqa: S603 (our own program)
             command, env=os.environ | {KEY_VARIABLE: pairing_key}, stderr=self._errors
         )

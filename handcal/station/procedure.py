@@ -41,6 +41,7 @@ from handcal.register.shape import ShapeChange, change_text
 from handcal.session.facts import AlignmentFacts, CameraUsed
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
+from handcal.station.evidence import Contradiction, Evidence
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.hold import merge_hold
 from handcal.types import (
@@ -122,6 +123,8 @@ class Observation:
     segment_ms: float | None = None
     guard_ms: float | None = None
     """Durations of these stages."""
+    contradiction: Contradiction | None = None
+    """Evidence that forbids to use this frame."""
 
 
 class Calibration:
@@ -157,6 +160,10 @@ class Calibration:
         Of all alignments; None before `solve` and after an alignment was deleted or restored.
     refused : int
         Number of confirmations refused by the guard.
+    camera : CameraIdentity
+        The camera that gives the frames; set it before `step`.
+    evidence : Evidence
+        Evidence from outside the solver against the result.
     refusal : str
         Reason why the last confirmation of the present cursor was refused; empty if none was.
     """
@@ -176,6 +183,8 @@ class Calibration:
         self.results: Results | None = None
         self.refused = 0
         self.refusal = ""
+        self.camera = CameraIdentity()
+        self.evidence = Evidence(rig)
         self._link = link
         self._session = session
         self._settings = settings or CalibrationSettings()
@@ -239,8 +248,13 @@ class Calibration:
         self._frame = frame
         problem = ""
         cloud: HandCloud | None = None
+        contradiction = self.evidence.see(frame, self.camera)
         try:
-            cloud = self._finder.find(frame)
+            if contradiction is None:
+                cloud = self._finder.find(frame)
+            else:
+                self._hands.clear()
+                problem = contradiction.text
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
@@ -248,7 +262,13 @@ class Calibration:
         problem = "" if hand else problem or not_placed
         is_steady = self._hands.steady() is not None
         observation = Observation(
-            self.state, hand, problem, is_steady, cloud, segment_ms=segment_ms
+            self.state,
+            hand,
+            problem,
+            is_steady,
+            cloud,
+            segment_ms=segment_ms,
+            contradiction=contradiction,
         )
         if self.state is State.ALIGN:
             observation = self._guide(observation)
@@ -280,6 +300,13 @@ class Calibration:
             self._items.next_number()
         except ValueError as error:
             raise ProcedureError(f"{error} in a session; start another") from error
+        if not self.is_applied:
+            # The cursor might be drawn with other projections than the solver assumes.
+            self._link.send_again()
+            raise ProcedureError(
+                "the headset has not acknowledged its projections yet; wait a moment, "
+                "or restart its app"
+            )
         hand = merge_hold(self._hands.held_at(hand), hand)
         self._guard = RotationGuard(hand.points_W_m, hand.cloud.is_cut)
         self._shape = None
@@ -490,7 +517,16 @@ class Calibration:
             self.state = State.ALIGNED
 
     def _solve(self) -> Results:
-        self.results = solve_session(self.alignments, self.rig, self._settings.solve)
+        found = self.evidence.contradictions
+        self.results = solve_session(
+            self.alignments,
+            self.rig,
+            self._settings.solve,
+            contradictions=[one.text for one in found],
+        )
+        if found:
+            names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
+            self._store(lambda session: session.save_facts(evidence=names, contradictions=texts))
         return self.results
 
     def _solved_shift_m(self) -> dict[Eye, Float64]:
@@ -574,6 +610,7 @@ class Calibration:
         assert self._cursor is not None
         assert self._guard is not None
         if confirmation.problem:
+            self.evidence.drawn_otherwise(confirmation.problem)
             self._link.send_again()
             self._refuse(
                 "The headset does not show what it should. Confirm again; if this is repeated, "
@@ -626,6 +663,7 @@ class Calibration:
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._shift_m),
         )
+        self.evidence.drawn_as_sent()
         facts = AlignmentFacts(
             match_age_s=1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns),
             cursor_moved_m=self._cursor.movement_m,
@@ -657,9 +695,7 @@ class Calibration:
     def _store_camera(self) -> None:
         """Record the camera if it is not the one recorded."""
         assert self._frame is not None
-        camera = CameraUsed(
-            CameraIdentity(), self._frame.depth_intrinsics, self._frame.depth_scale_m
-        )
+        camera = CameraUsed(self.camera, self._frame.depth_intrinsics, self._frame.depth_scale_m)
         if camera != self._camera_stored:
             self._camera_stored = camera
             self._store(lambda session: session.save_facts(camera=camera))

@@ -9,6 +9,7 @@ from typing import Literal
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.io.resources import resource_path
+from handcal.station.faults import Fault
 from handcal.station.procedure import CalibrationSettings
 
 Source = Literal["simulator", "recording", "realsense"]
@@ -43,6 +44,8 @@ class StationSettings:
     loss: float = 0.0
     reorder: float = 0.0
     """Share of the virtual headset's datagrams lost, and reordered, in each direction."""
+    fault: Fault = ""
+    """Fault of the simulated camera or the virtual headset; empty: none."""
     sessions: str = "sessions"
     """Folder in which sessions are created."""
     learn_prior: bool = True

@@ -112,6 +112,12 @@ def solve_again(
     if not record.alignments:
         return None
     try:
-        return solve_session(record.alignments, record.rig, settings, progress)
+        return solve_session(
+            record.alignments,
+            record.rig,
+            settings,
+            progress,
+            contradictions=record.facts.contradictions,
+        )
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error

@@ -28,7 +28,7 @@ from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
 from handcal.session.state import Kind
 from handcal.session.trial import make_trial
-from handcal.sim.camera import SyntheticCamera
+from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
@@ -139,6 +139,7 @@ class Station(Closable):
         observation = None
         try:
             if frame is not None:
+                self.calibration.camera = self._feed.status.identity
                 observation = self.calibration.step(frame)
                 cloud = observation.cloud
                 self._feed.expose_for(None if cloud is None else cloud.points_m)
@@ -290,6 +291,7 @@ class Station(Closable):
             worn_rig_path=self._worn_rig_path,
             loss=self.settings.loss,
             reorder=self.settings.reorder,
+            is_stale=self.settings.fault == "stale-headset",
         )
 
     def _open_camera(self) -> Camera:
@@ -305,6 +307,7 @@ class Station(Closable):
             self._simulation.scene,
             depth_intrinsics=self.worn_rig.depth_intrinsics,
             seed=settings.seed,
+            settings=CAMERA_FAULTS.get(settings.fault),
         )
 
     def _show(self, hand: PlacedHand) -> None:

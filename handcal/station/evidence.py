@@ -1,0 +1,102 @@
+"""Evidence from outside the solver against a calibration.
+
+The solver's residuals cannot show that the picture was frozen, that another camera than the rig's
+gave it, or that the headset drew something else than the PC believes. Each of these is watched for
+while the calibration runs. What is found refuses alignments while it lasts, or contradicts the
+result, and is named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handcal.rig.compare import compare_camera
+from handcal.rig.report import depth_finding
+from handcal.types import CameraIdentity, Frame, Intrinsics, Rig
+
+FROZEN_FRAMES = 4
+"""Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""
+_REFUSALS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Contradiction:
+    """One piece of evidence against a calibration."""
+
+    name: str
+    """Short name, as in ``handcal demo --fault``."""
+    text: str
+    """What happened; what to do."""
+
+
+class Evidence:
+    """Collects evidence during one calibration.
+
+    Parameters
+    ----------
+    rig : Rig
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._found: dict[str, Contradiction] = {}
+        self._camera: tuple[CameraIdentity, Intrinsics] | None = None
+        self._last: Frame | None = None
+        self._equal = 0
+        self._drawn_otherwise = 0
+        if rig.depth_check is not None and not (finding := depth_finding(rig.depth_check)).is_fine:
+            self._add(
+                "depth-bias",
+                f"the rig's depth check found {finding.found}; calibrate the depth camera, or "
+                "check it again",
+            )
+
+    @property
+    def contradictions(self) -> tuple[Contradiction, ...]:
+        """All evidence so far against the result."""
+        return tuple(self._found.values())
+
+    def see(self, frame: Frame, identity: CameraIdentity) -> Contradiction | None:
+        """Look at a frame; return what forbids to use it, if anything does.
+
+        A frozen picture passes by, so it forbids frames only while it lasts. Another camera
+        contradicts the whole calibration.
+        """
+        if (identity, frame.depth_intrinsics) != self._camera:
+            self._camera = identity, frame.depth_intrinsics
+            differences = compare_camera(self._rig, identity, frame.depth_intrinsics)
+            if differences:
+                self._add(
+                    "other-camera",
+                    f"the camera is not the rig's: {'; '.join(differences)}. Connect the rig's "
+                    "camera, or choose the rig file of this one",
+                )
+        last, self._last = self._last, frame
+        is_equal = last is not None and np.array_equal(last.depth, frame.depth)
+        self._equal = self._equal + 1 if is_equal else 0
+        if self._equal < FROZEN_FRAMES:
+            return None
+        return Contradiction(
+            "frozen-camera",
+            f"the camera's picture has not changed for {self._equal} frames; unplug the camera "
+            "and plug it in again",
+        )
+
+    def drawn_otherwise(self, problem: str) -> None:
+        """Note that a confirmation was refused because the headset drew something else."""
+        self._drawn_otherwise += 1
+        if self._drawn_otherwise >= _REFUSALS:
+            self._add(
+                "stale-headset",
+                f"the headset does not draw what was sent to it ({problem}); restart its app",
+            )
+
+    def drawn_as_sent(self) -> None:
+        """Note that a confirmation was drawn as it was sent."""
+        self._drawn_otherwise = 0
+        self._found.pop("stale-headset", None)
+
+    def _add(self, name: str, text: str) -> None:
+        self._found[name] = Contradiction(name, text)
