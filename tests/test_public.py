@@ -52,7 +52,7 @@ LEFT_LINE = (
 RESULTS_LINE = (
     "consistent, 2 alignments: "
     "left φ = (-4.07 ± 0.75, +0.91 ± 0.69, +2.27 ± 1.82) mm, accept; "
-    "right φ = (-1.95 ± 1.79, +0.84 ± 0.99, +2.52 ± 1.86) mm, accept"
+    "right φ = (-1.95 ± 1.79, +0.84 ± 0.99, +2.52 ± 1.86) mm, repeat"
 )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -140,6 +141,7 @@ def fit_match(
     aspect_m = shift_m - rigid_fit_m
     shape, paired = hand, hand[kept]
     while same_points:
+        kept &= _is_nearest(index, gap_m)
         fitted = hand[kept]
         _, partner = _unturned(shape[kept], cursor[index[kept]])
         fit_m, factor = _fit_pairs(partner, fitted, distance_m, history[-1] / 3.0)
@@ -149,6 +151,7 @@ def fit_match(
         gap_m, index = nearest(match.tree, transform(T_back, centre + (shape - centre) @ R_next.T))
         kept = match.hand_is_common & ~match.cursor_near_cut[index]
         kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
+        kept &= _is_nearest(index, gap_m)
         error_m2 = float(np.mean(gap_m[kept] ** 2))
         if error_m2 >= (1.0 - _GAIN) * history[-1]:
             break
@@ -213,6 +216,18 @@ def _covariance(
     displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
     gain = np.linalg.inv(design(cursor_m, hand_m, distance_m, exact=True).mean(axis=0))
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
+
+
+def _is_nearest(index: NDArray[np.intp], gap_m: Float64) -> Bool:
+    """Return (N,): True for the nearest of the points that are paired with the same partner.
+
+    Of two clouds that hold the same points, the others have lost their partner beyond the cut.
+    """
+    order = np.argsort(gap_m, kind="stable")
+    _, first = np.unique(index[order], return_index=True)
+    is_nearest = np.zeros(len(index), np.bool_)
+    is_nearest[order[first]] = True
+    return is_nearest
 
 
 def _unturned(shape: Float64, partner: Float64) -> tuple[Float64, Float64]:

@@ -87,9 +87,9 @@ class Fused:
 
     shifts: Mapping[Eye, EyeShift]
     prior: EyePrior
-    """What was assumed before the alignments, with the eye distance if it was measured."""
+    """Prior of the eyes before the alignments, with the eye distance if it was measured."""
     observed: tuple[Observation, ...]
-    """What each alignment measured."""
+    """The displacement measured by each alignment."""
     wearer_scale: float
     """Expected error of the wearer's overlays, in those of a usual wearer."""
 
@@ -237,7 +237,7 @@ def _scale_weights(
 def _observe(
     alignment: Alignment, shifts: Mapping[Eye, EyeShift], rig: Rig, settings: FuseSettings
 ) -> Observation:
-    """Return what an alignment measured.
+    """Return the displacement measured by an alignment.
 
     The wearer sees the part of the cursor's outline that lies within the display.
     """

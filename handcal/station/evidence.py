@@ -28,7 +28,7 @@ class Contradiction:
     name: str
     """Short name, as in ``handcal demo --fault``."""
     text: str
-    """What happened; what to do."""
+    """A sentence for people, with advice."""
 
 
 class Evidence:

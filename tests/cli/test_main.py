@@ -103,6 +103,7 @@ def segment_arguments(pictures: Path, output: object) -> list[object]:
     return [
         "segment", "--color", pictures / "color.png", "--depth", pictures / "depth.png",
         "--intrinsics", pictures / "camera.json", "--output", output,
+        "--roi", "depth",  # the hand has no colour of its own here
     ]  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
+from types import UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
@@ -53,12 +54,16 @@ def any_value(kind: Any) -> st.SearchStrategy[Any]:
         return any_settings(kind)
     if get_origin(kind) is Literal:
         return st.sampled_from(get_args(kind))
+    if get_origin(kind) is UnionType:
+        return st.none()
     known: dict[Any, st.SearchStrategy[Any]] = {
         float: PLAUSIBLE,
         int: st.integers(200, 40_000),
         bool: st.booleans(),
         str: st.text(),
         tuple[float, float, float]: st.lists(PLAUSIBLE, min_size=3, max_size=3),
+        # As long as the wearers' default scales and weights, which belong together.
+        tuple[float, ...]: st.lists(PLAUSIBLE, min_size=4, max_size=4),
     }
     return known[kind]
 

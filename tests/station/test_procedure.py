@@ -483,7 +483,8 @@ def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(
     np.testing.assert_array_equal(drawn_m["right"], np.zeros(3))
     fused = stage.calibration.solve().eyes["left"]
     before_m, after_m = (float(np.linalg.norm(s.shift_m - true_m)) for s in (first, fused))
-    assert after_m < max(0.6 * before_m, 5e-4)
+    # Both are drawn towards the eye box's middle, the second less.
+    assert after_m < max(0.7 * before_m, 5e-4)
     if slip_m == 0.0:
         assert np.trace(fused.covariance_m2) < np.trace(first.covariance_m2)
 
