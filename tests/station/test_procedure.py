@@ -30,6 +30,7 @@ from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.station.evidence import FROZEN_FRAMES
 from handcal.station.procedure import (
     Calibration,
     CalibrationSettings,
@@ -37,6 +38,7 @@ from handcal.station.procedure import (
     ProcedureError,
     State,
 )
+from handcal.station.solve_again import solve
 from handcal.types import (
     EYES,
     Alignment,
@@ -52,8 +54,8 @@ from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"
 IDENTITY = HeadsetIdentity("00000000000000aa", "Headset of the tests")
-RIG = example_rig()
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
+RIG = replace(example_rig(), depth_intrinsics=CAMERA)
 SENSOR = SensorSettings()
 LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
 SETTINGS = CalibrationSettings(camera_latency_s=0.0)
@@ -130,7 +132,8 @@ class Stage:
         if pose:
             self.send_poses(T)
         t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
-        depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad)
+        depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad).copy()
+        depth[0, 0] = self._frames % 1000  # a live picture always changes
         return self.calibration.step(
             Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
         )
@@ -155,6 +158,7 @@ class Stage:
         """Hold the hand, make the cursor of it, and wait until the headset shows it."""
         before = self.shown().cursor_id
         self.hold(T_D_hand)
+        eventually(lambda: self.calibration.is_applied)
         self.calibration.make_cursor(eyes)
         eventually(lambda: self.shown().cursor_id > before and self.shown().prompt)
 
@@ -1042,3 +1046,45 @@ def test_a_cursor_is_for_one_eye_or_both(stage: Stage, eyes: tuple[Eye, ...]) ->
     with pytest.raises(ValueError, match="one eye must be open, or both"):
         stage.calibration.make_cursor(eyes)
     assert stage.state() is State.SHOW_HAND
+
+
+def test_a_frozen_picture_makes_no_cursor_and_no_alignment(stage: Stage) -> None:
+    still = Frame(0, 0, 0, depth_of(T_D_HAND.tobytes()), SENSOR.depth_scale_m, CAMERA)
+    for _ in range(FROZEN_FRAMES + 8):
+        stage.t_ns += PERIOD_NS
+        stage.send_poses()
+        now = replace(still, t_camera_ns=stage.t_ns + CAMERA_AHEAD_NS, t_host_ns=stage.t_ns)
+        seen = stage.calibration.step(now)
+    assert seen.contradiction is not None
+    assert seen.contradiction.name == "frozen-camera"
+    assert "has not changed" in seen.problem
+    with pytest.raises(ProcedureError, match="hold the hand still"):
+        stage.calibration.make_cursor()
+    stage.make_cursor()  # the camera is alive again
+    assert stage.calibration.evidence.contradictions == ()
+
+
+def test_no_cursor_before_the_headset_has_the_projections(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage.hold()
+    with monkeypatch.context() as patch:
+        patch.setattr(Calibration, "is_applied", False)
+        with pytest.raises(ProcedureError, match="has not acknowledged its projections"):
+            stage.calibration.make_cursor()
+    assert stage.calibration.state is State.SHOW_HAND
+
+
+def test_a_headset_that_keeps_drawing_otherwise_contradicts_the_result(
+    stage: Stage, session: Session
+) -> None:
+    stage.align(T_D_NEAR, T_D_HAND)
+    stage.calibration.evidence.drawn_otherwise("other projections")
+    assert stage.calibration.evidence.contradictions == ()
+    stage.calibration.evidence.drawn_otherwise("other projections")
+    results = stage.calibration.solve()
+    assert {verdict.name for verdict in results.verdicts.values()} == {"contradicted"}
+    record = Session.open(session.path)
+    assert record.facts.evidence == ("stale-headset",)
+    again = solve(record)
+    assert {verdict.name for verdict in again.verdicts.values()} == {"contradicted"}
