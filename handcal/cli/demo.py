@@ -110,6 +110,7 @@ def run_demo(
             "sent": statistics.sent,
             "lost": statistics.lost,
             "acked": statistics.acked,
+            "projection_acked": calibration.projection_acked,
         },
         "timing_ms": _timing(calibration, rig, observations),
     }

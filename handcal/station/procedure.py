@@ -233,6 +233,11 @@ class Calibration:
         """True if the headset has acknowledged the newest projection of each eye."""
         return all(message.state is Delivery.ACKED for message in self._sent.values())
 
+    @property
+    def projection_acked(self) -> dict[Eye, bool]:
+        """True for each eye whose newest projection the headset has acknowledged."""
+        return {eye: message.state is Delivery.ACKED for eye, message in self._sent.items()}
+
     def step(self, frame: Frame) -> Observation:
         """Process a frame: find the hand, guide the alignment, handle a confirmation.
 

@@ -66,13 +66,16 @@ def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
     for eye in result["eyes"].values():
         for triple in ("shift_mm", "true_shift_mm", "sigma_mm"):
             assert np.shape(eye[triple]) == (3,)
-        assert eye["verdict"] in ("accept", "repeat", "implausible")
+        assert eye["verdict"] in ("accept", "repeat", "keep")
+        assert eye["evidence"] == []
         assert eye["reason"]
         off_mm = np.subtract(eye["shift_mm"], eye["true_shift_mm"])
         assert eye["error_mm"] == pytest.approx(np.linalg.norm(off_mm))
     assert set(result["reprojection_arcmin"]) == {"before", "after"}
     assert set(result["guard"]) == {"rejected", "accepted_deg"}
-    assert set(result["link"]) == {"sent", "lost", "acked"}
+    assert set(result["link"]) == {"sent", "lost", "acked", "projection_acked"}
+    assert result["link"]["projection_acked"] == {"left": True, "right": True}
+    assert result["alignments"] == 2
     assert set(result["timing_ms"]) == {"segment", "guard", "solve_both_eyes"}
     assert all(value > 0.0 for value in result["timing_ms"].values())
 
@@ -172,3 +175,22 @@ def test_a_wrong_rig_is_judged_by_the_true_eyes() -> None:
     expected = 60.0 * np.degrees(np.mean([0.001 / z for z in (0.4, 0.5, 0.6)]))
     moved = reprojection_arcmin(replace(worn, T_H_D=T_H_D), true_m, true_m, worn)
     assert moved == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("fault", ["stale-headset", "frozen-camera", "other-camera"])
+def test_a_fault_is_named_and_never_accepted(fault: str, tmp_path: Path) -> None:
+    write_small_rig(tmp_path / "rig.yaml")
+    options = f"--rig rig.yaml --seed {SEED} --fault {fault} --output runs --json it.json"
+    run = subprocess.run(
+        [sys.executable, "-m", "handcal", "demo", *options.split()],
+        cwd=tmp_path,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=150,
+    )
+    assert run.returncode == 3, run.stderr
+    result = json.loads((tmp_path / "it.json").read_text())
+    for eye in result["eyes"].values():
+        assert (eye["verdict"], eye["evidence"]) == ("contradicted", [fault])
+        assert eye["reason"] in run.stdout.replace("\n", " ")
