@@ -24,6 +24,7 @@ from handcal.io.settings import settings_json
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
+from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
 from handcal.session.state import Kind
@@ -37,6 +38,7 @@ from handcal.station.lab_prior import run_learn_prior
 from handcal.station.procedure import Calibration, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.solve_again import stored_solve_settings
 from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import Eye, Float64, Frame, Target
 
@@ -77,7 +79,9 @@ class Station(Closable):
         resume: Path | None = None,
         pairings: Pairings | str = "",
     ) -> None:
-        settings = settings if resume else _with_lab_prior(settings)
+        # A session keeps the prior that it began with, so that it is solved alike when resumed.
+        prior = _lab_prior(settings) if resume is None else _stored_prior(resume)
+        settings = _with_prior(settings, prior)
         self.settings = settings
         is_virtual = settings.headset == "virtual"
         if is_virtual or isinstance(pairings, str):
@@ -413,14 +417,21 @@ def _open_session(settings: StationSettings, wearer: str, resume: Path | None) -
     return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
 
 
-def _with_lab_prior(settings: StationSettings) -> StationSettings:
-    """Return the settings with the prior learned from the lab's earlier sessions, if wanted."""
+def _lab_prior(settings: StationSettings) -> PriorSettings:
+    """Return the prior for a new session, learned from the lab's earlier ones if wanted."""
+    prior = settings.calibration.solve.fuse.prior
+    if not settings.learn_prior or prior.learned is not None:
+        return prior
+    found = run_learn_prior(Path(settings.sessions), read_rig(settings.rig_path), prior)
+    return replace(prior, learned=found.learned)
+
+
+def _stored_prior(session: Path) -> PriorSettings:
+    return stored_solve_settings(Session.open(session)).fuse.prior
+
+
+def _with_prior(settings: StationSettings, prior: PriorSettings) -> StationSettings:
     solve = settings.calibration.solve
-    if not settings.learn_prior or solve.fuse.prior.learned is not None:
-        return settings
-    rig = read_rig(settings.rig_path)
-    found = run_learn_prior(Path(settings.sessions), rig, solve.fuse.prior)
-    prior = replace(solve.fuse.prior, learned=found.learned)
     solve = replace(solve, fuse=replace(solve.fuse, prior=prior))
     return replace(settings, calibration=replace(settings.calibration, solve=solve))
 

@@ -14,6 +14,8 @@ import pytest
 import handcal.station.station
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
+from handcal.register.fuse import FuseSettings
+from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
@@ -239,3 +241,15 @@ def test_a_station_that_cannot_be_opened_leaves_nothing_behind(
     Session(begun).close()  # the lock is free
     with pytest.raises(ValueError, match="unpack"):
         headset_of(os.getpid())
+
+
+def test_a_resumed_session_keeps_the_prior_it_began_with(
+    settings: StationSettings, simulated: Callable[..., Alignment]
+) -> None:
+    learned = LearnedPrior((0.001,) * 6, tuple((1e-6 * np.eye(6)).ravel().tolist()), 12)
+    solve = replace(CALIBRATION.solve, fuse=FuseSettings(prior=PriorSettings(learned=learned)))
+    stored = {"calibration": settings_json(replace(CALIBRATION, solve=solve))}
+    with Session.create(Path(settings.sessions), example_rig(), stored) as session:
+        session.save_alignment(simulated(1))
+    with Station(settings, resume=session.path) as station:
+        assert station.settings.calibration.solve.fuse.prior.learned == learned
