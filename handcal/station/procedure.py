@@ -407,6 +407,8 @@ class Calibration:
     def apply(self) -> None:
         """Send the solved projections to the headset and hide the cursor.
 
+        An eye with the verdict *keep* gets its offline projection.
+
         Raises
         ------
         ProcedureError
@@ -415,7 +417,7 @@ class Calibration:
         if self.results is None or self.state is not State.SOLVED:
             raise ProcedureError("solve first")
         self._clear_cursor()
-        self._send_projections(self._solved_shift_m())
+        self._send_projections(self.results.rendered_shift_m)
         self._apply_until_s = time.monotonic() + self._settings.apply_timeout_s
         self.state = State.APPLYING
 
@@ -458,7 +460,8 @@ class Calibration:
         except HandcalError:
             self.state = State.SOLVED
             raise
-        applied_m = self._solved_shift_m()
+        assert self.results is not None
+        applied_m = self.results.rendered_shift_m
         self._shift_m |= applied_m
         self.state = State.APPLIED
         self._store(lambda session: session.save_applied(applied_m))
@@ -528,10 +531,6 @@ class Calibration:
             names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
             self._store(lambda session: session.save_facts(evidence=names, contradictions=texts))
         return self.results
-
-    def _solved_shift_m(self) -> dict[Eye, Float64]:
-        assert self.results is not None
-        return {eye: shift.shift_m for eye, shift in self.results.eyes.items()}
 
     def _require_settled(self) -> None:
         if self.state in (State.ALIGN, State.APPLYING):

@@ -196,7 +196,7 @@ class Station(Closable):
             self.rig.eyes[eye],
             eye,
             depth_m,
-            results.eyes[eye].shift_m,
+            results.rendered_shift_m[eye],
             self.calibration.applied_shift_m[eye],
         )
         return self.session.save_trial(trial)

@@ -49,6 +49,7 @@ from handcal.types import (
     Intrinsics,
     Projection,
     UInt16,
+    Verdict,
 )
 from tests.helpers import eventually
 
@@ -720,6 +721,21 @@ def test_a_silent_headset_can_be_applied_to_again_when_it_is_back(
         for eye in EYES:
             expected = projection_matrix(RIG.eyes[eye], results.eyes[eye].shift_m)
             np.testing.assert_array_equal(back.state().projections[eye].P, expected)
+
+
+def test_keep_leaves_the_offline_calibration_in_the_headset(stage: Stage, session: Session) -> None:
+    stage.align()
+    solved = stage.calibration.solve()
+    verdicts = {"left": Verdict("keep", "as told"), "right": Verdict("repeat", "as told")}
+    stage.calibration.results = replace(solved, verdicts=verdicts)
+    stage.calibration.apply()
+    stage.calibration.wait_applied()
+    expected = {"left": np.zeros(3), "right": solved.eyes["right"].shift_m}
+    for eye, shift_m in expected.items():
+        shown = stage.shown().projections[eye].P
+        np.testing.assert_array_equal(shown, projection_matrix(RIG.eyes[eye], shift_m))
+        stored_m = Session.open(session.path).applied_shift_m[eye]
+        np.testing.assert_array_equal(stored_m, shift_m)
 
 
 def test_what_the_disk_did_not_take_is_kept_and_stored_later(
