@@ -26,9 +26,9 @@ _HISTORY_PERIOD_S = 0.2
 _HISTORY_LIMITS = 2.0
 """End of the history's scale in multiples of the limit, as for the dial."""
 _STRAIGHT_RAD = np.radians(2.0)
-# A smaller change of shape, rms, is not worth a word.
-_SHAPE_M = 0.0015
 """Rotations below this need no correction: hardly more than the guard's own error."""
+_SHAPE_M = 0.0015
+"""A smaller change of shape, rms, is not worth a word."""
 _NO_CURSOR = "Make a cursor; the hand's rotation from it is then shown here."
 _TAKEN = "The alignment is confirmed."
 _NO_HAND = "Hold the hand in view of the camera."
