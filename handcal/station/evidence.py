@@ -80,8 +80,7 @@ class Evidence:
             return None
         return Contradiction(
             "frozen-camera",
-            f"the camera's picture has not changed for {self._equal} frames; unplug the camera "
-            "and plug it in again",
+            "the camera's picture does not change; unplug the camera and plug it in again",
         )
 
     def drawn_otherwise(self, problem: str) -> None:

@@ -19,6 +19,7 @@ from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.station.faults import Fault
 from handcal.station.procedure import CalibrationSettings, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -239,3 +240,16 @@ def test_a_station_that_cannot_be_opened_leaves_nothing_behind(
     Session(begun).close()  # the lock is free
     with pytest.raises(ValueError, match="unpack"):
         headset_of(os.getpid())
+
+
+@pytest.mark.parametrize(
+    ("fault", "advice"),
+    [("other-camera", "choose the rig file"), ("frozen-camera", "unplug the camera")],
+)
+def test_evidence_is_told_before_anything_is_solved(
+    settings: StationSettings, fault: Fault, advice: str
+) -> None:
+    with Station(replace(settings, fault=fault)) as station:
+        found = step_until(station, "evidence", lambda seen: bool(seen.contradiction), 20.0)
+    assert advice in found.contradiction
+    assert not found.problem

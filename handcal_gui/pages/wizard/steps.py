@@ -184,11 +184,14 @@ class Wizard:
                 link.pose_rate_hz > 0,
             ),
         )
+        is_ready = all(check.holds for check in checks)
+        if snapshot.contradiction and not camera.problem:
+            checks = (Precondition(sentence(snapshot.contradiction), False), *checks[1:])
         return WizardView(
             Step.CONNECT,
             "Put the headset on the wearer and wait until camera and headset are connected.",
             checks,
-            ButtonSpec(Action.NEXT, "Next", all(check.holds for check in checks)),
+            ButtonSpec(Action.NEXT, "Next", is_ready),
         )
 
     def _show_hand(self, snapshot: Snapshot) -> WizardView:

@@ -122,6 +122,12 @@ def test_connect_waits_for_camera_headset_and_poses(
     assert [check for check in view.checks if complaint in check.text and not check.holds]
 
 
+def test_a_camera_against_which_there_is_evidence_is_not_ticked(snapshot: Maker) -> None:
+    seen = replace(snapshot(State.SHOW_HAND), contradiction="the camera is not the rig's")
+    camera = Wizard().view(seen).checks[0]
+    assert (camera.text, camera.holds) == ("The camera is not the rig's", False)
+
+
 def test_a_hand_is_needed_and_the_engine_s_reason_is_given(start: Snapshot) -> None:
     wizard = Wizard()
     reach(wizard, start, Step.SHOW_HAND)
