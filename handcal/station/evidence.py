@@ -92,6 +92,11 @@ class Evidence:
                 f"the headset does not draw what was sent to it ({problem}); restart its app",
             )
 
+    @property
+    def is_drawn_otherwise(self) -> bool:
+        """True if the last confirmation from the headset was refused for what it drew."""
+        return self._drawn_otherwise > 0
+
     def drawn_as_sent(self) -> None:
         """Note that a confirmation was drawn as it was sent."""
         self._drawn_otherwise = 0

@@ -329,7 +329,8 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no cursor, or no hand in view, or the headset does not draw it yet.
+            If there is no cursor, or no hand in view, or the headset does not draw it yet, or drew
+            something else at the last confirmation.
         """
         if self.state is not State.ALIGN:
             raise ProcedureError(f"there is no cursor to confirm ({self.state})")
@@ -339,6 +340,12 @@ class Calibration:
         cursor = self._sent_cursor
         if not self.is_applied or cursor is None or cursor.state is not Delivery.ACKED:
             raise ProcedureError("the headset has not received the cursor and projections; wait")
+        if self.evidence.is_drawn_otherwise:
+            # Only the headset's own confirmation says what it draws.
+            raise ProcedureError(
+                "the headset did not draw what was sent to it; let the wearer confirm in the "
+                "headset, and restart its app if that is refused again"
+            )
         self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, self._cursor_id)
 
     def redo(self) -> None:
