@@ -129,7 +129,9 @@ class RotationPanel(QWidget):
         if not procedure.refused and not procedure.refusal:
             self._refusals.setText("No confirmation refused.")
         else:
-            self._refusals.setText(f"Refused: {procedure.refused}. {procedure.refusal}")
+            # A refusal by other evidence than the guard's is not counted.
+            count = f": {procedure.refused}" if procedure.refused else ""
+            self._refusals.setText(f"Refused{count}. {procedure.refusal}")
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)
