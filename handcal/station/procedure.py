@@ -343,8 +343,7 @@ class Calibration:
         if self.evidence.is_drawn_otherwise:
             # Only the headset's own confirmation says what it draws.
             raise ProcedureError(
-                "the headset did not draw what was sent to it; let the wearer confirm in the "
-                "headset, and restart its app if that is refused again"
+                "the headset drew something else; let the wearer confirm, or restart its app"
             )
         self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, self._cursor_id)
 

@@ -524,7 +524,7 @@ def test_a_headset_that_keeps_stale_projections_is_refused(stage: Stage, session
     eventually(lambda: stage.shown().prompt == stage.calibration.refusal)
     stage.see(T_D_NEAR)
     eventually(lambda: stage.calibration.is_applied)
-    with pytest.raises(ProcedureError, match="let the wearer confirm in the headset"):
+    with pytest.raises(ProcedureError, match="let the wearer confirm, or restart"):
         stage.calibration.confirm()
     stage.press()
     assert stage.see(T_D_NEAR).state is State.ALIGNED

@@ -170,9 +170,8 @@ class _CheckRow(QWidget):
         self.setMinimumHeight(3 * SPACING_PX)
 
     def show_check(self, check: Precondition | None) -> None:
+        self.setVisible(check is not None)
         if check is None:
-            self._icon.clear()
-            self._text.clear()
             return
         name, word = ("check", "Yes") if check.holds else ("wait", "Not yet")
         shade = colors().good if check.holds else colors().muted
