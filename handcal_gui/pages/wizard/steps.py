@@ -261,7 +261,7 @@ class Wizard:
                 Step.SOLVE, wait, (aligned, *verdicts), ButtonSpec(Action.APPLY, "Sending…", False)
             )
         names = {eye: verdict.name for eye, verdict in procedure.results.verdicts.items()}
-        others = (redo,)
+        others: tuple[ButtonSpec, ...] = (redo,)
         send = ButtonSpec(Action.APPLY, "Send to the headset")
         instruction = "Send the corrected projections to the headset."
         kept = tuple(eye for eye, name in names.items() if name == "keep")

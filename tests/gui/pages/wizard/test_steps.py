@@ -179,7 +179,10 @@ def judged(snapshot: Maker, left: VerdictName, right: VerdictName, state: State)
     """Return a snapshot with these verdicts."""
     seen = snapshot(state)
     assert seen.procedure.results is not None
-    verdicts = {"left": Verdict(left, "as told"), "right": Verdict(right, "as told")}
+    verdicts: dict[Eye, Verdict] = {
+        "left": Verdict(left, "as told"),
+        "right": Verdict(right, "as told"),
+    }
     results = replace(seen.procedure.results, verdicts=verdicts)
     return replace(seen, procedure=replace(seen.procedure, results=results))
 
