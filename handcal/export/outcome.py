@@ -33,7 +33,7 @@ class SessionOutcome:
     """All alignments solved again; None without alignments."""
     shifts_m: Mapping[Eye, Mapping[ShiftOrigin, Float64]]
     """each (3,); every known φ of an eye, the final one first: fine-tuned by hand, solved, and the
-    zero of the offline calibration."""
+    zero of the offline calibration, which precedes the solved one if the verdict is *keep*."""
 
     @property
     def name(self) -> str:
@@ -98,5 +98,7 @@ def _shifts_m(
     if record.fine_tuned is not None and eye in record.fine_tuned:
         shifts_m["fine_tuned"] = record.fine_tuned[eye]
     if results is not None and eye in results.eyes:
+        if results.verdicts[eye].name == "keep":
+            shifts_m["offline"] = np.zeros(3)
         shifts_m["solved"] = results.eyes[eye].shift_m
     return shifts_m | {"offline": np.zeros(3)}

@@ -24,6 +24,7 @@ from handcal.types import (
     Alignment,
     Eye,
     EyeShift,
+    Float64,
     Method,
     Rig,
     Verdict,
@@ -53,7 +54,7 @@ class Results:
     alignments: Mapping[int, Mapping[Eye, EyeShift]]
     """Each alignment alone, without prior, by number."""
     eyes: Mapping[Eye, EyeShift]
-    """Fused estimates, for the headset to render with."""
+    """Fused estimates."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
     """Eye distance implied by `eyes`; None unless both eyes are solved."""
@@ -65,6 +66,14 @@ class Results:
     """Expected error after one more alignment with all solved eyes open."""
     fused: Fused
     """The observations and the prior behind `eyes`."""
+
+    @property
+    def rendered_shift_m(self) -> Mapping[Eye, Float64]:
+        """φ for the headset to render with, (3,): zero where the offline calibration is kept."""
+        return {
+            eye: np.zeros(3) if self.verdicts[eye].name == "keep" else shift.shift_m
+            for eye, shift in self.eyes.items()
+        }
 
     def __str__(self) -> str:
         solved = (

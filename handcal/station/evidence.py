@@ -80,8 +80,7 @@ class Evidence:
             return None
         return Contradiction(
             "frozen-camera",
-            f"the camera's picture has not changed for {self._equal} frames; unplug the camera "
-            "and plug it in again",
+            "the camera's picture does not change; unplug the camera and plug it in again",
         )
 
     def drawn_otherwise(self, problem: str) -> None:
@@ -92,6 +91,11 @@ class Evidence:
                 "stale-headset",
                 f"the headset does not draw what was sent to it ({problem}); restart its app",
             )
+
+    @property
+    def is_drawn_otherwise(self) -> bool:
+        """True if the last confirmation from the headset was refused for what it drew."""
+        return self._drawn_otherwise > 0
 
     def drawn_as_sent(self) -> None:
         """Note that a confirmation was drawn as it was sent."""

@@ -334,7 +334,8 @@ class Calibration:
         Raises
         ------
         ProcedureError
-            If there is no cursor, or no hand in view, or the headset does not draw it yet.
+            If there is no cursor, or no hand in view, or the headset does not draw it yet, or drew
+            something else at the last confirmation.
         """
         if self.state is not State.ALIGN:
             raise ProcedureError(f"there is no cursor to confirm ({self.state})")
@@ -344,6 +345,11 @@ class Calibration:
         cursor = self._sent_cursor
         if not self.is_applied or cursor is None or cursor.state is not Delivery.ACKED:
             raise ProcedureError("the headset has not received the cursor and projections; wait")
+        if self.evidence.is_drawn_otherwise:
+            # Only the headset's own confirmation says what it draws.
+            raise ProcedureError(
+                "the headset drew something else; let the wearer confirm, or restart its app"
+            )
         self._confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, self._cursor_id)
 
     def redo(self) -> None:
@@ -412,6 +418,8 @@ class Calibration:
     def apply(self) -> None:
         """Send the solved projections to the headset and hide the cursor.
 
+        An eye with the verdict *keep* gets its offline projection.
+
         Raises
         ------
         ProcedureError
@@ -420,7 +428,7 @@ class Calibration:
         if self.results is None or self.state is not State.SOLVED:
             raise ProcedureError("solve first")
         self._clear_cursor()
-        self._send_projections(self._solved_shift_m())
+        self._send_projections(self.results.rendered_shift_m)
         self._apply_until_s = time.monotonic() + self._settings.apply_timeout_s
         self.state = State.APPLYING
 
@@ -463,7 +471,8 @@ class Calibration:
         except HandcalError:
             self.state = State.SOLVED
             raise
-        applied_m = self._solved_shift_m()
+        assert self.results is not None
+        applied_m = self.results.rendered_shift_m
         self._shift_m |= applied_m
         self.state = State.APPLIED
         self._store(lambda session: session.save_applied(applied_m))
@@ -533,10 +542,6 @@ class Calibration:
             names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
             self._store(lambda session: session.save_facts(evidence=names, contradictions=texts))
         return self.results
-
-    def _solved_shift_m(self) -> dict[Eye, Float64]:
-        assert self.results is not None
-        return {eye: shift.shift_m for eye, shift in self.results.eyes.items()}
 
     def _require_settled(self) -> None:
         if self.state in (State.ALIGN, State.APPLYING):

@@ -61,6 +61,8 @@ class Snapshot:
     procedure: Procedure
     record: SessionRecord
     """The session as stored on disk; the same object until it changes."""
+    contradiction: str = ""
+    """Evidence against the calibration or this frame, with advice; empty if there is none."""
     views: Mapping[Eye, EyeView] = field(default_factory=dict)
     """The wearer's views, if requested by `Station.watch_views`."""
 

@@ -35,7 +35,7 @@ from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
 from handcal.station.hands import PlacedHand
 from handcal.station.lab_prior import run_learn_prior
-from handcal.station.procedure import Calibration, ProcedureError, State
+from handcal.station.procedure import Calibration, Observation, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.solve_again import stored_solve_settings
@@ -171,6 +171,7 @@ class Station(Closable):
             link=self._link.statistics(),
             link_problem=self._link_problem(),
             problem=self._not_stored or self._not_applied,
+            contradiction=self._contradiction(observation),
             procedure=self._procedure(),
             record=self._record,
             views=dict(self._views),
@@ -200,7 +201,7 @@ class Station(Closable):
             self.rig.eyes[eye],
             eye,
             depth_m,
-            results.eyes[eye].shift_m,
+            results.rendered_shift_m[eye],
             self.calibration.applied_shift_m[eye],
         )
         return self.session.save_trial(trial)
@@ -374,6 +375,12 @@ class Station(Closable):
             f"no headset is connected; let it connect to {host}, UDP port {port}, with the "
             "pairing key"
         )
+
+    def _contradiction(self, observation: Observation | None) -> str:
+        found = self.calibration.evidence.contradictions
+        if observation is not None and observation.contradiction is not None:
+            found = (observation.contradiction, *found)
+        return found[0].text if found else ""
 
     def _procedure(self) -> Procedure:
         calibration = self.calibration

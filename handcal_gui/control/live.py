@@ -231,7 +231,10 @@ class CalibrationController(QObject):
                 panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
-            snapshot.problem or snapshot.camera.problem or snapshot.link_problem
+            snapshot.problem
+            or snapshot.camera.problem
+            or snapshot.link_problem
+            or snapshot.contradiction
         )
         self._watch_views(panels.wearer_view in self._visible)
         self.polled.emit(snapshot)

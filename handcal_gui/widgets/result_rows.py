@@ -19,6 +19,21 @@ VERDICT_WORDS: Mapping[VerdictName, str] = {
     "implausible": "✕ Implausible",
     "contradicted": "✕ Contradicted",
 }
+VERDICT_COLORS: Mapping[VerdictName, str] = {
+    "accept": "good",
+    "repeat": "warning",
+    "keep": "warning",
+    "implausible": "red",
+    "contradicted": "red",
+}
+"""Names of the theme's colours."""
+VERDICT_ICONS: Mapping[VerdictName, str] = {
+    "accept": "check",
+    "repeat": "redo",
+    "keep": "undo",
+    "implausible": "cross",
+    "contradicted": "cross",
+}
 NOTHING = "–"
 
 

@@ -13,6 +13,7 @@ from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.progress import Progress
 from handcal.register.results import results_json
 from handcal.session.session import SessionRecord
+from handcal.types import EYES, Verdict
 
 
 def test_the_session_is_solved_to_what_it_was(outcome: SessionOutcome) -> None:
@@ -39,6 +40,18 @@ def test_applied_is_what_the_headset_rendered_with_in_the_end(outcome: SessionOu
     assert never.final("left") == "solved"
     assert not never.is_applied("left", "solved")
     assert never.is_applied("left", "offline")
+
+
+def test_the_offline_calibration_is_final_where_it_is_kept(
+    outcome: SessionOutcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert outcome.results is not None
+    kept = replace(outcome.results, verdicts=dict.fromkeys(EYES, Verdict("keep", "as told")))
+    monkeypatch.setattr("handcal.export.outcome.solve_again", lambda *_: kept)
+    again = load_outcome(outcome.record)
+    assert list(again.shifts_m["left"]) == ["fine_tuned", "offline", "solved"]
+    assert list(again.shifts_m["right"]) == ["offline", "solved"]
+    assert not again.final_shift_m("right").any()
 
 
 def test_projections_are_those_of_each_shift(outcome: SessionOutcome) -> None:

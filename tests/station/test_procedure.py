@@ -49,6 +49,7 @@ from handcal.types import (
     Intrinsics,
     Projection,
     UInt16,
+    Verdict,
 )
 from tests.helpers import eventually
 
@@ -522,6 +523,9 @@ def test_a_headset_that_keeps_stale_projections_is_refused(stage: Stage, session
     assert events(session)[-1][1]["reason"] == "drawn otherwise"
     eventually(lambda: stage.shown().prompt == stage.calibration.refusal)
     stage.see(T_D_NEAR)
+    eventually(lambda: stage.calibration.is_applied)
+    with pytest.raises(ProcedureError, match="let the wearer confirm, or restart"):
+        stage.calibration.confirm()
     stage.press()
     assert stage.see(T_D_NEAR).state is State.ALIGNED
 
@@ -720,6 +724,24 @@ def test_a_silent_headset_can_be_applied_to_again_when_it_is_back(
         for eye in EYES:
             expected = projection_matrix(RIG.eyes[eye], results.eyes[eye].shift_m)
             np.testing.assert_array_equal(back.state().projections[eye].P, expected)
+
+
+def test_keep_leaves_the_offline_calibration_in_the_headset(stage: Stage, session: Session) -> None:
+    stage.align()
+    solved = stage.calibration.solve()
+    verdicts: dict[Eye, Verdict] = {
+        "left": Verdict("keep", "as told"),
+        "right": Verdict("repeat", "as told"),
+    }
+    stage.calibration.results = replace(solved, verdicts=verdicts)
+    stage.calibration.apply()
+    stage.calibration.wait_applied()
+    expected: dict[Eye, Float64] = {"left": np.zeros(3), "right": solved.eyes["right"].shift_m}
+    for eye, shift_m in expected.items():
+        shown = stage.shown().projections[eye].P
+        np.testing.assert_array_equal(shown, projection_matrix(RIG.eyes[eye], shift_m))
+        stored_m = Session.open(session.path).applied_shift_m[eye]
+        np.testing.assert_array_equal(stored_m, shift_m)
 
 
 def test_what_the_disk_did_not_take_is_kept_and_stored_later(
@@ -1057,7 +1079,7 @@ def test_a_frozen_picture_makes_no_cursor_and_no_alignment(stage: Stage) -> None
         seen = stage.calibration.step(now)
     assert seen.contradiction is not None
     assert seen.contradiction.name == "frozen-camera"
-    assert "has not changed" in seen.problem
+    assert "does not change" in seen.problem
     with pytest.raises(ProcedureError, match="hold the hand still"):
         stage.calibration.make_cursor()
     stage.make_cursor()  # the camera is alive again

@@ -21,6 +21,7 @@ from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.station.faults import Fault
 from handcal.station.procedure import CalibrationSettings, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -253,3 +254,16 @@ def test_a_resumed_session_keeps_the_prior_it_began_with(
         session.save_alignment(simulated(1))
     with Station(settings, resume=session.path) as station:
         assert station.settings.calibration.solve.fuse.prior.learned == learned
+
+
+@pytest.mark.parametrize(
+    ("fault", "advice"),
+    [("other-camera", "choose the rig file"), ("frozen-camera", "unplug the camera")],
+)
+def test_evidence_is_told_before_anything_is_solved(
+    settings: StationSettings, fault: Fault, advice: str
+) -> None:
+    with Station(replace(settings, fault=fault)) as station:
+        found = step_until(station, "evidence", lambda seen: bool(seen.contradiction), 20.0)
+    assert advice in found.contradiction
+    assert not found.problem

@@ -10,7 +10,7 @@ import numpy as np
 
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye, EyePlan
+from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
@@ -22,6 +22,8 @@ PLANS: dict[EyePlan, str] = {
 }
 _DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
 _LEAST_ALIGN_NS = 1_500_000_000
+_UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
+_SENDS_UNUSABLE = "Draws with a result that should not be used"
 
 
 class Step(StrEnum):
@@ -63,6 +65,8 @@ class Precondition:
 
     text: str
     holds: bool
+    verdict: VerdictName | None = None
+    """The verdict that it shows, if it shows one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,11 +184,14 @@ class Wizard:
                 link.pose_rate_hz > 0,
             ),
         )
+        is_ready = all(check.holds for check in checks)
+        if snapshot.contradiction and not camera.problem:
+            checks = (Precondition(sentence(snapshot.contradiction), False), *checks[1:])
         return WizardView(
             Step.CONNECT,
             "Put the headset on the wearer and wait until camera and headset are connected.",
             checks,
-            ButtonSpec(Action.NEXT, "Next", all(check.holds for check in checks)),
+            ButtonSpec(Action.NEXT, "Next", is_ready),
         )
 
     def _show_hand(self, snapshot: Snapshot) -> WizardView:
@@ -253,13 +260,22 @@ class Wizard:
             return WizardView(
                 Step.SOLVE, wait, (aligned, *verdicts), ButtonSpec(Action.APPLY, "Sending…", False)
             )
+        names = {eye: verdict.name for eye, verdict in procedure.results.verdicts.items()}
+        others: tuple[ButtonSpec, ...] = (redo,)
+        send = ButtonSpec(Action.APPLY, "Send to the headset")
+        instruction = "Send the corrected projections to the headset."
+        kept = tuple(eye for eye, name in names.items() if name == "keep")
+        if _UNUSABLE.intersection(names.values()):
+            instruction = "Do not use this result. Follow the advice below, then repeat."
+            send = ButtonSpec(Action.APPLY, "Send to the headset", False)
+            others += (ButtonSpec(Action.APPLY, "Send &anyway", discards=_SENDS_UNUSABLE),)
+        elif len(kept) == len(names):
+            instruction = f"Keep the offline calibration of {_names(kept)}."
+            send = ButtonSpec(Action.APPLY, "Keep offline")
+        elif kept:
+            instruction = f"Send the projections to the headset, those of {_names(kept)} offline."
         return WizardView(
-            Step.SOLVE,
-            "Send the corrected projections to the headset.",
-            (aligned, *verdicts),
-            ButtonSpec(Action.APPLY, "Send to the headset"),
-            (redo,),
-            snapshot.problem,
+            Step.SOLVE, instruction, (aligned, *verdicts), send, others, snapshot.problem
         )
 
     def _verify(self, snapshot: Snapshot) -> WizardView:
@@ -281,10 +297,18 @@ class Wizard:
                 ButtonSpec(Action.ANOTHER, f"Align {eyes}"),
                 (ButtonSpec(Action.NEXT, "Finish with &one eye"),),
             )
+        instruction = (
+            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
+            "add an alignment or fine-tune φ."
+        )
+        if any(check.verdict == "repeat" for check in checks):
+            instruction = (
+                "The wearer looks at the raised hand. Not accepted yet: add the alignments "
+                "advised below, unless the outline fits."
+            )
         return WizardView(
             Step.VERIFY,
-            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
-            "add an alignment or fine-tune φ.",
+            instruction,
             checks,
             ButtonSpec(Action.NEXT, "It fits"),
             (
@@ -343,7 +367,9 @@ def _verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
         return ()
     return tuple(
         Precondition(
-            f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}", verdict.name == "accept"
+            f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}",
+            verdict.name == "accept",
+            verdict.name,
         )
         for eye, verdict in results.verdicts.items()
     )

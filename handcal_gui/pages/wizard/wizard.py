@@ -17,6 +17,7 @@ from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.steps import PLANS, STEPS, Precondition, Step, Wizard, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
 _MOST_CHECKS = 3
 
@@ -169,12 +170,14 @@ class _CheckRow(QWidget):
         self.setMinimumHeight(3 * SPACING_PX)
 
     def show_check(self, check: Precondition | None) -> None:
+        self.setVisible(check is not None)
         if check is None:
-            self._icon.clear()
-            self._text.clear()
             return
         name, word = ("check", "Yes") if check.holds else ("wait", "Not yet")
         shade = colors().good if check.holds else colors().muted
+        if check.verdict is not None:
+            name, word = VERDICT_ICONS[check.verdict], check.verdict.capitalize()
+            shade = getattr(colors(), VERDICT_COLORS[check.verdict])
         self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
         self._icon.setAccessibleName(word)
         self._text.setText(check.text)

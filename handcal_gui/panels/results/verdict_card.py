@@ -9,16 +9,9 @@ from PySide6.QtWidgets import QFrame, QLabel, QWidget
 from handcal.types import Eye, Verdict
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
-_ROLES = {
-    "accept": "good",
-    "repeat": "warning",
-    "keep": "warning",
-    "implausible": "red",
-    "contradicted": "red",
-}
 _REASON_LINES = 4
 
 
@@ -63,6 +56,6 @@ class VerdictCard(QFrame):
     def _recolor(self) -> None:
         palette = QPalette(self.palette())
         if self._verdict is not None:
-            color = QColor(getattr(colors(), _ROLES[self._verdict.name]))
+            color = QColor(getattr(colors(), VERDICT_COLORS[self._verdict.name]))
             palette.setColor(QPalette.ColorRole.WindowText, color)
         self._word.setPalette(palette)

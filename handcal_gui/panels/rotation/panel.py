@@ -26,9 +26,9 @@ _HISTORY_PERIOD_S = 0.2
 _HISTORY_LIMITS = 2.0
 """End of the history's scale in multiples of the limit, as for the dial."""
 _STRAIGHT_RAD = np.radians(2.0)
-# A smaller change of shape, rms, is not worth a word.
-_SHAPE_M = 0.0015
 """Rotations below this need no correction: hardly more than the guard's own error."""
+_SHAPE_M = 0.0015
+"""A smaller change of shape, rms, is not worth a word."""
 _NO_CURSOR = "Make a cursor; the hand's rotation from it is then shown here."
 _TAKEN = "The alignment is confirmed."
 _NO_HAND = "Hold the hand in view of the camera."
@@ -129,7 +129,9 @@ class RotationPanel(QWidget):
         if not procedure.refused and not procedure.refusal:
             self._refusals.setText("No confirmation refused.")
         else:
-            self._refusals.setText(f"Refused: {procedure.refused}. {procedure.refusal}")
+            # A refusal by other evidence than the guard's is not counted.
+            count = f": {procedure.refused}" if procedure.refused else ""
+            self._refusals.setText(f"Refused{count}. {procedure.refusal}")
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)

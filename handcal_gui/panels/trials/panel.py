@@ -155,7 +155,7 @@ class TrialsPanel(QWidget):
         if self._obstacle() or procedure is None or procedure.results is None:
             return False
         eye = self._next_eye()
-        solved_m = procedure.results.eyes[eye].shift_m
+        solved_m = procedure.results.rendered_shift_m[eye]
         return bool(np.allclose(procedure.applied_shift_m[eye], solved_m, rtol=0.0, atol=1e-6))
 
     def _refresh(self) -> None:

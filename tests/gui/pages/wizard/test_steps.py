@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -10,7 +10,7 @@ from handcal.errors import FileError
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye, EyePlan
+from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName
 from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
@@ -122,6 +122,12 @@ def test_connect_waits_for_camera_headset_and_poses(
     assert [check for check in view.checks if complaint in check.text and not check.holds]
 
 
+def test_a_camera_against_which_there_is_evidence_is_not_ticked(snapshot: Maker) -> None:
+    seen = replace(snapshot(State.SHOW_HAND), contradiction="the camera is not the rig's")
+    camera = Wizard().view(seen).checks[0]
+    assert (camera.text, camera.holds) == ("The camera is not the rig's", False)
+
+
 def test_a_hand_is_needed_and_the_engine_s_reason_is_given(start: Snapshot) -> None:
     wizard = Wizard()
     reach(wizard, start, Step.SHOW_HAND)
@@ -167,6 +173,65 @@ def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> No
     assert view.note == "the disk is full; free some space"
     assert actions(view) == [Action.REDO]
     assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
+
+
+def judged(snapshot: Maker, left: VerdictName, right: VerdictName, state: State) -> Snapshot:
+    """Return a snapshot with these verdicts."""
+    seen = snapshot(state)
+    assert seen.procedure.results is not None
+    verdicts: dict[Eye, Verdict] = {
+        "left": Verdict(left, "as told"),
+        "right": Verdict(right, "as told"),
+    }
+    results = replace(seen.procedure.results, verdicts=verdicts)
+    return replace(seen, procedure=replace(seen.procedure, results=results))
+
+
+def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
+    for name in get_args(VerdictName):
+        checks = Wizard().view(judged(snapshot, name, "accept", State.SOLVED)).checks
+        assert [(c.verdict, c.holds) for c in checks[1:]] == [
+            (name, name == "accept"),
+            ("accept", True),
+        ]
+
+
+@pytest.mark.parametrize("name", ["implausible", "contradicted"])
+def test_no_key_sends_a_result_that_must_not_be_used(snapshot: Maker, name: VerdictName) -> None:
+    view = Wizard().view(judged(snapshot, "accept", name, State.SOLVED))
+    assert view.sentence.startswith("Do not use this result.")
+    assert not view.main.is_enabled
+    assert actions(view) == [Action.REDO, Action.APPLY]
+    assert all(offer.discards for offer in view.others)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "sentence", "label"),
+    [
+        ("keep", "keep", "Keep the offline calibration of both eyes.", "Keep offline"),
+        (
+            "keep",
+            "accept",
+            "Send the projections to the headset, those of the left eye offline.",
+            "Send to the headset",
+        ),
+    ],
+)
+def test_solve_says_which_offline_calibration_is_kept(
+    snapshot: Maker, left: VerdictName, right: VerdictName, sentence: str, label: str
+) -> None:
+    view = Wizard().view(judged(snapshot, left, right, State.SOLVED))
+    assert (view.sentence, view.main.label) == (sentence, label)
+    assert view.main.is_enabled
+
+
+def test_verify_points_at_the_advice_while_an_eye_is_not_accepted(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    repeat = wizard.view(judged(snapshot, "repeat", "accept", State.APPLIED))
+    assert "Not accepted yet" in repeat.sentence
+    accepted = wizard.view(judged(snapshot, "accept", "accept", State.APPLIED))
+    assert "Not accepted yet" not in accepted.sentence
 
 
 def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> None:

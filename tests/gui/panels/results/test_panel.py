@@ -84,7 +84,13 @@ def test_the_numbers_are_the_results(solved: ResultsPanel, results: Results) -> 
 
 @pytest.mark.parametrize(
     ("name", "word"),
-    [("accept", "✓ Accept"), ("repeat", "↻ Repeat"), ("implausible", "✕ Implausible")],
+    [
+        ("accept", "✓ Accept"),
+        ("repeat", "↻ Repeat"),
+        ("keep", "↩ Keep offline"),
+        ("implausible", "✕ Implausible"),
+        ("contradicted", "✕ Contradicted"),
+    ],
 )
 def test_a_verdict_is_a_sign_a_word_and_a_reason(qtbot: QtBot, name: str, word: str) -> None:
     card = VerdictCard("left")

@@ -139,6 +139,8 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
     assert text(panel, "refusals") == "No confirmation refused."
     panel.show_snapshot(snapshot(procedure={"refused": 2, "refusal": "Your hand is turned."}))
     assert text(panel, "refusals") == "Refused: 2. Your hand is turned."
+    panel.show_snapshot(snapshot(procedure={"refusal": "The headset draws something else."}))
+    assert text(panel, "refusals") == "Refused. The headset draws something else."
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:
