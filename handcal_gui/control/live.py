@@ -216,9 +216,7 @@ class CalibrationController(QObject):
             return
         self._shown = shown
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
-            self._comparison.use(
-                snapshot.record.alignments, snapshot.record.rig, self._solve_settings
-            )
+            self._comparison.use(snapshot.record, self._solve_settings)
         self._snapshot = snapshot
         panels = self._window.panels
         # Even while hidden: they may be used before the next snapshot.

@@ -38,7 +38,10 @@ def left(simulated: Callable[..., Alignment]) -> Alignment:
 def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None:
     results = solve_session([left, both], RIG, SolveSettings())
     data = json.loads(json.dumps(results_json(results), allow_nan=False))
-    assert set(data) == {"version", "method", "eyes", "eye_distance_m", "alignments", "observed"}
+    assert set(data) == {
+        "version", "method", "eyes", "eye_distance_m", "measured_eye_distance", "alignments",
+        "observed",
+    }  # fmt: skip
     assert (data["version"], data["method"]) == (2, "consistent")
     assert list(data["eyes"]) == list(EYES)
     solved = {
