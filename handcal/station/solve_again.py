@@ -129,7 +129,7 @@ def solve_again(
             record.rig,
             settings,
             progress,
-            eye_distance or record.facts.eye_distance,
+            eye_distance=eye_distance or record.facts.eye_distance,
             contradictions=record.facts.contradictions,
         )
     except ValueError as error:

@@ -55,8 +55,9 @@ class Comparison(QObject):
 
         def work(progress: Progress) -> object:
             assert record is not None
+            measured = record.facts.eye_distance
             return solve_session(
-                record.alignments, record.rig, settings, progress, record.facts.eye_distance
+                record.alignments, record.rig, settings, progress, eye_distance=measured
             )
 
         self._job = Job(work)

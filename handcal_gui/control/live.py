@@ -197,6 +197,11 @@ class CalibrationController(QObject):
                 )
             )
         session.notes_changed.connect(self._save_notes)
+        session.eye_distance_changed.connect(
+            lambda typed: self._calibrate(
+                "set the eye distance", lambda c: c.set_eye_distance(typed)
+            )
+        )
 
     def _submit(self, name: str, command: Command) -> int:
         return self._engine.submit(name, command) if self._engine is not None else 0
