@@ -84,7 +84,7 @@ def run_demo(
     """
     worn_rig = read_rig(Path(settings.worn_rig or rig_path))
     measured = (
-        None if settings.eye_distance == "none" else _measure_eye_distance(settings.seed, worn_rig)
+        None if settings.eye_distance == "none" else measure_eye_distance(settings.seed, worn_rig)
     )
     station_settings = StationSettings(
         rig=str(rig_path),
@@ -179,7 +179,7 @@ def _true_eye_distance_m(seed: int, worn_rig: Rig) -> float:
     return float(np.linalg.norm(right_m - left_m))
 
 
-def _measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
+def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
     """Return the wearer's eye distance as measured with an error drawn from the seed.
 
     Raises HandcalError if the worn rig's is not a person's.
