@@ -25,12 +25,13 @@ if TYPE_CHECKING:
     from handcal.rig.rig_file import read_rig, write_rig
     from handcal.session.session import open_session
     from handcal.station.solve_again import solve
-    from handcal.types import Alignment, EyeShift, Frame, HandCloud, Rig
+    from handcal.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud, Rig
 
     __version__: str
 
 __all__ = [
     "Alignment",
+    "EyeDistance",
     "EyeShift",
     "Frame",
     "HandCloud",
@@ -68,7 +69,7 @@ _HOMES = {
     "rig.rig_file": ("read_rig", "write_rig"),
     "session.session": ("open_session",),
     "station.solve_again": ("solve",),
-    "types": ("Alignment", "EyeShift", "Frame", "HandCloud", "Rig"),
+    "types": ("Alignment", "EyeDistance", "EyeShift", "Frame", "HandCloud", "Rig"),
 }
 _HOME_OF = {name: f"handcal.{home}" for home, names in _HOMES.items() for name in names}
 

@@ -34,6 +34,9 @@ METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open
 """The last needs the extra ``3d``; studies leave it out unless it is requested."""
 VerdictName: TypeAlias = Literal["accept", "repeat", "keep", "implausible", "contradicted"]
 
+EYE_DISTANCES_M = 0.045, 0.085
+"""Eye distances of adults, with room to spare (Gordon et al. 2014, ANSUR II: 52 to 78 mm)."""
+
 _FEW = 6  # items that `brief` shows
 
 
@@ -168,6 +171,35 @@ class HeadsetIdentity:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "views", MappingProxyType(dict(self.views)))
+
+
+@dataclass(frozen=True, slots=True)
+class EyeDistance:
+    """A measured distance between the wearer's pupils.
+
+    Raises
+    ------
+    ValueError
+        If the value is not in `EYE_DISTANCES_M`, or the standard deviation is not from 0 to 20 mm.
+    """
+
+    value_m: float
+    sigma_m: float = 0.001
+    """Standard deviation: 1 mm for a ruler or a pupillometer."""
+    source: Literal["typed", "headset"] = "typed"
+
+    def __post_init__(self) -> None:
+        low_m, high_m = EYE_DISTANCES_M
+        if not low_m <= self.value_m <= high_m:
+            raise ValueError(
+                f"an eye distance of {1e3 * self.value_m:.1f} mm is not one of a person; "
+                f"enter {1e3 * low_m:.0f} to {1e3 * high_m:.0f} mm"
+            )
+        if not 0.0 < self.sigma_m <= 0.02:
+            raise ValueError("the eye distance's standard deviation must be from 0 to 20 mm")
+
+    def __str__(self) -> str:
+        return f"{1e3 * self.value_m:.1f} ± {1e3 * self.sigma_m:.1f} mm"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

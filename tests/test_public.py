@@ -41,7 +41,8 @@ U = handcal.to_unity(rig, results)
 PUBLIC = {
     "open_session", "solve", "projections", "read_cloud", "read_frame", "segment", "read_rig",
     "write_rig",
-    "HandcalError", "HandError", "Frame", "HandCloud", "Alignment", "EyeShift", "Rig", "Results",
+    "HandcalError", "HandError", "Frame", "HandCloud", "Alignment", "EyeDistance", "EyeShift",
+    "Rig", "Results",
     "to_unity", "to_opengl", "to_openxr", "__version__",
     "solve_eye_shift", "update_matrix", "rotation_between",
 }  # fmt: skip

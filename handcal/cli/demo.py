@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,17 +19,21 @@ from handcal.display import reprojection_arcmin
 from handcal.errors import HandcalError
 from handcal.link.server import LinkStatistics
 from handcal.progress import Progress
+from handcal.register.fuse import eye_position_m
 from handcal.register.solve import solve_alignment
+from handcal.rig.rig_file import read_rig
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
 from handcal.station.procedure import Calibration, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
-from handcal.types import EYES, Eye, Rig
+from handcal.types import EYES, Eye, EyeDistance, Float64, Rig
 
 _DELIVERY_S = 5.0
 _PATIENCE_S = 60.0
+_RULER_SIGMA_M = 0.001
+_RULER = 1  # its random numbers are not the wearer's
 _PATIENCE_STEPS = 300
 """Minimum number of station steps before giving up, so that a slow computer gets more time."""
 
@@ -50,6 +54,8 @@ class DemoSettings:
     """Path of the rig that the wearer really looks through; empty: the rig of the calibration."""
     fault: Fault = ""
     """Fault of the camera or the headset; empty: none."""
+    eye_distance: Literal["none", "ruler", "headset"] = "none"
+    """Measurement of the wearer's eye distance, with 1 mm of error: typed, or by the headset."""
 
 
 def run_demo(
@@ -76,6 +82,10 @@ def run_demo(
     HandcalError
         If the headset does not answer, the wearer does not finish a step, or the disk is full.
     """
+    worn_rig = read_rig(Path(settings.worn_rig or rig_path))
+    measured = (
+        None if settings.eye_distance == "none" else measure_eye_distance(settings.seed, worn_rig)
+    )
     station_settings = StationSettings(
         rig=str(rig_path),
         worn_rig=settings.worn_rig,
@@ -83,9 +93,14 @@ def run_demo(
         loss=settings.loss,
         reorder=settings.reorder,
         fault=settings.fault,
+        eye_distance_m=(
+            measured.value_m if measured and settings.eye_distance == "headset" else None
+        ),
         sessions=str(output),
     )
     with Station(station_settings, "Simulated wearer") as station:
+        if settings.eye_distance == "ruler":
+            station.calibration.set_eye_distance(measured)
         progress.at(0.0, "Connecting to the virtual headset")
         try:
             observations = _follow_plan(station, settings, progress)
@@ -153,6 +168,31 @@ def _contradicted(
     }
 
 
+def _draw_eyes(seed: int) -> dict[Eye, Float64]:
+    """Draw the wearer's φ as the virtual headset does."""
+    return draw_eyes(np.random.default_rng(seed), WearerSettings())
+
+
+def _true_eye_distance_m(seed: int, worn_rig: Rig) -> float:
+    left_m, right_m = (
+        eye_position_m(worn_rig.eyes[eye], shift_m) for eye, shift_m in _draw_eyes(seed).items()
+    )
+    return float(np.linalg.norm(right_m - left_m))
+
+
+def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
+    """Return the wearer's eye distance as measured with an error drawn from the seed.
+
+    Raises HandcalError if the worn rig's is not a person's.
+    """
+    error = np.random.default_rng([seed, _RULER]).normal()
+    true_m = _true_eye_distance_m(seed, worn_rig)
+    try:
+        return EyeDistance(true_m + error * _RULER_SIGMA_M)
+    except ValueError as problem:
+        raise HandcalError(f"the worn rig is not of a person: {problem}") from problem
+
+
 def _delivered(station: Station) -> LinkStatistics:
     """Return the link's counters once every message is acknowledged, or after a while."""
     deadline_s = time.monotonic() + _DELIVERY_S
@@ -209,7 +249,8 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
     """Compare the result with the wearer's true eyes."""
     assert calibration.results is not None
     results, rig, worn_rig = calibration.results, station.rig, station.worn_rig
-    eyes_m = draw_eyes(np.random.default_rng(settings.seed), WearerSettings())
+    eyes_m = _draw_eyes(settings.seed)
+    measured = results.measured_eye_distance
     # Relative to the rig's C0, which differs from the true one.
     truth_m = {
         eye: shift_m + rig.eyes[eye].t_C0_V_m - worn_rig.eyes[eye].t_C0_V_m
@@ -229,6 +270,10 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
                 "evidence": [one.name for one in calibration.evidence.contradictions],
             }
             for eye, shift in results.eyes.items()
+        },
+        "eye_distance": {
+            "true_m": _true_eye_distance_m(settings.seed, worn_rig),
+            "used": None if measured is None else asdict(measured),
         },
         "reprojection_arcmin": {
             "before": reprojection_arcmin(rig, nothing_m, eyes_m, worn_rig),

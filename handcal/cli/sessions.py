@@ -19,6 +19,19 @@ _METRES = number(float, 1e-3, 1e6)
 @command(
     arg("session", type=Path, help="session folder"),
     arg("--method", choices=METHODS, help="solver (default: the session's own)"),
+    arg(
+        "--eye-distance-mm",
+        type=number(float, 45.0, 85.0),
+        metavar="MM",
+        help="the wearer's eye distance (default: the session's own)",
+    ),
+    arg(
+        "--eye-distance-sigma-mm",
+        type=number(float, 0.01, 20.0),
+        metavar="MM",
+        default=1.0,
+        help="its standard deviation",
+    ),
     json=True,
 )
 def solve(arguments: argparse.Namespace) -> None:
@@ -28,10 +41,16 @@ def solve(arguments: argparse.Namespace) -> None:
     from handcal.register.results import results_json
     from handcal.session.session import Session
     from handcal.station import solve_again
+    from handcal.types import EyeDistance
 
+    eye_distance = None
+    if arguments.eye_distance_mm is not None:
+        eye_distance = EyeDistance(
+            arguments.eye_distance_mm / 1e3, arguments.eye_distance_sigma_mm / 1e3
+        )
     record = Session.open(arguments.session)
     _say_what_is_left_out(record)
-    results = solve_again.solve(record, method=arguments.method)
+    results = solve_again.solve(record, method=arguments.method, eye_distance=eye_distance)
     save(arguments.json, results_json(results))
     shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.eyes.items():
@@ -48,6 +67,8 @@ def solve(arguments: argparse.Namespace) -> None:
         console.print(f"{eye}: {verdict.name}: {verdict.reason}")
     if results.eye_distance_m is not None:
         console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
+    if measured := results.measured_eye_distance:
+        console.print(f"Eye distance measured: {measured} ({measured.source})")
 
 
 @command(

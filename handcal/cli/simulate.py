@@ -65,11 +65,19 @@ _LINK = (
         choices=FAULTS,
         help="a fault that must not be accepted; depth-bias is seen if the rig has a depth check",
     ),
+    arg(
+        "--eye-distance",
+        choices=("none", "ruler", "headset"),
+        default="none",
+        help="the wearer's eye distance, measured with 1 mm of error: by a ruler and typed, or by "
+        "the headset",
+    ),
     json=True,
 )
 def demo(arguments: argparse.Namespace) -> None:
     """Calibrate a simulated wearer from start to end, and compare with the truth."""
     from handcal.cli.demo import DemoSettings, run_demo
+    from handcal.types import EyeDistance
 
     settings = DemoSettings(
         seed=arguments.seed,
@@ -79,6 +87,7 @@ def demo(arguments: argparse.Namespace) -> None:
         reorder=arguments.reorder,
         worn_rig=str(arguments.worn_rig or ""),
         fault=arguments.fault or "",
+        eye_distance=arguments.eye_distance,
     )
     with show_progress() as progress:
         rig = _rig_path(arguments.rig)
@@ -93,6 +102,8 @@ def demo(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
     for eye, found in result["eyes"].items():
         console.print(f"{eye}: {found['verdict']}: {found['reason']}")
+    if used := result["eye_distance"]["used"]:
+        console.print(f"Eye distance measured: {EyeDistance(**used)} ({used['source']})")
     error, guard = result["reprojection_arcmin"], result["guard"]
     console.print(
         f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after\n"
@@ -163,6 +174,12 @@ def _say_contradictions(result: dict[str, Any]) -> None:
         help="fault: keep drawing with the projections of the wearer before",
     ),
     arg(
+        "--eye-distance-mm",
+        type=number(float, 45.0, 85.0),
+        metavar="MM",
+        help="the wearer's eye distance, as the headset reports it (default: not measured)",
+    ),
+    arg(
         "--as-device",
         action="store_true",
         help="no simulated wearer: print what is shown, confirm on Enter",
@@ -191,6 +208,7 @@ def headset(arguments: argparse.Namespace) -> None:
         clock_offset_s=arguments.clock_offset_ms / 1e3,
         duration_s=arguments.duration_s,
         is_stale=arguments.stale,
+        eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
         has_wearer=not arguments.as_device,
     )
     run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())

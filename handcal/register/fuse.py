@@ -27,7 +27,17 @@ from handcal.display import eye_projection
 from handcal.geometry import invert, project, transform
 from handcal.register.prior import EyePrior, Observed, PriorSettings, eye_prior, posterior
 from handcal.register.surface import describe_surface
-from handcal.types import EYES, Alignment, Bool, Eye, EyeDisplay, EyeShift, Float64, Rig
+from handcal.types import (
+    EYES,
+    Alignment,
+    Bool,
+    Eye,
+    EyeDisplay,
+    EyeDistance,
+    EyeShift,
+    Float64,
+    Rig,
+)
 
 # The cursor's outline is found in this many of its points.
 _OUTLINE_FROM_POINTS = 1500
@@ -35,8 +45,6 @@ _OUTLINE_FROM_POINTS = 1500
 _NORMAL_FLOOR = 1e-3
 # Of a single solved eye: the eye box is about 2 cm wide (paper).
 _WIDE_EYE_BOX_M = 0.010
-# Of adults, with room to spare (ANSUR II: 52 to 78 mm).
-_EYE_DISTANCES_M = 0.045, 0.085
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,26 +67,6 @@ class FuseSettings:
             raise ValueError("wearer_scales and wearer_weights must have the same length")
         if min(self.wearer_scales) <= 0.0 or min(self.wearer_weights) <= 0.0:
             raise ValueError("wearer_scales and wearer_weights must be positive")
-
-
-@dataclass(frozen=True, slots=True)
-class EyeDistance:
-    """A measured distance between the wearer's pupils."""
-
-    value_m: float
-    sigma_m: float = 0.001
-    """Standard deviation: 1 mm for a ruler or a pupillometer."""
-    source: str = "typed"
-    """``"typed"`` or ``"headset"``."""
-
-    def __post_init__(self) -> None:
-        if not (_EYE_DISTANCES_M[0] <= self.value_m <= _EYE_DISTANCES_M[1]):
-            raise ValueError(
-                f"an eye distance of {1e3 * self.value_m:.1f} mm is not one of a person; "
-                f"enter {1e3 * _EYE_DISTANCES_M[0]:.0f} to {1e3 * _EYE_DISTANCES_M[1]:.0f} mm"
-            )
-        if not 0.0 < self.sigma_m <= 0.02:
-            raise ValueError("the eye distance's standard deviation must be from 0 to 20 mm")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from handcal.progress import Progress
 from handcal.register.benefit import Benefit, expected_arcmin
-from handcal.register.fuse import EyeDistance, Fused, FuseSettings, eye_slice, fuse_alignments
+from handcal.register.fuse import Fused, FuseSettings, eye_slice, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
     Advice,
@@ -23,6 +23,7 @@ from handcal.register.verdict import (
 from handcal.types import (
     Alignment,
     Eye,
+    EyeDistance,
     EyeShift,
     Float64,
     Method,
@@ -58,6 +59,8 @@ class Results:
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
     """Eye distance implied by `eyes`; None unless both eyes are solved."""
+    measured_eye_distance: EyeDistance | None
+    """The wearer's, as used; None if it was not measured."""
     benefits: Mapping[Eye, Benefit]
     """Expected error of each eye without the calibration and with it."""
     advice: Mapping[Eye, Advice]
@@ -149,6 +152,7 @@ def solve_session(
         eyes=fused.shifts,
         verdicts=verdicts,
         eye_distance_m=eye_distance_m(rig, fused.shifts),
+        measured_eye_distance=eye_distance,
         benefits={eye: eye_benefit(rig, fused, eye) for eye in fused.shifts},
         advice={eye: advice[eye] for eye in advice if verdicts[eye].name == "repeat"},
         expected_after_another_arcmin={
@@ -163,6 +167,7 @@ def solve_session(
 
 def results_json(results: Results) -> dict[str, Any]:
     """Return results as JSON-able values, metres, without rounding."""
+    measured = results.measured_eye_distance
     return {
         "version": RESULTS_VERSION,
         "method": results.method,
@@ -174,6 +179,7 @@ def results_json(results: Results) -> dict[str, Any]:
             for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
+        "measured_eye_distance": None if measured is None else asdict(measured),
         "observed": [
             dict(
                 zip(

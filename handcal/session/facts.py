@@ -11,7 +11,7 @@ import numpy as np
 
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
-from handcal.types import CameraIdentity, Eye, EyePlan, HeadsetIdentity, Intrinsics
+from handcal.types import CameraIdentity, Eye, EyeDistance, EyePlan, HeadsetIdentity, Intrinsics
 
 Facts = TypeVar("Facts")
 
@@ -30,21 +30,6 @@ class CameraUsed:
         sizes = one.width, one.height, one.fx, one.fy, self.depth_scale_m
         if not all(0 < size < np.inf for size in sizes):
             raise ValueError("the camera's size, focal lengths and depth scale must be positive")
-
-
-@dataclass(frozen=True, slots=True)
-class EyeDistance:
-    """The wearer's eye distance; ValueError unless it and σ are positive."""
-
-    distance_m: float
-    sigma_m: float
-    """One standard deviation."""
-    source: str
-    """Origin of the value, such as ``ruler`` or ``headset``."""
-
-    def __post_init__(self) -> None:
-        if self.distance_m <= 0.0 or self.sigma_m <= 0.0:
-            raise ValueError("the eye distance and its σ must be positive")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +72,7 @@ class SessionFacts:
     plan: EyePlan | None = None
     """The order in which the eyes were aligned."""
     eye_distance: EyeDistance | None = None
+    """Measured; the results were solved with it."""
     verified: Mapping[Eye, Verification] = field(default_factory=dict)
     """Newest verification of each eye."""
     evidence: tuple[str, ...] = ()

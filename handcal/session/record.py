@@ -52,7 +52,8 @@ class SessionRecord:
     deleted_trials: Mapping[int, Trial]
     """Trials of the user test, likewise."""
     results: dict[str, Any] | None
-    """The newest results; None if none were saved since an alignment was deleted or restored."""
+    """The newest results; None if none were saved since an alignment was deleted or restored, or
+    the eye distance was changed."""
     is_solved: bool
     """True if the results are those of all `alignments`."""
     is_applied: bool

@@ -281,6 +281,8 @@ class Session(Closable):
     def save_facts(self, **facts: Any) -> None:
         """Record facts by their names in `SessionFacts`; each replaces an earlier one.
 
+        Results go if the eye distance changes.
+
         Raises
         ------
         FileError
@@ -291,6 +293,7 @@ class Session(Closable):
         data = facts_json(facts)
         with_facts(SessionFacts(), data)
         self._append(SessionEvent.FACTS_SAVED, data)
+        self._remove_old_results()
 
     def finish(self) -> None:
         """Record the end of the session; FileError if the journal cannot be written.
@@ -316,7 +319,10 @@ class Session(Closable):
 
     def _change(self, kind: Kind, what: Literal["deleted", "restored"], number: int) -> None:
         self._append(SessionEvent(f"{kind}_{what}"), {"number": number})
-        if kind == "alignment":  # the results are those of other alignments
+        self._remove_old_results()
+
+    def _remove_old_results(self) -> None:
+        if self._state.results is None:
             with suppress(OSError):  # the journal says so already
                 (self.path / "results.json").unlink(missing_ok=True)
 

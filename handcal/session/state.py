@@ -201,7 +201,10 @@ class SessionState:
             case SessionEvent.NOTES_SAVED:
                 self.notes_sha256 = data["sha256"], data["before_sha256"]
             case SessionEvent.FACTS_SAVED:
-                self.facts = with_facts(self.facts, data)
+                before, self.facts = self.facts, with_facts(self.facts, data)
+                if self.facts.eye_distance != before.eye_distance:
+                    self.is_solved = self.is_applied = False
+                    self._set_results(None)
             case SessionEvent.ALIGNMENT_SAVED:
                 facts = read_facts(AlignmentFacts, data.get("facts", {}))
                 self.alignments.save(_number(data), data["sha256"])

@@ -67,6 +67,8 @@ class HeadsetSettings:
     name: str = "Virtual headset"
     is_stale: bool = False
     """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
+    eye_distance_m: float | None = None
+    """Eye distance that it reports; None: it measures none."""
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
 
@@ -192,6 +194,7 @@ def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> Headse
         app=f"handcal {version('handcal')}",
         protocol=VERSION,
         views={eye: _runtime_view(rig.eyes[eye]) for eye in EYES},
+        eye_distance_m=settings.eye_distance_m,
     )
 
 

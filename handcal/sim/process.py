@@ -39,6 +39,8 @@ class VirtualHeadset(Closable):
         Share of the datagrams lost, and reordered, in each direction.
     is_stale : bool
         Fault: it keeps drawing with the projections of the wearer before.
+    eye_distance_m : float or None
+        Eye distance that it reports; None: it measures none.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class VirtualHeadset(Closable):
         loss: float = 0.0,
         reorder: float = 0.0,
         is_stale: bool = False,
+        eye_distance_m: float | None = None,
     ) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
         options = {
@@ -67,6 +70,8 @@ class VirtualHeadset(Closable):
         command = [*program_command(), "headset"]
         command += [str(part) for option in options.items() for part in option]
         command += ["--stale"] if is_stale else []
+        if eye_distance_m is not None:
+            command += ["--eye-distance-mm", str(1e3 * eye_distance_m)]
         self._process = subprocess.Popen(  # noqa: S603 (our own program)
             command, env=os.environ | {KEY_VARIABLE: pairing_key}, stderr=self._errors
         )

@@ -9,9 +9,10 @@
         |                                                           |   v
         '--make_cursor-- APPLIED <--acknowledged-- APPLYING <--apply-- SOLVED
 
-Alignments can be deleted, restored and solved again between these steps; φ can be set by hand while
-no cursor is shown. The procedure only combines the other packages. One thread drives it: `step` for
-every frame, all other calls in between.
+Between these steps alignments can be deleted and restored, the wearer's eye distance can be set,
+and all can be solved again; φ can be set by hand while no cursor is shown. The procedure only
+combines the other packages. One thread drives it: `step` for every frame, all other calls in
+between.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
@@ -49,6 +51,7 @@ from handcal.types import (
     Alignment,
     CameraIdentity,
     Eye,
+    EyeDistance,
     Float64,
     Frame,
     HandCloud,
@@ -157,7 +160,10 @@ class Calibration:
     eyes : tuple of eye
         Eyes open in the present alignment.
     results : Results or None
-        Of all alignments; None before `solve` and after an alignment was deleted or restored.
+        Of all alignments; None before `solve`, after an alignment was deleted or restored, and
+        after the eye distance was changed.
+    eye_distance : EyeDistance or None
+        The wearer's, if it was measured.
     refused : int
         Number of confirmations refused by the guard.
     camera : CameraIdentity
@@ -181,6 +187,7 @@ class Calibration:
         self.state = State.SHOW_HAND
         self.eyes: tuple[Eye, ...] = EYES
         self.results: Results | None = None
+        self.eye_distance = None if resume is None else resume.facts.eye_distance
         self.refused = 0
         self.refusal = ""
         self.camera = CameraIdentity()
@@ -381,7 +388,7 @@ class Calibration:
         FileError
             If the session cannot be written; the alignment is deleted anyway.
         """
-        self._require_settled()
+        self._require_settled("alignments")
         self._items.delete(number)
         self._forget_results()
         self._store(lambda session: session.delete("alignment", number))
@@ -391,13 +398,33 @@ class Calibration:
 
         Raises as `delete_alignment`.
         """
-        self._require_settled()
+        self._require_settled("alignments")
         self._items.restore(number)
         self._forget_results()
         self._store(lambda session: session.restore("alignment", number))
 
+    def set_eye_distance(self, eye_distance: EyeDistance | None) -> None:
+        """Set the wearer's eye distance, None if it is not measured; the results are discarded.
+
+        Raises
+        ------
+        ProcedureError
+            While a cursor is being aligned or projections are being applied.
+        FileError
+            If the session cannot be written; the eye distance is used anyway.
+        """
+        if eye_distance == self.eye_distance:
+            return
+        self._require_settled("the eye distance")
+        self.eye_distance = eye_distance
+        if self.alignments:
+            self._forget_results()
+        self._store(lambda session: session.save_facts(eye_distance=eye_distance))
+
     def solve(self) -> Results:
         """Solve all alignments so far.
+
+        The eye distance that the headset measures is used if none was typed.
 
         Raises
         ------
@@ -410,6 +437,7 @@ class Calibration:
             raise ProcedureError("wait until the projections are applied")
         if not self.alignments or self.state is State.ALIGN:
             raise ProcedureError("align the hand with the cursor first")
+        self._take_headsets_eye_distance()
         results = self._solve()
         self.state = State.SOLVED
         self._store(lambda session: session.save_results(results_json(results)))
@@ -536,6 +564,7 @@ class Calibration:
             self.alignments,
             self.rig,
             self._settings.solve,
+            eye_distance=self.eye_distance,
             contradictions=[one.text for one in found],
         )
         if found:
@@ -543,9 +572,22 @@ class Calibration:
             self._store(lambda session: session.save_facts(evidence=names, contradictions=texts))
         return self.results
 
-    def _require_settled(self) -> None:
+    def _take_headsets_eye_distance(self) -> None:
+        """Use the headset's newest eye distance unless one was typed."""
+        device = self._link.device
+        is_typed = self.eye_distance is not None and self.eye_distance.source == "typed"
+        if is_typed or device is None or device.eye_distance_m is None:
+            return
+        with suppress(ValueError):  # no person's
+            told = EyeDistance(device.eye_distance_m, source="headset")
+            if told != self.eye_distance:
+                self.eye_distance = told
+                # Written with the results, which it must not prevent.
+                self._unstored.append(lambda session: session.save_facts(eye_distance=told))
+
+    def _require_settled(self, what: str) -> None:
         if self.state in (State.ALIGN, State.APPLYING):
-            raise ProcedureError(f"alignments cannot be changed now ({self.state})")
+            raise ProcedureError(f"{what} cannot be changed now ({self.state})")
 
     def _forget_results(self) -> None:
         self.results = None

@@ -46,6 +46,8 @@ class StationSettings:
     """Share of the virtual headset's datagrams lost, and reordered, in each direction."""
     fault: Fault = ""
     """Fault of the simulated camera or the virtual headset; empty: none."""
+    eye_distance_m: float | None = None
+    """Eye distance that the virtual headset reports; None: it measures none."""
     sessions: str = "sessions"
     """Folder in which sessions are created."""
     learn_prior: bool = True

@@ -12,10 +12,15 @@ from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import CalibrationSettings
-from handcal.types import METHODS, Method
+from handcal.types import METHODS, EyeDistance, Method
 
 
-def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
+def solve(
+    session: SessionRecord,
+    *,
+    method: Method | None = None,
+    eye_distance: EyeDistance | None = None,
+) -> Results:
     """Solve a stored session's alignments, fuse them and judge the result.
 
     Parameters
@@ -27,6 +32,8 @@ def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
         published. ``linear``: its model with all three rows of each pair. ``consistent``: exact
         factor, and robust to cuts, sampling and a turned hand. ``icp``: rigid, the paper's
         baseline. Its other settings are the session's own.
+    eye_distance : EyeDistance, optional
+        The wearer's, in place of the one measured in the session, if any.
 
     Returns
     -------
@@ -59,7 +66,7 @@ def solve(session: SessionRecord, *, method: Method | None = None) -> Results:
     settings = stored_solve_settings(session)
     if method is not None:
         settings = replace(settings, method=method)
-    results = solve_again(session, settings)
+    results = solve_again(session, settings, eye_distance=eye_distance)
     if results is None:
         raise FileError(f"{session.path} holds no alignment to solve")
     return results
@@ -91,7 +98,10 @@ def _upgraded(calibration: Any) -> Any:
 
 
 def solve_again(
-    record: SessionRecord, settings: SolveSettings, progress: Progress = Progress()
+    record: SessionRecord,
+    settings: SolveSettings,
+    progress: Progress = Progress(),
+    eye_distance: EyeDistance | None = None,
 ) -> Results | None:
     """Return the results of a session's alignments; None if there are none.
 
@@ -101,6 +111,8 @@ def solve_again(
     settings : SolveSettings
     progress : Progress
         As in `solve_session`.
+    eye_distance : EyeDistance, optional
+        The wearer's, in place of the session's own.
 
     Raises
     ------
@@ -117,6 +129,7 @@ def solve_again(
             record.rig,
             settings,
             progress,
+            eye_distance=eye_distance or record.facts.eye_distance,
             contradictions=record.facts.contradictions,
         )
     except ValueError as error:

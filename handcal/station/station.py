@@ -297,6 +297,7 @@ class Station(Closable):
             loss=self.settings.loss,
             reorder=self.settings.reorder,
             is_stale=self.settings.fault == "stale-headset",
+            eye_distance_m=self.settings.eye_distance_m,
         )
 
     def _open_camera(self) -> Camera:

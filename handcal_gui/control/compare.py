@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from PySide6.QtCore import QObject
 
 from handcal.progress import Progress
 from handcal.register.results import SolveSettings, solve_session
-from handcal.types import Alignment, Method, Rig
+from handcal.session.session import SessionRecord
+from handcal.types import Method
 from handcal_gui.engine.jobs import Job
 from handcal_gui.panels.results.panel import ResultsPanel
 
@@ -25,16 +25,15 @@ class Comparison(QObject):
     def __init__(self, panel: ResultsPanel) -> None:
         super().__init__(panel)
         self._panel = panel
-        self._alignments: Mapping[int, Alignment] = {}
-        self._rig: Rig | None = None
+        self._record: SessionRecord | None = None
         self._settings = SolveSettings()
         self._job: Job | None = None
         panel.compare_requested.connect(self._start)
         panel.compare_cancelled.connect(self._request_cancel)
 
-    def use(self, alignments: Mapping[int, Alignment], rig: Rig, settings: SolveSettings) -> None:
-        """Set the alignments to compare with."""
-        self._alignments, self._rig, self._settings = alignments, rig, settings
+    def use(self, record: SessionRecord, settings: SolveSettings) -> None:
+        """Set the session to compare with."""
+        self._record, self._settings = record, settings
 
     def cancel(self) -> None:
         """Cancel the comparison, and wait for its end; nothing is shown."""
@@ -51,12 +50,15 @@ class Comparison(QObject):
 
     def _start(self, method: Method) -> None:
         self.cancel()
-        alignments, rig = self._alignments, self._rig
+        record = self._record
         settings = replace(self._settings, method=method)
 
         def work(progress: Progress) -> object:
-            assert rig is not None
-            return solve_session(alignments, rig, settings, progress)
+            assert record is not None
+            measured = record.facts.eye_distance
+            return solve_session(
+                record.alignments, record.rig, settings, progress, eye_distance=measured
+            )
 
         self._job = Job(work)
         self._job.succeeded.connect(self._panel.show_comparison)

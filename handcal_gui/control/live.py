@@ -197,6 +197,11 @@ class CalibrationController(QObject):
                 )
             )
         session.notes_changed.connect(self._save_notes)
+        session.eye_distance_changed.connect(
+            lambda typed: self._calibrate(
+                "set the eye distance", lambda c: c.set_eye_distance(typed)
+            )
+        )
 
     def _submit(self, name: str, command: Command) -> int:
         return self._engine.submit(name, command) if self._engine is not None else 0
@@ -216,9 +221,7 @@ class CalibrationController(QObject):
             return
         self._shown = shown
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
-            self._comparison.use(
-                snapshot.record.alignments, snapshot.record.rig, self._solve_settings
-            )
+            self._comparison.use(snapshot.record, self._solve_settings)
         self._snapshot = snapshot
         panels = self._window.panels
         # Even while hidden: they may be used before the next snapshot.

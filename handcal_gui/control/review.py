@@ -116,6 +116,6 @@ class ReviewController(QObject):
             number, last = list(record.alignments.items())[-1]
             residuals_m = stored.results.alignments[number][last.eyes[0]].residuals_m
             panels.cloud.show_alignment(last, residuals_m)
-            self._comparison.use(record.alignments, record.rig, stored.settings)
+            self._comparison.use(record, stored.settings)
         self._window.show_page("review")
         self.opened.emit(record.path)

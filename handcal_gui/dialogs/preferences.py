@@ -5,16 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QWidget
 
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import choice
+from handcal_gui.widgets.fields import choice, number, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
+
+_TARGET_HELP = "Largest expected error of a calibration that is accepted, in arcminutes."
+_LEARN_HELP = (
+    "Learn where wearers' eyes are from the finished sessions in this folder with the same rig,\n"
+    "once there are enough."
+)
 
 
 class PreferencesDialog(QDialog):
@@ -38,6 +44,14 @@ class PreferencesDialog(QDialog):
         self._sessions.setMinimumWidth(45 * SPACING_PX)
         self._calibration = CalibrationFields()
         self._calibration.show_settings(preferences.station.calibration)
+        self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
+        self._target.setValue(preferences.station.calibration.solve.verdict.target_arcmin)
+        self._learn = with_name(
+            QCheckBox("Learn from earlier sessions"), "learnPrior", help_text=_LEARN_HELP
+        )
+        self._learn.setChecked(preferences.station.learn_prior)
+        self._calibration.add_row("Target", self._target)
+        self._calibration.add_row("Prior", self._learn)
         self._calibration.add_row("Theme", self._theme)
         self._calibration.add_row("Session folder", self._sessions)
         buttons = QDialogButtonBox(
@@ -52,12 +66,16 @@ class PreferencesDialog(QDialog):
     def preferences(self) -> Preferences:
         """Return the preferences with the values shown."""
         station = self._preferences.station
+        calibration = self._calibration.take(station.calibration)
+        solve = calibration.solve
+        verdict = replace(solve.verdict, target_arcmin=self._target.value())
         return replace(
             self._preferences,
             theme=self._theme.currentData(),
             station=replace(
                 station,
                 sessions=self._sessions.path or station.sessions,
-                calibration=self._calibration.take(station.calibration),
+                learn_prior=self._learn.isChecked(),
+                calibration=replace(calibration, solve=replace(solve, verdict=verdict)),
             ),
         )

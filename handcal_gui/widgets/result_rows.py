@@ -119,9 +119,15 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
     arcmin = results.expected_after_another_arcmin
     another = tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
     rows.insert(QUANTITIES.index(EXPECTED_ERROR) + 1, Row("With one more", another, _ANOTHER))
+    rows.append(Row(_EYE_DISTANCE, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
+    if measured := results.measured_eye_distance:
+        meaning = f"Used in the results; {measured.source}"
+        rows.append(Row("Eye distance measured", (str(measured),), meaning))
+    if sessions := results.fused.prior.sessions:
+        learned = f"learned from {sessions} sessions"
+        rows.append(Row("Prior", (learned,), "Where eyes are expected before any alignment"))
     return [
         *rows,
-        Row(_EYE_DISTANCE, (eye_distance_text(results),), _EYE_DISTANCE_MEANING),
         Row("Alignments", (str(len(results.alignments)),), "Fused into these results"),
         Row("Method", (results.method,), "The solver"),
     ]

@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handcal.cli.demo import measure_eye_distance
 from handcal.cli.main import main
 from handcal.display import reprojection_arcmin
 from handcal.geometry import rigid
+from handcal.register.fuse import eye_position_m
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer import WearerSettings, draw_eyes
-from handcal.types import EYES, Eye
+from handcal.types import EYES, Eye, EyeDistance
 from tests.helpers import write_small_rig
 
 SEED = 3
@@ -36,7 +38,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def run(folder: Path) -> subprocess.CompletedProcess[str]:
     write_small_rig(folder / "rig.yaml")
-    options = f"--rig rig.yaml --seed {SEED} --eyes each --loss 0.3 --reorder 0.2"
+    options = (
+        f"--rig rig.yaml --seed {SEED} --eyes each --loss 0.3 --reorder 0.2 --eye-distance headset"
+    )
     files = "--output runs --json new/it.json"
     return subprocess.run(
         [sys.executable, "-m", "handcal", "demo", *options.split(), *files.split()],
@@ -92,6 +96,32 @@ def test_the_result_is_as_good_as_it_says(result: dict[str, Any]) -> None:
     assert 0.0 <= result["guard"]["accepted_deg"] <= 9.0
 
 
+def test_the_headset_s_eye_distance_was_used(
+    run: subprocess.CompletedProcess[str], result: dict[str, Any], session: Path
+) -> None:
+    found = result["eye_distance"]
+    assert found["used"]["source"] == "headset"
+    # Given to the headset in millimetres.
+    assert found["used"]["value_m"] == pytest.approx(_measure(SEED).value_m)
+    assert EyeDistance(**found["used"]) == Session.open(session).facts.eye_distance
+    assert "mm (headset)" in run.stdout
+    errors_m = [_measure(seed).value_m - _true_m(seed) for seed in range(200)]
+    assert np.std(errors_m) == pytest.approx(0.001, rel=0.15)
+    assert np.mean(errors_m) == pytest.approx(0.0, abs=0.0003)
+
+
+def _measure(seed: int) -> EyeDistance:
+    return measure_eye_distance(seed, example_rig())
+
+
+def _true_m(seed: int) -> float:
+    left_m, right_m = (
+        eye_position_m(example_rig().eyes[eye], shift_m)
+        for eye, shift_m in draw_eyes(np.random.default_rng(seed), WearerSettings()).items()
+    )
+    return float(np.linalg.norm(right_m - left_m))
+
+
 def test_the_link_was_bad_and_everything_arrived(result: dict[str, Any], session: Path) -> None:
     assert result["link"]["lost"] > 0.15 * result["link"]["sent"]
     events = [(event.name, event.data) for event in Session.open(session).events]
@@ -126,6 +156,20 @@ def test_the_session_is_solved_again_to_the_last_bit(
     main()
     assert again.read_bytes() == (session / "results.json").read_bytes()
     assert {path: path.read_bytes() for path in session.rglob("*") if path.is_file()} == before
+
+
+def test_a_session_is_solved_with_another_eye_distance(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again = tmp_path / "again.json"
+    arguments = ["solve", str(session), "--eye-distance-mm", "70", "--eye-distance-sigma-mm", "0.5"]
+    monkeypatch.setattr(sys, "argv", ["handcal", *arguments, "--json", str(again)])
+    main()
+    found, before = (json.loads(path.read_text()) for path in (again, session / "results.json"))
+    assert found["measured_eye_distance"] == {
+        "value_m": 0.07, "sigma_m": 0.0005, "source": "typed",
+    }  # fmt: skip
+    assert abs(found["eye_distance_m"] - 0.07) < 0.5 * abs(before["eye_distance_m"] - 0.07)
 
 
 def test_a_torn_session_is_solved_with_another_method(

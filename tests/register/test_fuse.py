@@ -7,7 +7,6 @@ from handcal.display import projection_matrix, view_of_eye
 from handcal.geometry import invert, rigid, transform
 from handcal.lab.bench.trials import trial_hand
 from handcal.register.fuse import (
-    EyeDistance,
     Fused,
     FuseSettings,
     fuse_alignments,
@@ -19,7 +18,7 @@ from handcal.register.surface import describe_surface
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
 from handcal.sim.placement import overlay_hand, view_through
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
+from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64
 
 RIG = example_rig()
 SETTINGS = FuseSettings()

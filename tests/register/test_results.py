@@ -10,17 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.display import reprojection_arcmin
 from handcal.errors import CancelledError
 from handcal.io.files import write_json
 from handcal.io.settings import read_settings, settings_json
+from handcal.lab.study.wearers import align_hand, draw_wearer
 from handcal.progress import Progress
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.register.verdict import VerdictSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
+from handcal.sim.wearer import WearerSettings
 from handcal.station.procedure import CalibrationSettings
-from handcal.types import EYES, METHODS, Alignment, Method
+from handcal.types import EYES, METHODS, Alignment, EyeDistance, Method
 
 RIG = example_rig()
 
@@ -38,7 +41,10 @@ def left(simulated: Callable[..., Alignment]) -> Alignment:
 def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None:
     results = solve_session([left, both], RIG, SolveSettings())
     data = json.loads(json.dumps(results_json(results), allow_nan=False))
-    assert set(data) == {"version", "method", "eyes", "eye_distance_m", "alignments", "observed"}
+    assert set(data) == {
+        "version", "method", "eyes", "eye_distance_m", "measured_eye_distance", "alignments",
+        "observed",
+    }  # fmt: skip
     assert (data["version"], data["method"]) == (2, "consistent")
     assert list(data["eyes"]) == list(EYES)
     solved = {
@@ -112,6 +118,27 @@ def test_a_slow_method_can_be_cancelled_in_the_middle(left: Alignment, method: M
     with pytest.raises(CancelledError):
         solve_session([left], RIG, SolveSettings(method), Progress(is_cancelled=is_cancelled))
     assert asked == 4  # before the alignment, and before three iterations
+
+
+def test_a_measured_eye_distance_improves_one_alignment_of_both_eyes() -> None:
+    usual = WearerSettings(eye_distance_sigma_m=0.004)
+    still_m = {eye: np.zeros(3) for eye in EYES}
+    arcmin: list[list[float]] = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        wearer = draw_wearer(rng, seed, usual)
+        alignment = align_hand(wearer, rng, EYES, still_m, usual, 1500, 0.001)
+        true_m = float(np.linalg.norm(wearer.eye_m("right") - wearer.eye_m("left")))
+        measured = EyeDistance(true_m + rng.normal(0.0, 0.001))
+        arcmin.append([])
+        for known in (None, measured):
+            results = solve_session([alignment], RIG, SolveSettings(), eye_distance=known)
+            solved_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
+            arcmin[-1].append(reprojection_arcmin(RIG, solved_m, wearer.true_shift_m))
+            if known is not None:
+                assert results.eye_distance_m == pytest.approx(true_m, abs=0.004)
+    without, used = np.mean(arcmin, axis=0)
+    assert used < 0.9 * without
 
 
 def test_nothing_to_solve_is_refused() -> None:

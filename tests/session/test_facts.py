@@ -13,13 +13,19 @@ from handcal.rig.example import example_rig
 from handcal.session.facts import (
     AlignmentFacts,
     CameraUsed,
-    EyeDistance,
     SessionFacts,
     Verification,
     facts_json,
 )
 from handcal.session.session import Session
-from handcal.types import Alignment, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
+from handcal.types import (
+    Alignment,
+    CameraIdentity,
+    EyeDistance,
+    HeadsetIdentity,
+    HeadsetView,
+    Intrinsics,
+)
 
 CAMERA = CameraUsed(
     CameraIdentity("D415", "816612062327", "5.13"),
@@ -32,7 +38,7 @@ FACTS: dict[str, Any] = {
     "camera": CAMERA,
     "headset": HEADSET,
     "plan": "each",
-    "eye_distance": EyeDistance(0.0632, 0.001, "ruler"),
+    "eye_distance": EyeDistance(0.0632, 0.002, "headset"),
     "verified": {"left": Verification((0.001, 0.0, 1 / 3), (1.5, -2.0), (0.002, 0.0, 0.0))},
     "evidence": ("digest", "picture"),
     "contradictions": (),
@@ -85,7 +91,7 @@ def test_what_is_no_fact_is_refused_and_nothing_written(
 
 def test_impossible_values_are_refused() -> None:
     for make in (
-        lambda: EyeDistance(0.0, 0.001, "ruler"),
+        lambda: EyeDistance(0.063, 0.0),
         lambda: AlignmentFacts(match_age_s=-1.0),
         lambda: CameraUsed(CameraIdentity(), Intrinsics(1, 1, np.nan, 1.0, 0.0, 0.0), 0.001),
     ):
@@ -100,3 +106,15 @@ def test_facts_of_an_alignment_come_back(tmp_path: Path, alignment: Alignment) -
         session.save_alignment(alignment)
     record = Session.open(session.path)
     assert record.alignment_facts == {1: facts, 2: AlignmentFacts()}
+
+
+def test_results_go_with_another_eye_distance_only(tmp_path: Path) -> None:
+    with Session.create(tmp_path, example_rig(), {}) as session:
+        for distance, is_kept in ((EyeDistance(0.063), True), (EyeDistance(0.064), False)):
+            session.save_facts(eye_distance=EyeDistance(0.063))
+            session.save_results({})
+            session.save_facts(plan="both", eye_distance=distance)
+            record = Session.open(session.path)
+            assert (record.is_solved, record.results is not None) == (is_kept, is_kept)
+            assert (session.path / "results.json").exists() == is_kept
+            assert not record.damaged

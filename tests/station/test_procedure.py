@@ -43,6 +43,7 @@ from handcal.types import (
     EYES,
     Alignment,
     Eye,
+    EyeDistance,
     Float64,
     Frame,
     HeadsetIdentity,
@@ -942,6 +943,71 @@ def test_any_alignment_can_be_deleted_and_restored_and_the_rest_solved(
     stage.align()
     assert list(calibration.alignments) == [3]
     assert list(Session.open(session.path).alignments) == [3]
+
+
+def test_a_measured_eye_distance_is_used_stored_and_restored(
+    stage: Stage, session: Session, server: HeadsetServer, client: HeadsetClient
+) -> None:
+    calibration, wide = stage.calibration, EyeDistance(0.070)
+    stage.make_cursor()
+    with pytest.raises(ProcedureError, match="the eye distance cannot be changed now"):
+        calibration.set_eye_distance(wide)
+    calibration.redo()
+    stage.calibrate()
+    without = calibration.results
+    assert without is not None
+    assert without.eye_distance_m is not None
+    assert without.measured_eye_distance is None
+
+    calibration.set_eye_distance(wide)
+    assert calibration.results is None
+    assert stage.state() is State.APPLIED
+    assert Session.open(session.path).results is None
+    results = calibration.solve()
+    assert results.measured_eye_distance == wide
+    assert results.eye_distance_m is not None
+    assert abs(results.eye_distance_m - 0.070) < 0.5 * abs(without.eye_distance_m - 0.070)
+    calibration.set_eye_distance(wide)  # nothing changes
+    assert calibration.results is results
+
+    record = Session.open(session.path)
+    assert record.facts.eye_distance == wide
+    assert record.is_solved
+    assert results_json(solve(record)) == results_json(results) == record.results
+    other = solve(record, eye_distance=EyeDistance(0.058))
+    assert other.eye_distance_m is not None
+    assert other.eye_distance_m < results.eye_distance_m
+    resumed = Stage(server, client, session, resume=record)
+    assert resumed.calibration.eye_distance == wide
+    assert resumed.calibration.results is not None
+    assert results_json(resumed.calibration.results) == results_json(results)
+
+    calibration.set_eye_distance(None)
+    assert Session.open(session.path).facts.eye_distance is None
+    assert results_json(calibration.solve()) == results_json(without)
+
+
+def test_the_headset_s_eye_distance_is_used_if_none_was_typed(
+    stage: Stage, session: Session, server: HeadsetServer, client: HeadsetClient
+) -> None:
+    def tell(distance_m: float) -> None:
+        client.set_identity(replace(IDENTITY, eye_distance_m=distance_m))
+        eventually(lambda: server.device and server.device.eye_distance_m == distance_m)
+
+    stage.align()
+    for told_m, used in (
+        (0.040, None),  # no person's
+        (0.066, EyeDistance(0.066, source="headset")),
+        (0.067, EyeDistance(0.067, source="headset")),
+    ):
+        tell(told_m)
+        results = stage.calibration.solve()
+        record = Session.open(session.path)
+        assert results.measured_eye_distance == record.facts.eye_distance == used
+        assert record.is_solved
+        assert results_json(solve(record)) == results_json(results)
+    stage.calibration.set_eye_distance(EyeDistance(0.060))
+    assert stage.calibration.solve().measured_eye_distance == EyeDistance(0.060)
 
 
 def test_redo_of_an_alignment_can_be_undone(stage: Stage, session: Session) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
+    QLineEdit,
     QPushButton,
     QWidget,
 )
@@ -16,9 +17,11 @@ from PySide6.QtWidgets import (
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
+from handcal.types import EyeDistance
 from handcal_gui.panels.session.notes_editor import NotesEditor
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
@@ -33,6 +36,12 @@ from handcal_gui.widgets.session_rows import (
 from handcal_gui.widgets.times import local_time
 from handcal_gui.widgets.undo_strip import UndoStrip
 
+_EYE_DISTANCE_HELP = (
+    "Distance between the wearer's pupils in millimetres, by a ruler or pupillometer (± 1 mm);\n"
+    "empty: not measured. Alignments with both eyes open hardly show it.\n"
+    "A change discards the results: solve again."
+)
+
 
 class SessionPanel(QWidget):
     """Shows a session, and requests changes to it.
@@ -43,12 +52,15 @@ class SessionPanel(QWidget):
         Kind and number of the alignment or trial.
     notes_changed : Signal(str)
         The complete notes, 0.8 s after the last key.
+    eye_distance_changed : Signal(EyeDistance or None)
+        The wearer's, as typed; None if it is not measured.
     export_requested, inspect_requested : Signal()
     """
 
     delete_requested = Signal(str, int)
     restore_requested = Signal(str, int)
     notes_changed = Signal(str)
+    eye_distance_changed = Signal(object)
     export_requested = Signal()
     inspect_requested = Signal()
 
@@ -60,6 +72,11 @@ class SessionPanel(QWidget):
         self._results: Results | None = None
         self._is_read_only = False
         self._wearer, self._folder, self._started = ElidedLabel(), ElidedLabel(), QLabel()
+        self._eye_distance = with_name(
+            QLineEdit(), "eyeDistance", "Eye distance in millimetres", _EYE_DISTANCE_HELP
+        )
+        self._eye_distance.editingFinished.connect(self._take_eye_distance)
+        self._eye_distance_problem = paragraph("eyeDistanceProblem")
         self._alignments = RecordTable(
             "Alignments", ALIGNMENT_COLUMNS, "Confirmed alignments appear here"
         )
@@ -97,6 +114,8 @@ class SessionPanel(QWidget):
             Results of all its alignments, if known.
         """
         before, self._record, self._results = self._record, record, results
+        if before is None or before.path != record.path:
+            self._eye_distance.setModified(False)
         self._alignments.show_rows(alignment_rows(record, results))
         if before is None or trials_id(before) != trials_id(record):
             self._trials.show_rows(trial_rows(record))
@@ -119,6 +138,7 @@ class SessionPanel(QWidget):
         self._open_folder.setEnabled(record is not None)
         self._inspect.setEnabled(record is not None and bool(record.alignments))
         self._export.setEnabled(record is not None)
+        self._eye_distance.setEnabled(record is not None and not self._is_read_only)
         if record is None:
             self._wearer.setText("–")
             self._folder.setText("Start or open a session to see it here")
@@ -128,9 +148,33 @@ class SessionPanel(QWidget):
         self._folder.setText(str(record.path))
         began = local_time(record.events[0].time, "%Y-%m-%d %H:%M:%S")
         self._started.setText(f"{began}, finished" if record.is_finished else began)
+        if not self._eye_distance.isModified():
+            self._show_eye_distance(record.facts.eye_distance)
         self._strip.show_deletions([] if self._is_read_only else deletions(record))
         self._tabs.setTabText(0, f"Alignments ({len(record.alignments)})")
         self._tabs.setTabText(1, f"Trials ({len(record.trials)})")
+
+    def _show_eye_distance(self, stored: EyeDistance | None) -> None:
+        is_told = stored is not None and stored.source == "headset"
+        self._eye_distance.setPlaceholderText(f"{stored} (headset)" if is_told else "Not measured")
+        self._eye_distance.setText(
+            "" if stored is None or is_told else f"{1e3 * stored.value_m:.1f}"
+        )
+        self._eye_distance_problem.hide()
+
+    def _take_eye_distance(self) -> None:
+        """Request the typed eye distance, or say why it is refused."""
+        if self._record is None or not self._eye_distance.isModified():
+            return
+        text, stored = self._eye_distance.text().strip(), self._record.facts.eye_distance
+        try:
+            typed = _read_eye_distance(text) if text else None
+        except ValueError as error:
+            self._eye_distance_problem.setText(f"Not used: {error}.")
+            self._eye_distance_problem.show()
+            return
+        self._show_eye_distance(stored)  # until the session holds the new one
+        self.eye_distance_changed.emit(typed)
 
     def _show_folder(self) -> None:
         if self._record is not None:
@@ -150,6 +194,9 @@ class SessionPanel(QWidget):
         form.addRow("Wearer", self._wearer)
         form.addRow("Folder", self._folder)
         form.addRow("Started", self._started)
+        form.addRow("Eye distance (mm)", self._eye_distance)
+        form.addRow(self._eye_distance_problem)
+        self._eye_distance_problem.hide()
         self._tabs.addTab(self._alignments, "Alignments")
         self._tabs.addTab(self._trials, "Trials")
         self._tabs.addTab(self._notes, "Notes")
@@ -157,3 +204,12 @@ class SessionPanel(QWidget):
             (self._strip, 1), self._open_folder, self._inspect, self._export, spacing=SPACING_PX
         )
         vbox(form, (self._tabs, 1), buttons, on=self, margins=SPACING_PX, spacing=SPACING_PX)
+
+
+def _read_eye_distance(text: str) -> EyeDistance:
+    """Return an eye distance typed in millimetres; ValueError if it is not one of a person."""
+    try:
+        value_mm = float(text.replace(",", "."))
+    except ValueError:
+        raise ValueError("the eye distance is a number; enter 45 to 85 mm") from None
+    return EyeDistance(1e-3 * value_mm)

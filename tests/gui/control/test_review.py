@@ -38,7 +38,9 @@ class Solver:
         self.began = threading.Event()
         self.was_cancelled = threading.Event()
 
-    def __call__(self, _alignments: Any, _rig: Any, _settings: Any, progress: Progress) -> Results:
+    def __call__(
+        self, _alignments: Any, _rig: Any, _settings: Any, progress: Progress, **_measured: Any
+    ) -> Results:
         progress.at(0.0, "Solving alignment 1 of 2")
         self.began.set()
         while not progress.is_cancelled():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox
 from pytestqt.qtbot import QtBot
 
 from handcal.station.settings import StationSettings
@@ -37,11 +37,20 @@ def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
     theme.setCurrentIndex(theme.findData("dark"))
     folder.set_path("/b")
     guard.setValue(10.5)
+    target, learn = dialog.findChild(QDoubleSpinBox, "target"), dialog.findChild(QCheckBox)
+    assert isinstance(target, QDoubleSpinBox)
+    assert isinstance(learn, QCheckBox)
+    target.setValue(6.5)
+    learn.click()
     after = dialog.preferences()
     assert after.theme == "dark"
     assert after.station.sessions == "/b"
     assert np.degrees(after.station.calibration.guard.limit_rad) == 10.5
-    station = replace(after.station, sessions="/a", calibration=BEFORE.station.calibration)
+    assert after.station.calibration.solve.verdict.target_arcmin == 6.5
+    assert not after.station.learn_prior
+    station = replace(
+        after.station, sessions="/a", learn_prior=True, calibration=BEFORE.station.calibration
+    )
     assert replace(after, theme="light", station=station) == BEFORE
     folder.set_path("")  # no folder is no choice
     assert dialog.preferences().station.sessions == "/a"

@@ -8,7 +8,7 @@ import pytest
 
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.types import EYES, Alignment, EyeShift, Rig
+from handcal.types import EYES, Alignment, EyeDistance, EyeShift, Rig
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
@@ -65,6 +65,17 @@ def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
     assert [row.cells[1] for row in verdict_rows(results)] == [
         results.verdicts[eye].reason for eye in EYES
     ]
+
+
+def test_what_was_known_before_is_shown_if_it_was_used(results: Results, rig: Rig) -> None:
+    labels = {row.label for row in result_rows(results, rig)}
+    assert not labels & {"Eye distance measured", "Prior"}
+    prior = replace(results.fused.prior, sessions=12)
+    fused = replace(results.fused, prior=prior)
+    known = replace(results, measured_eye_distance=EyeDistance(0.063), fused=fused)
+    rows = result_rows(known, rig)
+    assert cells(rows, "Eye distance measured") == ("63.0 ± 1.0 mm",)
+    assert cells(rows, "Prior") == ("learned from 12 sessions",)
 
 
 def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:

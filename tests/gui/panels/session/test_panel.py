@@ -1,13 +1,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton, QTabWidget, QToolButton
+from PySide6.QtWidgets import (
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QTabWidget,
+    QToolButton,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
@@ -15,7 +23,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import Rig
+from handcal.types import EyeDistance, Rig
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.record_table import RecordTable
 from tests.gui.helpers import button, child, show, text
@@ -145,3 +153,46 @@ def test_opens_the_folder(
     panel.show_record(record, None)
     button(panel, QPushButton, "Open folder").click()
     assert [url.toLocalFile() for url in opened] == [str(record.path)]
+
+
+def test_an_eye_distance_is_taken_in_millimetres_or_refused(
+    qtbot: QtBot, panel: SessionPanel, record: SessionRecord, results: Results
+) -> None:
+    field, problem = (
+        child(panel, QLineEdit, "eyeDistance"),
+        child(panel, QLabel, "eyeDistanceProblem"),
+    )
+    assert not field.isEnabled()
+    panel.show_record(record, results)
+    asked: list[EyeDistance | None] = []
+    panel.eye_distance_changed.connect(asked.append)
+
+    def enter(text: str) -> None:
+        field.selectAll()
+        QTest.keyClick(field, Qt.Key.Key_Delete)
+        QTest.keyClicks(field, text)
+        QTest.keyClick(field, Qt.Key.Key_Return)
+
+    for wrong in ("0.063", "90", "wide", "nan"):
+        enter(wrong)
+        assert problem.isVisible()
+        assert "enter 45 to 85 mm" in problem.text()
+        panel.show_record(record, results)
+        assert field.text() == wrong, "what is being corrected is not replaced"
+    enter("63,5")
+    assert asked == [EyeDistance(0.0635)]
+    assert not problem.isVisible()
+    assert field.text() == "", "not stored yet"
+    for stored, shown, placeholder in (
+        (asked[0], "63.5", "Not measured"),
+        (EyeDistance(0.066, source="headset"), "", "66.0 ± 1.0 mm (headset)"),
+    ):
+        facts = replace(record.facts, eye_distance=stored)
+        panel.show_record(replace(record, facts=facts), results)
+        assert (field.text(), field.placeholderText()) == (shown, placeholder)
+    enter(" ")
+    assert asked[1:] == [None]
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert len(asked) == 2, "unchanged"
+    panel.set_read_only(True)
+    assert not field.isEnabled()
