@@ -172,7 +172,7 @@ def snapshot(
 
 
 class Camera(Closable):
-    """A camera that repeats one of the rendered frames and can be unplugged."""
+    """A camera that shows one of the rendered frames and can be unplugged."""
 
     name = "Camera of the tests"
     identity = CameraIdentity()
@@ -199,7 +199,9 @@ class Camera(Closable):
         self._index += 1
         now_ns = time.monotonic_ns()
         shown = self._frames[self.shows]
-        return replace(shown, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns)
+        depth = shown.depth.copy()
+        depth[0, 0] = self._index % 1000  # a live picture always changes
+        return replace(shown, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns, depth=depth)
 
     def close(self) -> None:
         pass
