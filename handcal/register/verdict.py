@@ -175,12 +175,13 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
 
 
 def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSettings) -> Verdict:
-    percent = f"{100 * gain.probability_better:.0f} %"
+    # Rounded down, so that what is refused never reads as the limit. The space does not break.
+    percent = f"{int(100.0 * gain.probability_better)}\u00a0%"
     if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
             "accept",
             f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
-            f"better than none with {percent}",
+            f"{percent} sure to be better than none",
         )
     is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
     if gain.without_arcmin <= gain.after_arcmin or (
@@ -189,11 +190,12 @@ def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSet
         return Verdict(
             "keep",
             f"the offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here; "
-            f"this result, expected at {gain.after_arcmin:.1f}′, is better with just {percent}",
+            f"this result, expected at {gain.after_arcmin:.1f}′, is only {percent} sure to be "
+            "better",
         )
     which = "with both eyes open" if len(advice.eyes) > 1 else f"with the {eye} eye alone"
     more = f"{advice.alignments} more alignment{'s' * (advice.alignments != 1)} {which}"
-    now = f"expected error {gain.after_arcmin:.1f}′, better than none with {percent}"
+    now = f"expected error {gain.after_arcmin:.1f}′, {percent} sure to be better than none"
     then = f"{advice.after_arcmin:.1f}′ expected after {more}"
     if advice.meets_target:
         return Verdict("repeat", f"{now}; {then}")

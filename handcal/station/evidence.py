@@ -8,6 +8,7 @@ result, and is named.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,11 +38,13 @@ class Evidence:
     Parameters
     ----------
     rig : Rig
+    earlier : sequence of Contradiction
+        Evidence found before the session was interrupted.
     """
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, earlier: Sequence[Contradiction] = ()) -> None:
         self._rig = rig
-        self._found: dict[str, Contradiction] = {}
+        self._found = {one.name: one for one in earlier}
         self._camera: tuple[CameraIdentity, Intrinsics] | None = None
         self._last: Frame | None = None
         self._equal = 0

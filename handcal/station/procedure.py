@@ -191,7 +191,7 @@ class Calibration:
         self.refused = 0
         self.refusal = ""
         self.camera = CameraIdentity()
-        self.evidence = Evidence(rig)
+        self.evidence = Evidence(rig, _earlier_evidence(resume))
         self._link = link
         self._session = session
         self._settings = settings or CalibrationSettings()
@@ -440,7 +440,15 @@ class Calibration:
         self._take_headsets_eye_distance()
         results = self._solve()
         self.state = State.SOLVED
-        self._store(lambda session: session.save_results(results_json(results)))
+        found = self.evidence.contradictions
+        names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
+
+        def write(session: Session) -> None:
+            if found:
+                session.save_facts(evidence=names, contradictions=texts)
+            session.save_results(results_json(results))
+
+        self._store(write)
         return results
 
     def apply(self) -> None:
@@ -559,17 +567,13 @@ class Calibration:
             self.state = State.ALIGNED
 
     def _solve(self) -> Results:
-        found = self.evidence.contradictions
         self.results = solve_session(
             self.alignments,
             self.rig,
             self._settings.solve,
             eye_distance=self.eye_distance,
-            contradictions=[one.text for one in found],
+            contradictions=[one.text for one in self.evidence.contradictions],
         )
-        if found:
-            names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
-            self._store(lambda session: session.save_facts(evidence=names, contradictions=texts))
         return self.results
 
     def _take_headsets_eye_distance(self) -> None:
@@ -767,6 +771,13 @@ def _rig_name(rig: Rig) -> str:
     }
     name = "".join(character for character in rig.name if character >= " ")
     return f"{name[:80]} {drawn_digest(offline, None).hex()[:8]}"
+
+
+def _earlier_evidence(resume: SessionRecord | None) -> list[Contradiction]:
+    if resume is None:
+        return []
+    pairs = zip(resume.facts.evidence, resume.facts.contradictions, strict=False)
+    return [Contradiction(name, text) for name, text in pairs]
 
 
 def _align_prompt(eyes: Sequence[Eye]) -> str:

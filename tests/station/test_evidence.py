@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.rig.example import example_rig
-from handcal.station.evidence import FROZEN_FRAMES, Evidence
+from handcal.station.evidence import FROZEN_FRAMES, Contradiction, Evidence
 from handcal.types import CameraIdentity, DepthCheck, Frame
 
 RIG = example_rig()
@@ -89,3 +89,8 @@ def test_a_headset_may_draw_otherwise_once() -> None:
     assert _names(evidence) == ["stale-headset"]
     evidence.drawn_as_sent()
     assert _names(evidence) == []
+
+
+def test_evidence_found_before_an_interruption_counts() -> None:
+    earlier = Contradiction("other-camera", "the camera is not the rig's")
+    assert _names(Evidence(RIG, [earlier])) == ["other-camera"]
