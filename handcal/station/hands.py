@@ -121,9 +121,10 @@ class RecentHands:
 
     def held_at(self, hand: PlacedHand) -> list[PlacedHand]:
         """Return the hands just before and at a hand, back to where it was elsewhere."""
-        held: list[PlacedHand] = []
-        for one in reversed(self._placed):
-            if one.t_host_ns > hand.t_host_ns:
+        held = [hand]
+        # In the order of exposure: a frame's time is estimated again when one arrives sooner.
+        for one in sorted(self._placed, key=lambda placed: placed.t_host_ns, reverse=True):
+            if one is hand or one.t_host_ns > hand.t_host_ns:
                 continue
             is_near = float(np.linalg.norm(one.middle_W_m - hand.middle_W_m)) < _HOLD_M
             if not is_near or hand.t_host_ns - one.t_host_ns > self._steady_ns:

@@ -111,3 +111,15 @@ def test_the_hand_nearest_in_time_is_returned_while_it_is_kept(hands: RecentHand
     hands.clear()
     with pytest.raises(HandError):
         hands.nearest(3 * PERIOD_NS, 0.05)
+
+
+def test_a_hold_is_what_came_before_the_hand_and_holds_it_even_out_of_order(
+    hands: RecentHands,
+) -> None:
+    for number, x_m in enumerate([0.0, 0.1, 0.1, 0.1]):
+        hands.add(cloud(x_m), (10 + number) * PERIOD_NS)
+    hand = hands.nearest(13 * PERIOD_NS, 0.05)
+    assert [one.t_host_ns for one in hands.held_at(hand)] == [n * PERIOD_NS for n in (11, 12, 13)]
+    # A later frame whose estimated time is earlier, of a hand elsewhere.
+    hands.add(cloud(0.2), 13 * PERIOD_NS - 1)
+    assert hands.held_at(hand) == [hand]
