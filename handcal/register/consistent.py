@@ -129,9 +129,7 @@ def fit_match(
     hand = transform(T_E, match.hand_m)
     cursor = transform(T_cursor, match.cursor_m)
     registered = transform(T_cursor @ match.rigid.T_target_source, match.hand_m)
-    gap_m, index = nearest(match.tree, transform(T_back, registered))
-    kept = match.hand_is_common & ~match.cursor_near_cut[index]
-    kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
+    gap_m, index, kept = _pairs(match, transform(T_back, registered))
     same_points = len(np.unique(index[kept])) > _SAME_POINTS * np.count_nonzero(kept)
     history = [float(np.mean(gap_m[kept] ** 2))]
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
@@ -140,17 +138,17 @@ def fit_match(
     shift_m = balance(unturned, hand[kept], rigid_fit_m, distance_m)
     aspect_m = shift_m - rigid_fit_m
     shape, paired = hand, hand[kept]
+    if same_points:
+        kept = kept & _is_nearest(index, gap_m)
     while same_points:
-        kept &= _is_nearest(index, gap_m)
         fitted = hand[kept]
         _, partner = _unturned(shape[kept], cursor[index[kept]])
         fit_m, factor = _fit_pairs(partner, fitted, distance_m, history[-1] / 3.0)
         shape = transform(update_matrix(fit_m, distance_m), hand) / factor
         R_next, _ = _unturned(shape[kept], cursor[index[kept]])
         centre = shape[kept].mean(axis=0)
-        gap_m, index = nearest(match.tree, transform(T_back, centre + (shape - centre) @ R_next.T))
-        kept = match.hand_is_common & ~match.cursor_near_cut[index]
-        kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
+        turned = centre + (shape - centre) @ R_next.T
+        gap_m, index, kept = _pairs(match, transform(T_back, turned))
         kept &= _is_nearest(index, gap_m)
         error_m2 = float(np.mean(gap_m[kept] ** 2))
         if error_m2 >= (1.0 - _GAIN) * history[-1]:
@@ -216,6 +214,17 @@ def _covariance(
     displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
     gain = np.linalg.inv(design(cursor_m, hand_m, distance_m, exact=True).mean(axis=0))
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
+
+
+def _pairs(match: HandMatch, hand_m: Float64) -> tuple[Float64, NDArray[np.intp], Bool]:
+    """Return the distance of each hand point to its partner, the partner, and if the pair counts.
+
+    Pairs do not count beyond the common cut, beside a cut edge, or much farther apart than most.
+    """
+    gap_m, index = nearest(match.tree, hand_m)
+    kept = match.hand_is_common & ~match.cursor_near_cut[index]
+    kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
+    return gap_m, index, kept
 
 
 def _is_nearest(index: NDArray[np.intp], gap_m: Float64) -> Bool:

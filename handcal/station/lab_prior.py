@@ -62,10 +62,11 @@ def run_learn_prior(
     sessions: list[list[Observed]] = []
     left_out: dict[str, int] = {}
     wearers: set[str] = set()
+    numbers = _numbers(rig)
     for number, journal in enumerate(journals):
         progress.at(number / len(journals), f"Reading session {number + 1} of {len(journals)}")
         try:
-            observed, wearer = _read_session(journal, rig)
+            observed, wearer = _read_session(journal, numbers)
             if wearer and wearer in wearers:
                 raise _NotUsableError("earlier sessions of the same wearer")
         except _NotUsableError as reason:
@@ -87,11 +88,11 @@ def _modified_s(path: Path) -> float:
         return 0.0
 
 
-def _read_session(journal: Path, rig: Rig) -> tuple[list[Observed], str]:
+def _read_session(journal: Path, numbers: list[list[float]]) -> tuple[list[Observed], str]:
     """Return the observations of a session and its wearer."""
     try:
         events = read_journal(journal).events
-        is_same_rig = _numbers(read_rig(journal.with_name("rig.yaml"))) == _numbers(rig)
+        is_same_rig = _numbers(read_rig(journal.with_name("rig.yaml"))) == numbers
     except FileError:
         raise _NotUsableError("not readable") from None
     if not is_same_rig:
