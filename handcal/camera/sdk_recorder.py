@@ -13,6 +13,7 @@ import numpy as np
 from handcal.camera.one_camera import of_one_camera
 from handcal.camera.sdk_devices import librealsense
 from handcal.errors import CameraError
+from handcal.io.files import sync_folder
 from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
 
 _RATE_HZ = 30
@@ -56,6 +57,7 @@ def record_db3(
     try:
         count = _record(unfinished, frames, identity)
         unfinished.replace(path)
+        sync_folder(path.parent)
     except (RuntimeError, OSError) as error:
         raise CameraError(f"{path} cannot be recorded: {error}") from error
     finally:

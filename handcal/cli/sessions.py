@@ -128,7 +128,8 @@ def check(arguments: argparse.Namespace) -> None:
     found = check_session(arguments.session)
     save(arguments.json, asdict(found))
     for damage in found.damaged:
-        console.print(str(damage), markup=False)
+        # That it is no session names its folder itself.
+        console.print(damage.what if found.state == "none" else str(damage), markup=False)
     if found.state == "sound":
         console.print("The session is sound.")
     elif found.state == "damaged":
@@ -206,6 +207,10 @@ def prior(arguments: argparse.Namespace) -> None:
 
     if not arguments.folder.is_dir():
         raise FileError(f"{arguments.folder} is not a folder; choose the one that holds sessions")
+    if (arguments.folder / "journal.jsonl").exists():
+        raise FileError(
+            f"{arguments.folder} is one session; choose the folder above, which holds all sessions"
+        )
     settings = PriorSettings()
     with show_progress() as progress:
         rig = read_rig(arguments.rig or resource_path("example_rig.yaml"))

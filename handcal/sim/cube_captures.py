@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from handcal.display import eye_projection, view_of_eye
 from handcal.errors import FileError
 from handcal.geometry import image_points, invert, project, rigid, transform
-from handcal.io.files import make_folder, write_json
+from handcal.io.files import make_folder, sync_folder, write_json
 from handcal.io.images import write_png
 from handcal.progress import Progress
 from handcal.register.results import SolveSettings, solve_session
@@ -123,6 +123,7 @@ def _appearing_in(folder: Path) -> Iterator[Path]:
         yield hidden
         for made in hidden.iterdir():
             made.rename(folder / made.name)
+        sync_folder(folder)
     except OSError as error:
         raise FileError(f"cannot write {folder}: {error.strerror or error}") from error
     finally:

@@ -291,6 +291,7 @@ def test_misuse_is_one_line_and_exit_code_2(
     [
         ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
         ("solve nowhere", "nowhere is not a session"),
+        ("prior one_session", "one_session is one session; choose the folder above"),
         ("replay nowhere.db3", "there is no recording nowhere.db3"),
         ("replay text.txt", "text.txt is not a recording"),
         ("demo --rig nowhere.yaml --output out", "cannot read nowhere.yaml"),
@@ -311,6 +312,8 @@ def test_failure_is_one_line_and_exit_code_1(
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv(KEY_VARIABLE, raising=False)
     (tmp_path / "text.txt").write_text("text\n!")
+    (tmp_path / "one_session").mkdir()
+    (tmp_path / "one_session/journal.jsonl").touch()
     code, error = fails(*line.split())
     assert code == 1
     assert problem in error
@@ -358,6 +361,7 @@ def test_a_session_is_checked_and_repaired(
     assert f"alignments/1.npz: {what}" in capsys.readouterr().out
     code, found = check(tmp_path)
     assert (code, found["state"]) == (2, "none")
+    assert capsys.readouterr().out.startswith(f"{tmp_path} is not a session")
     assert "is not a session" in found["damaged"][0]["what"]
 
     handcal("session", "repair", session.path, "--output", tmp_path / "two")
