@@ -538,7 +538,7 @@ def test_the_pc_confirms_nothing_that_the_headset_has_not_received(
     stage.see(T_D_NEAR)
     eventually(lambda: stage.calibration.is_applied)
     client.close()
-    stage.calibration._send_projections(stage.calibration.applied_shift_m)
+    stage.calibration._drawing.send(stage.calibration.applied_shift_m)
     with pytest.raises(ProcedureError, match="has not received the cursor and projections"):
         stage.calibration.confirm()
 
@@ -1118,7 +1118,7 @@ def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
 def test_a_full_session_says_so_before_the_wearer_aligns(
     server: HeadsetServer, client: HeadsetClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("handcal.station.procedure.MAX_ALIGNMENTS", 1)
+    monkeypatch.setattr("handcal.station.alignments.MAX_ALIGNMENTS", 1)
     stage = Stage(server, client, None)
     stage.align()
     stage.calibration.redo()
