@@ -256,10 +256,11 @@ class AlignmentSteps:
             cursor_id=self._cursor_id,
         )
 
-    def _clear_cursor(self) -> None:
+    def _clear_cursor(self, keeps_hand: bool = False) -> None:
         self._aligning = None
-        # The wearer lowers the hand now: only a hand seen from here on can become a cursor.
-        self._hands.clear()
+        if not keeps_hand:
+            # The wearer lowers the hand now: only a hand seen from here on can become a cursor.
+            self._hands.clear()
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
         self._link.send_prompt("", EYES)
 

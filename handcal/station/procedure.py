@@ -30,16 +30,19 @@ from handcal.link.reliable import Outgoing
 from handcal.link.server import HeadsetServer
 from handcal.register.results import Results, results_json, solve_session
 from handcal.session.session import Session, SessionRecord
-from handcal.station.alignments import AlignmentSteps
 from handcal.station.states import MAX_HAND_SET_SHIFT_M as MAX_HAND_SET_SHIFT_M
 from handcal.station.states import CalibrationSettings as CalibrationSettings
 from handcal.station.states import Observation as Observation
 from handcal.station.states import ProcedureError as ProcedureError
 from handcal.station.states import State as State
+from handcal.station.verifications import VerificationSteps
+from handcal.station.verifying import Verifying as Verifying
 from handcal.types import Eye, EyeDistance, Rig
 
+_UNSETTLED = (State.ALIGN, State.VERIFY, State.APPLYING)
 
-class Calibration(AlignmentSteps):
+
+class Calibration(VerificationSteps):
     """One wearer's calibration.
 
     It first sends the offline projections, or those of the session it resumes, so that the headset
@@ -73,6 +76,10 @@ class Calibration(AlignmentSteps):
         after the eye distance was changed.
     eye_distance : EyeDistance or None
         The wearer's, if it was measured.
+    verifications : dict of eye to Verification
+        The newest of each eye; fused with the alignments.
+    verifying : Verifying or None
+        The verification that goes on, in the state `verify`.
     refused : int
         Number of confirmations refused by the guard.
     camera : CameraIdentity
@@ -108,7 +115,7 @@ class Calibration(AlignmentSteps):
         FileError
             If the session cannot be written; the alignment is deleted anyway.
         """
-        if self.state in (State.ALIGNED, State.SOLVED):
+        if self.state in (State.ALIGNED, State.SOLVED) and self._items.active:
             self.delete_alignment(max(self._items.active))
         elif self.state is State.ALIGN:
             self._show_hand_again()
@@ -161,20 +168,20 @@ class Calibration(AlignmentSteps):
         self._store.write(lambda session: session.save_facts(eye_distance=eye_distance))
 
     def solve(self) -> Results:
-        """Solve all alignments so far.
+        """Solve all alignments and verifications so far.
 
         The eye distance that the headset measures is used if none was typed.
 
         Raises
         ------
         ProcedureError
-            If there is no alignment, or the headset has not yet acknowledged the projections.
+            If there is nothing to solve, or the headset has not yet acknowledged the projections.
         FileError
             If the session cannot be written; the results are kept in memory.
         """
         if self.state is State.APPLYING:
             raise ProcedureError("wait until the projections are applied")
-        if not self.alignments or self.state is State.ALIGN:
+        if not (self.alignments or self.verifications) or self.state in _UNSETTLED:
             raise ProcedureError("align the hand with the cursor first")
         self._take_headsets_eye_distance()
         results = self._solve()
@@ -190,10 +197,11 @@ class Calibration(AlignmentSteps):
         self._store.write(write)
         return results
 
-    def apply(self) -> None:
+    def apply(self, keeps_hand: bool = False) -> None:
         """Send the solved projections to the headset and hide the cursor.
 
-        An eye with the verdict *keep* gets its offline projection.
+        An eye whose result is not to be used gets its offline projection. `keeps_hand`: the wearer
+        keeps the hand up, so that it can become a cursor or be verified at once.
 
         Raises
         ------
@@ -202,7 +210,7 @@ class Calibration(AlignmentSteps):
         """
         if self.results is None or self.state is not State.SOLVED:
             raise ProcedureError("solve first")
-        self._clear_cursor()
+        self._clear_cursor(keeps_hand)
         self._drawing.send(self.results.rendered_shift_m)
         self._apply_until_s = time.monotonic() + self._settings.apply_timeout_s
         self.state = State.APPLYING
@@ -288,14 +296,16 @@ class Calibration(AlignmentSteps):
         self._items.deleted = dict(record.deleted_alignments)
         self._items.taken = record.last_alignment
         self._drawing.shift_m |= record.applied_shift_m
+        self.verifications = dict(record.facts.verified)
         if record.is_solved:
             try:
                 self._solve()
             except ValueError as error:
                 raise ProcedureError(f"{record.path} cannot be resumed: {error}") from error
             self.state = State.APPLIED if record.is_applied else State.SOLVED
-        elif record.alignments:
+        elif record.alignments or record.facts.verified:
             self.state = State.ALIGNED
+        self._resume_verifying(record)
 
     def _solve(self) -> Results:
         self.results = solve_session(
@@ -304,8 +314,13 @@ class Calibration(AlignmentSteps):
             self._settings.solve,
             eye_distance=self.eye_distance,
             contradictions=[one.text for one in self.evidence.contradictions],
+            verified=self.verifications,
         )
         return self.results
+
+    def _use_verification(self) -> None:
+        self.solve()
+        self.apply(keeps_hand=True)
 
     def _take_headsets_eye_distance(self) -> None:
         """Use the headset's newest eye distance unless one was typed."""
@@ -321,7 +336,7 @@ class Calibration(AlignmentSteps):
                 self._store.write_later(lambda session: session.save_facts(eye_distance=told))
 
     def _require_settled(self, what: str) -> None:
-        if self.state in (State.ALIGN, State.APPLYING):
+        if self.state in _UNSETTLED:
             raise ProcedureError(f"{what} cannot be changed now ({self.state})")
 
     def _forget_results(self) -> None:

@@ -26,6 +26,7 @@ class State(StrEnum):
     SOLVED = "solved"
     APPLYING = "applying"
     APPLIED = "applied"
+    VERIFY = "verify"
 
 
 class ProcedureError(HandcalError):
