@@ -48,6 +48,8 @@ from handcal.types import (
 _OUTLINE_FROM_POINTS = 1500
 # Far less than that of one point; it keeps the weights defined for a cursor outside the display.
 _NORMAL_FLOOR = 1e-3
+# Place of the hand, in E, that a verification to come is expected to have.
+_VERIFIED_AT_M = 0.0, 0.0, 0.5
 # Of a single solved eye: the eye box is about 2 cm wide (paper).
 _WIDE_EYE_BOX_M = 0.010
 
@@ -91,6 +93,8 @@ class Fused:
     """Expected error of the wearer's overlays, in those of a usual wearer."""
     verified: Mapping[Eye, Observation] = field(default_factory=dict)
     """The φ found by each eye's verification."""
+    unverified: Mapping[Eye, Observation] = field(default_factory=dict)
+    """The verification to expect of each solved eye that was not verified; its φ is zero."""
 
     def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
         """Return the covariance (6, 6) to expect after more alignments with some eyes open."""
@@ -192,8 +196,7 @@ def fuse_alignments(
     of_eye = {
         eye: found_shifts
         for eye in EYES
-        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts])
-        or eye in checks
+        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts]) or eye in checks
     }
     return Fused(
         shifts={
@@ -206,6 +209,11 @@ def fuse_alignments(
         observed=observed,
         wearer_scale=float(np.sqrt(weights @ np.square(settings.wearer_scales))),
         verified=checks,
+        unverified={
+            eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
+            for eye in of_eye
+            if eye not in checks
+        },
     )
 
 
