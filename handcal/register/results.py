@@ -35,6 +35,7 @@ from handcal.types import (
     PlanName,
     Rig,
     Verdict,
+    VerdictName,
     Verification,
     html_table,
     phi_text,
@@ -42,6 +43,7 @@ from handcal.types import (
 )
 
 RESULTS_VERSION = 2
+_USED: tuple[VerdictName, ...] = ("accept", "repeat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +83,12 @@ class Results:
 
     @property
     def rendered_shift_m(self) -> Mapping[Eye, Float64]:
-        """φ for the headset to render with, (3,): zero where the offline calibration is kept."""
+        """φ for the headset to render with, (3,): zero, the offline calibration, if not used.
+
+        A result to be repeated is used, as it is expected to be better than none.
+        """
         return {
-            eye: np.zeros(3) if self.verdicts[eye].name == "keep" else shift.shift_m
+            eye: shift.shift_m if self.verdicts[eye].name in _USED else np.zeros(3)
             for eye, shift in self.eyes.items()
         }
 

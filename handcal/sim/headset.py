@@ -125,6 +125,8 @@ def run_headset(
             client.send_pose(action.T_W_H @ _tracking_error(rng, settings), clock_ns(t_ns))
             if action.confirm:
                 client.confirm(clock_ns(t_ns), state)
+            if action.nudge is not None and state.verify is not None:
+                client.nudge(clock_ns(t_ns), state, action.nudge, action.fits)
             now_s = time.monotonic()
             if client.connected:
                 heard_s = now_s
@@ -231,6 +233,9 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
     """Return the displays' content; nothing is drawn before both projections have arrived."""
     drawn = state.drawn
     is_ready = len(drawn) == len(EYES)
+    is_outlined = (
+        state.is_outline and state.verify is not None and state.verify.eye in state.live_eyes
+    )
 
     def rendered(eye: Eye) -> Float64:
         return drawn[eye].P if is_ready else projection_matrix(rig.eyes[eye])
@@ -244,6 +249,8 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
         eyes=state.eyes,
         guard_red=state.is_over_limit,
         prompt=state.prompt,
+        verify=state.verify if is_ready else None,
+        outline_W_m=state.live_W_m if is_outlined else None,
     )
 
 

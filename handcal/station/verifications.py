@@ -20,6 +20,7 @@ from handcal.station.verifying import (
     VERIFYING,
     Verifying,
     hand_centre_E_m,
+    new_id,
     resumed,
     verify_prompt,
 )
@@ -44,7 +45,6 @@ class VerificationSteps(AlignmentSteps, ABC):
         super().__init__(rig, link, session, settings, resume, wearer)
         self.verifications: dict[Eye, Verification] = {}
         self.verifying: Verifying | None = None
-        self._verify_id = 0
         self._before_verifying = State.SHOW_HAND
 
     @abstractmethod
@@ -84,9 +84,8 @@ class VerificationSteps(AlignmentSteps, ABC):
         if self.verifying is not None:
             self._end_verifying(self.verifying.before_m)
         self._before_verifying = self.state
-        self._verify_id += 1
         self.verifying = Verifying(
-            VerifyRequest(self._verify_id, eye),
+            VerifyRequest(new_id(), eye),
             self.rig.eyes[eye],
             self._drawing.shift_m[eye],
             hand_centre_E_m(self.rig, eye, hand),
@@ -152,7 +151,6 @@ class VerificationSteps(AlignmentSteps, ABC):
         verifying = resumed(record.events, self.rig.eyes)
         if verifying is not None:
             self._before_verifying = self.state
-            self._verify_id = verifying.request.verify_id
             self.verifying = verifying
             self._drawing.shift_m[verifying.eye] = verifying.shift_m
             self._ask_to_verify(verifying)

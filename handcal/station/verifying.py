@@ -7,6 +7,7 @@ the PC as steps; both add up.
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -74,6 +75,7 @@ class Verifying:
         self.refusal = ""
         self._display = display
         self._heard = NudgeSum()
+        self._session = 0
         self._done: list[NudgeSum] = []
         self._undone: list[NudgeSum] = []
 
@@ -102,8 +104,9 @@ class Verifying:
 
         The word that the drawing fits counts only for a drawing that the wearer has seen so.
         """
-        heard, before = nudge.moved, self._heard
-        self._heard = heard
+        heard = nudge.moved
+        before = self._heard if nudge.session == self._session else NudgeSum()
+        self._heard, self._session = heard, nudge.session
         step = (
             heard.right_arcmin - before.right_arcmin,
             heard.down_arcmin - before.down_arcmin,
@@ -173,6 +176,11 @@ def hand_centre_E_m(rig: Rig, eye: Eye, hand: PlacedHand) -> Float64:
     return np.asarray(transform(T_E_W, hand.points_W_m).mean(axis=0))
 
 
+def new_id() -> int:
+    """Return the id of another verification, which no earlier run of this program has used."""
+    return secrets.randbits(31) | 1
+
+
 def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Verifying | None:
     """Return the verification that a session was in when it ended, or None."""
     last: Event | None = None
@@ -189,7 +197,7 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
             np.array(last.data[name], dtype=np.float64).reshape(3)
             for name in ("before_m", "hand_E_m")
         )
-        verifying = Verifying(VerifyRequest(1, eye), displays[eye], before_m, hand_E_m)
+        verifying = Verifying(VerifyRequest(new_id(), eye), displays[eye], before_m, hand_E_m)
         right_arcmin, down_arcmin = last.data["nudge_arcmin"]
         verifying.nudge(right_arcmin, down_arcmin, last.data["nudge_size"])
     except (KeyError, TypeError, ValueError):

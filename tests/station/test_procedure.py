@@ -394,7 +394,7 @@ def test_a_moving_or_absent_hand_is_not_steady(stage: Stage) -> None:
 def test_a_hand_held_before_a_slow_camera_is_steady(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(f"{__name__}.PERIOD_NS", 350_000_000)
+    monkeypatch.setattr("tests.station.stage.PERIOD_NS", 350_000_000)
     assert not stage.hold(frames=1).is_steady
     assert stage.hold(frames=3).is_steady
     assert not stage.see(rigid([-0.2, 0.0, 0.0], [0.02, 0.0, 0.5])).is_steady

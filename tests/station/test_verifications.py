@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.display import projection_matrix
+from handcal.geometry import rigid
 from handcal.link.client import HeadsetClient
 from handcal.link.nudges import MAX_NUDGE_ARCMIN, NudgeSum
 from handcal.link.server import HeadsetServer
@@ -19,7 +20,6 @@ from tests.helpers import eventually
 from tests.station.stage import (
     HEADSET_AHEAD_NS,
     RIG,
-    T_D_NEAR,
     Stage,
     connect,
     events,
@@ -187,7 +187,7 @@ def test_a_word_for_another_drawing_or_a_moving_hand_is_refused(
     stage.see()
     assert stage.state() is State.VERIFY
     assert "drawing has changed" in stage.calibration.refusal
-    stage.see(T_D_NEAR)
+    stage.see(rigid([-0.2, 0.0, 0.0], [0.02, 0.0, 0.5]))
     press(stage, NudgeSum(), fits=True)
     assert stage.state() is State.VERIFY
     assert "still" in stage.calibration.refusal
