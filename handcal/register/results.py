@@ -161,8 +161,8 @@ def solve_session(
         solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
     pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
     fused = fuse_alignments(pairs, rig, settings.fuse, eye_distance, verified)
-    done = [one.eyes for one in numbered.values()]
-    ahead = [] if plan is None else _upcoming(plan, done, usable_eyes)
+    aligned = [one.eyes for one in numbered.values()]
+    ahead = [] if plan is None else _upcoming(plan, aligned, usable_eyes)
     advice = {eye: advise(rig, fused, eye, settings.verdict, ahead) for eye in fused.shifts}
     measured = {
         eye: measured_arcmin(rig, fused, eye, verified[eye])
