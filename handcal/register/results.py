@@ -164,10 +164,43 @@ def solve_session(
     for done, (number, alignment) in enumerate(numbered.items()):
         progress.at(done / len(alignments), f"Solving alignment {done + 1} of {len(alignments)}")
         solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
-    pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
+    return conclude(
+        [(numbered[number], shifts) for number, shifts in solved.items()],
+        rig,
+        settings,
+        eye_distance=eye_distance,
+        contradictions=contradictions,
+        verified=verified,
+        plan=plan,
+        usable_eyes=usable_eyes,
+        numbers=tuple(solved),
+    )
+
+
+def conclude(
+    pairs: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]],
+    rig: Rig,
+    settings: SolveSettings,
+    *,
+    eye_distance: EyeDistance | None = None,
+    contradictions: Sequence[str] = (),
+    verified: Mapping[Eye, Verification] = MappingProxyType({}),
+    plan: PlanName | None = None,
+    usable_eyes: tuple[Eye, ...] = EYES,
+    numbers: Sequence[int] = (),
+) -> Results:
+    """Fuse and judge alignments that are solved already; as `solve_session`.
+
+    Parameters
+    ----------
+    pairs : sequence of (Alignment, mapping of eye to EyeShift)
+        As `solve_alignment` returns them.
+    numbers : sequence of int
+        Numbers of the alignments in the session; from 1 if empty.
+    """
     fused = fuse_alignments(pairs, rig, settings.fuse, eye_distance, verified)
-    done = [one.eyes for one in numbered.values()]
-    ahead = [] if plan is None else _upcoming(plan, done, usable_eyes)
+    aligned = [alignment.eyes for alignment, _ in pairs]
+    ahead = [] if plan is None else _upcoming(plan, aligned, usable_eyes)
     advice = {eye: advise(rig, fused, eye, settings.verdict, ahead) for eye in fused.shifts}
     measured = {
         eye: measured_arcmin(rig, fused, eye, verified[eye])
@@ -178,7 +211,9 @@ def solve_session(
     another_m2 = fused.covariance_after_m2(tuple(fused.shifts), 1)
     return Results(
         method=settings.method,
-        alignments=solved,
+        alignments=dict(
+            zip(numbers or range(1, len(pairs) + 1), (one for _, one in pairs), strict=True)
+        ),
         eyes=fused.shifts,
         verdicts=verdicts,
         eye_distance_m=eye_distance_m(rig, fused.shifts),
