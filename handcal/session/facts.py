@@ -18,6 +18,7 @@ from handcal.types import (
     EyePlan,
     HeadsetIdentity,
     Intrinsics,
+    PlanName,
     Verification,
 )
 
@@ -65,8 +66,10 @@ class SessionFacts:
 
     camera: CameraUsed | None = None
     headset: HeadsetIdentity | None = None
-    plan: EyePlan | None = None
-    """The order in which the eyes were aligned."""
+    plan: EyePlan | PlanName | None = None
+    """The plan that was followed, or only the order in which the eyes were aligned."""
+    former: str = ""
+    """Name of the session with whose φ this one began; empty if with none."""
     eye_distance: EyeDistance | None = None
     """Measured; the results were solved with it."""
     verified: Mapping[Eye, Verification] = field(default_factory=dict)

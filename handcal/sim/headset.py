@@ -26,7 +26,7 @@ from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.wire import VERSION, hkdf
 from handcal.rig.rig_file import read_rig
-from handcal.sim.hand import make_hand
+from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings
 from handcal.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
@@ -69,6 +69,8 @@ class HeadsetSettings:
     """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
     eye_distance_m: float | None = None
     """Eye distance that it reports; None: it measures none."""
+    side: Side | None = None
+    """The hand that is raised; None: as the seed has it."""
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
 
@@ -95,7 +97,7 @@ def run_headset(
     rig = read_rig(Path(settings.rig_path))
     worn_rig = read_rig(Path(settings.worn_rig_path or settings.rig_path))
     if settings.has_wearer:
-        hand = make_hand(settings.seed)
+        hand = make_hand(settings.seed, HandSettings(side=settings.side))
         act = _as_wearer(Wearer(settings.seed, worn_rig, hand, settings.wearer), rig)
     else:
         act = _at_keyboard()

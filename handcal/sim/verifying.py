@@ -25,6 +25,8 @@ _STEP_M = 1e-3
 _ACROSS = 0.5
 # Half a step either way is as good; a little more does not make the wearer press again.
 _CONTENT_STEPS = 0.75
+# The longest that a wearer waits for the effect of a key.
+_EFFECT_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +115,22 @@ class Check:
         self._look_s = look_s
         self._press_s = press_s
         self._next_s: float | None = None
+        self._waits_until_s = 0.0
+        self._drawn = np.empty(0)
         self._presses: list[tuple[float, float, float]] = []
         self.moved = NudgeSum()
 
-    def is_due(self, t_s: float) -> bool:
-        """Return whether the wearer looks or presses now; the first look takes its time."""
+    def is_due(self, t_s: float, drawn: Float64) -> bool:
+        """Return whether the wearer looks or presses now.
+
+        A look takes its time, and begins once the drawing has followed the keys and stands still.
+        """
         if self._next_s is None:
             self._next_s = t_s + self._look_s
-        return t_s >= self._next_s
+        if self.looks and not np.array_equal(drawn, self._drawn):
+            self._next_s, self._waits_until_s = t_s + self._look_s, 0.0
+        self._drawn = drawn
+        return t_s >= max(self._next_s, self._waits_until_s)
 
     @property
     def looks(self) -> bool:
@@ -131,6 +141,7 @@ class Check:
         """Press the next key; return all presses so far."""
         self.moved = self.moved.plus(*self._presses.pop())
         self._next_s = t_s + (self._press_s if self._presses else self._look_s)
+        self._waits_until_s = 0.0 if self._presses else t_s + _EFFECT_S
         return self.moved
 
     def look(self, t_s: float, seen: SeenDifference | None) -> bool:

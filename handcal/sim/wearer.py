@@ -50,6 +50,8 @@ class WearerSettings:
     """Each eye's own deviation along each axis."""
     largest_shift_m: float = 0.010
     """Eye box, to which longer shifts are shortened."""
+    slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Movement of both eyes before the headset since these were drawn, E axes: it has slipped."""
     raise_m: tuple[float, float, float] = (0.0, 0.048, 0.56)
     raise_spread_m: tuple[float, float, float] = (0.015, 0.006, 0.025)
     """Position of the raised palm relative to the midpoint of the viewpoints C0, in the head's
@@ -193,7 +195,7 @@ def draw_eyes(rng: np.random.Generator, settings: WearerSettings) -> dict[Eye, F
         shorten = settings.largest_shift_m / max(
             settings.largest_shift_m, float(np.linalg.norm(shift_m))
         )
-        shifts[eye] = shorten * shift_m
+        shifts[eye] = shorten * shift_m + settings.slip_m
     return shifts
 
 
@@ -301,11 +303,11 @@ class Wearer:
         self, check: Check, view: DisplayView, T_W_H: Float64, T_W_hand: Float64
     ) -> tuple[NudgeSum | None, bool]:
         """Return the presses made so far if one is made now, and whether the drawing fits."""
-        if view.outline_W_m is None or not check.is_due(view.t_s):
+        eye = check.request.eye
+        if view.outline_W_m is None or not check.is_due(view.t_s, view.P[eye]):
             return None, False
         if not check.looks:
             return check.press(view.t_s), False
-        eye = check.request.eye
         seen = see_difference(
             self._rig.eyes[eye],
             self.true_shift_m[eye],

@@ -19,6 +19,8 @@ from handcal.station.hold import merge_hold
 from handcal.station.states import CalibrationSettings, Observation
 from handcal.types import EYES, Alignment, Eye, Float64, Rig
 
+KEEP_PROMPT = "Keep your hand up."
+"""Shown while the next cursor or verification follows at once."""
 _SHAPE_EVERY_NS = 250_000_000
 """A measurement of the shape takes half of a frame's time, and nobody reads faster."""
 

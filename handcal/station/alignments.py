@@ -8,16 +8,18 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
 from handcal.errors import HandError
-from handcal.geometry import transform
+from handcal.geometry import invert, rigid, transform
 from handcal.hand.shipped import make_finder
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
+from handcal.register.results import SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
-from handcal.station.aligning import Accepted, Aligning, Refused, align_prompt
+from handcal.station.aligning import KEEP_PROMPT, Accepted, Aligning, Refused, align_prompt
 from handcal.station.drawing import Drawing
 from handcal.station.evidence import Contradiction, Evidence
 from handcal.station.hands import PlacedHand, RecentHands
@@ -55,6 +57,7 @@ class AlignmentSteps:
         self._hands = RecentHands(
             link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
         )
+        self.raised: PlacedHand | None = None
         self._aligning: Aligning | None = None
         self._cursor_id = 0
         self._items = NumberedItems[Alignment]("alignment", MAX_ALIGNMENTS)
@@ -92,6 +95,25 @@ class AlignmentSteps:
     def projection_acked(self) -> dict[Eye, bool]:
         """True for each eye whose newest projection the headset has acknowledged."""
         return self._drawing.acked
+
+    @property
+    def steady_hand(self) -> PlacedHand | None:
+        """The newest hand if it is in view and has hardly moved for a while, else None."""
+        return self._hands.steady()
+
+    @property
+    def newest_hand(self) -> PlacedHand | None:
+        """The newest hand unless it is too old for a confirmation."""
+        return self._hands.newest(self._settings.match_tolerance_s)
+
+    @property
+    def solve_settings(self) -> SolveSettings:
+        """Settings of the solver."""
+        return self._settings.solve
+
+    def T_W_H(self, hand: PlacedHand) -> Float64:
+        """Return the headset's pose (4, 4) when a hand was seen."""
+        return np.asarray(hand.T_W_D @ invert(self.rig.T_H_D))
 
     def step(self, frame: Frame) -> Observation:
         """Process a frame: find the hand, guide the alignment, handle a confirmation.
@@ -134,8 +156,13 @@ class AlignmentSteps:
             observation = self._guide(observation, self._aligning)
         return replace(observation, state=self.state)
 
-    def make_cursor(self, eyes: Sequence[Eye] = EYES) -> None:
+    def make_cursor(
+        self, eyes: Sequence[Eye] = EYES, displacement_W_m: ArrayLike | None = None
+    ) -> None:
         """Freeze the newest hand as cursor, to be aligned with the given eyes open.
+
+        With a displacement (3,), the cursor is the raised hand moved by it: the hand that was
+        frozen first since it was raised. The wearer keeps it up from one cursor to the next.
 
         Raises
         ------
@@ -151,7 +178,7 @@ class AlignmentSteps:
         """
         if self.state not in (State.SHOW_HAND, State.APPLIED, State.ALIGN):
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
-        hand = self._hands.steady()
+        hand = self.raised if displacement_W_m is not None and self.raised else self.steady_hand
         if hand is None:
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
@@ -167,7 +194,10 @@ class AlignmentSteps:
                 "the headset has not acknowledged its projections yet; wait a moment, "
                 "or restart its app"
             )
-        hand = merge_hold(self._hands.held_at(hand), hand)
+        if hand is not self.raised:
+            hand = merge_hold(self._hands.held_at(hand), hand)
+        self.raised = None if displacement_W_m is None else hand
+        hand = hand if displacement_W_m is None else _moved(hand, displacement_W_m)
         self._aligning = Aligning(hand, self._cursor_id + 1, tuple(eyes), self.rig, self._settings)
         self._cursor_id += 1
         self.eyes = tuple(eyes)
@@ -261,8 +291,20 @@ class AlignmentSteps:
         if not keeps_hand:
             # The wearer lowers the hand now: only a hand seen from here on can become a cursor.
             self._hands.clear()
+            self.raised = None
         self._link.send_cursor(np.empty((0, 3)), self._cursor_id)
-        self._link.send_prompt("", EYES)
+        self._link.send_prompt(KEEP_PROMPT if keeps_hand else "", EYES)
+
+
+def _moved(hand: PlacedHand, displacement_W_m: ArrayLike) -> PlacedHand:
+    """Return a hand at another place of the world."""
+    moved_m = np.asarray(displacement_W_m, dtype=np.float64)
+    return replace(
+        hand,
+        T_W_D=rigid(translation_m=moved_m) @ hand.T_W_D,
+        points_W_m=hand.points_W_m + moved_m,
+        middle_W_m=hand.middle_W_m + moved_m,
+    )
 
 
 def _earlier_evidence(resume: SessionRecord | None) -> list[Contradiction]:

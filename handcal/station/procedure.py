@@ -20,6 +20,8 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,7 +39,7 @@ from handcal.station.states import ProcedureError as ProcedureError
 from handcal.station.states import State as State
 from handcal.station.verifications import VerificationSteps
 from handcal.station.verifying import Verifying as Verifying
-from handcal.types import Eye, EyeDistance, Rig
+from handcal.types import EYES, Eye, EyeDistance, Float64, PlanName, Rig
 
 _UNSETTLED = (State.ALIGN, State.VERIFY, State.APPLYING)
 
@@ -60,6 +62,12 @@ class Calibration(VerificationSteps):
         The contents of `session`, to resume it.
     wearer : str
         Name or code, by which the headset keeps the projections.
+    plan : {"paper", "recommended"}, optional
+        The advice counts its next alignments.
+    usable_eyes : tuple of eye
+        One eye for a wearer who sees with one.
+    former_m : mapping of eye to (3,) array_like
+        φ of a stored session to begin with, in place of the offline calibration.
 
     Raises
     ------
@@ -96,14 +104,26 @@ class Calibration(VerificationSteps):
         settings: CalibrationSettings | None = None,
         resume: SessionRecord | None = None,
         wearer: str = "",
+        plan: PlanName | None = None,
+        usable_eyes: tuple[Eye, ...] = EYES,
+        former_m: Mapping[Eye, ArrayLike] = MappingProxyType({}),
     ) -> None:
         super().__init__(rig, link, session, settings or CalibrationSettings(), resume, wearer)
         self.results: Results | None = None
+        self._plan = plan
+        self._usable_eyes = usable_eyes
+        self._former_m = {eye: np.zeros(3) for eye in EYES} | as_shifts(former_m)
+        self._drawing.shift_m |= self._former_m
         self.eye_distance = None if resume is None else resume.facts.eye_distance
         self._apply_until_s = 0.0
         if resume is not None:
             self._resume(resume)
         self._drawing.send(self._drawing.shift_m)
+
+    @property
+    def former_shift_m(self) -> Mapping[Eye, Float64]:
+        """φ to which `go_back` returns: those before the newest ones."""
+        return MappingProxyType(dict(self._former_m))
 
     def redo(self) -> None:
         """Discard the present cursor, or else delete the last alignment and the results.
@@ -254,9 +274,39 @@ class Calibration(VerificationSteps):
             raise
         assert self.results is not None
         applied_m = self.results.rendered_shift_m
+        self._former_m = dict(self._drawing.shift_m)
         self._drawing.shift_m |= applied_m
         self.state = State.APPLIED
         self._store.write(lambda session: session.save_applied(applied_m))
+
+    def release_hand(self) -> None:
+        """Tell the wearer that the hand may be lowered; the next cursor needs another raise."""
+        self.raised = None
+        self._link.send_prompt("", EYES)
+
+    def go_back(self, to: Literal["offline", "former"]) -> None:
+        """Have the headset draw with the offline calibration, or with φ before the newest one.
+
+        A cursor, a verification and projections on their way are given up; the alignments stay.
+
+        Raises
+        ------
+        FileError
+            If the session cannot be written; the headset draws so anyway.
+        LinkError
+            If the link is closed.
+        """
+        back_m = {eye: np.zeros(3) for eye in EYES} if to == "offline" else dict(self._former_m)
+        if self.verifying is not None:
+            self._end_verifying(self.verifying.before_m)
+        former_m = dict(self._drawing.shift_m)
+        self._clear_cursor()
+        self._drawing.shift_m |= back_m
+        self._drawing.send(back_m)
+        self._former_m = former_m
+        self.state = State.APPLIED if self.state is State.APPLIED else State.SHOW_HAND
+        self._store.event("went_back", to=to)
+        self.record_shift()
 
     def set_shift(self, shifts_m: Mapping[Eye, ArrayLike]) -> list[Outgoing]:
         """Have the headset render with φ set by hand; an eye not given keeps its own.
@@ -315,6 +365,8 @@ class Calibration(VerificationSteps):
             eye_distance=self.eye_distance,
             contradictions=[one.text for one in self.evidence.contradictions],
             verified=self.verifications,
+            plan=self._plan,
+            usable_eyes=self._usable_eyes,
         )
         return self.results
 

@@ -132,6 +132,7 @@ def solve_again(
             eye_distance=eye_distance or record.facts.eye_distance,
             contradictions=record.facts.contradictions,
             verified=record.facts.verified,
+            plan="recommended" if record.facts.plan == "recommended" else None,
         )
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error

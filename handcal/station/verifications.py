@@ -11,6 +11,7 @@ from handcal.geometry import transform
 from handcal.link.nudges import VerifyRequest
 from handcal.link.server import HeadsetServer, Nudge
 from handcal.session.session import Session, SessionRecord
+from handcal.station.aligning import KEEP_PROMPT
 from handcal.station.alignments import AlignmentSteps
 from handcal.station.hands import PlacedHand
 from handcal.station.hold import merge_hold
@@ -182,9 +183,9 @@ class VerificationSteps(AlignmentSteps, ABC):
         if observation.hand is not None:
             outline_W_m = transform(observation.hand.T_W_D, observation.hand.cloud.contour_m)
             self._link.send_live_hand(outline_W_m, False, (verifying.eye,), is_outline=True)
-        for nudge in self._link.nudges():
-            if nudge.verify_id == verifying.request.verify_id:
-                self._hear(nudge, verifying)
+        verify_id = verifying.request.verify_id
+        if heard := [one for one in self._link.nudges() if one.verify_id == verify_id]:
+            self._hear(heard[-1], verifying)  # it has the sums of all
         fits = verifying.fits
         if fits is None or self._hands.placed_until_ns() < fits.t_host_ns:
             return
@@ -236,4 +237,4 @@ class VerificationSteps(AlignmentSteps, ABC):
         self._drawing.shift_m[verifying.eye] = shift_m
         self._drawing.send({verifying.eye: shift_m})
         self._link.send_verify(None)
-        self._link.send_prompt("", EYES)
+        self._link.send_prompt(KEEP_PROMPT, EYES)

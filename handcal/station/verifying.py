@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,20 @@ _ENDS = (
     SessionEvent.FINISHED,
 )
 """Events after which a verification does not go on."""
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyingView:
+    """A verification while it goes on."""
+
+    eye: Eye
+    moved: NudgeSum
+    """All movement of the drawing so far: the error that was left, as far as it is found."""
+    before_m: tuple[float, float, float]
+    shift_m: tuple[float, float, float]
+    """φ before the verification, and with the movement so far."""
+    can_undo: bool
+    can_redo: bool
 
 
 class Verifying:
@@ -84,15 +99,16 @@ class Verifying:
         """The eye that is verified."""
         return self.request.eye
 
-    @property
-    def can_undo(self) -> bool:
-        """True if there is a nudge to undo."""
-        return bool(self._done)
-
-    @property
-    def can_redo(self) -> bool:
-        """True if there is a nudge to redo."""
-        return bool(self._undone)
+    def view(self) -> VerifyingView:
+        """Return the verification as it is now."""
+        return VerifyingView(
+            self.eye,
+            self.moved,
+            _triple(self.before_m),
+            _triple(self.shift_m),
+            can_undo=bool(self._done),
+            can_redo=bool(self._undone),
+        )
 
     def nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
         """Move the drawing; ValueError if it is moved too far."""
@@ -171,8 +187,7 @@ class Verifying:
 
 def hand_centre_E_m(rig: Rig, eye: Eye, hand: PlacedHand) -> Float64:
     """Return the centre (3,) of a hand in an eye's E."""
-    T_W_H = hand.T_W_D @ invert(rig.T_H_D)
-    T_E_W = view_of_eye(rig.eyes[eye], T_W_H)
+    T_E_W = view_of_eye(rig.eyes[eye], hand.T_W_D @ invert(rig.T_H_D))
     return np.asarray(transform(T_E_W, hand.points_W_m).mean(axis=0))
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from handcal.display import arcmin_from_px, eye_projection, projection_matrix, view_of_eye
 from handcal.geometry import invert, project, rigid, transform
-from handcal.lab.methods.spaam import solve_spaam
-from handcal.lab.study.methods import rendered, target_errors
-from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
+from handcal.lab.study.wearers import StudyWearer
 from handcal.register.fuse import FuseSettings
 from handcal.register.guard import GuardSettings
 from handcal.register.nudge import nudged_shift_m
@@ -23,8 +21,6 @@ from handcal.register.solve import solve_alignment
 from handcal.register.surface import describe_surface
 from handcal.sim.people import (
     Sitting,
-    Variant,
-    begin_sitting,
     draw_error,
     draw_movement_m,
     draw_perception,
