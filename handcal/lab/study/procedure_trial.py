@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from handcal.display import arcmin_from_px, eye_projection, projection_matrix, view_of_eye
 from handcal.geometry import invert, project, rigid, transform
-from handcal.lab.methods.spaam import solve_spaam
-from handcal.lab.study.methods import rendered, target_errors
-from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
+from handcal.lab.study.wearers import StudyWearer
 from handcal.register.fuse import FuseSettings
 from handcal.register.guard import GuardSettings
 from handcal.register.nudge import nudged_shift_m
@@ -23,8 +21,6 @@ from handcal.register.solve import solve_alignment
 from handcal.register.surface import describe_surface
 from handcal.sim.people import (
     Sitting,
-    Variant,
-    begin_sitting,
     draw_error,
     draw_movement_m,
     draw_perception,
@@ -41,21 +37,15 @@ from handcal.types import (
     EyeDistance,
     EyeShift,
     Float64,
-    Intrinsics,
     PlanName,
     Verification,
 )
 
 EyeDistanceSource: TypeAlias = Literal["none", "ruler", "headset"]
 
-# A D415's smaller images, which are drawn three times as fast, show enough points.
-_CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
 _OUTLINE_FROM_POINTS = 1500
 _FOREARM_M = 0.04
 _EYE_DISTANCE_SIGMA_M = 0.001
-# As `MethodSettings.pointing_sigma_arcmin`, for errors of 1.33 times the usual.
-_POINTING_ARCMIN, _POINTING_SCALE = 5.9, 1.33
-_TARGET_DEPTHS_M = 0.4, 0.5, 0.6
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings, output_folder
+from handcal.lab.settings import (
+    MethodComparisonSettings,
+    NoiseStudySettings,
+    ProcedureStudySettings,
+    output_folder,
+)
 from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
 from handcal.lab.study.methods_report import methods_report
 from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
 from handcal.lab.study.noise_report import noise_report
+from handcal.lab.study.procedures import ProcedureRow, procedure_cases, procedure_rows
 from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
@@ -53,6 +60,26 @@ def run_method_comparison(settings: MethodComparisonSettings, progress: Progress
     noise = fit_noise(study.settings, settings.noise_wearers, progress.part(0.0, 0.0))
     study = methods_study(replace(study.settings, noise_scale=noise.scale))
     return replace(run_and_report(study, methods_report, settings, progress), noise=noise)
+
+
+def run_procedure_study(settings: ProcedureStudySettings, progress: Progress) -> list[ProcedureRow]:
+    """Run or resume a study of procedures.
+
+    Raises
+    ------
+    HandcalError
+        If a plan, variant or scale is unknown; otherwise as `run_study`.
+    """
+    study = procedure_cases(settings, progress)
+    with TemporaryDirectory() as scratch:
+        rows = run_study(
+            study,
+            output_folder(settings.output or scratch),
+            workers=settings.processes or None,
+            scheduler=settings.scheduler or None,
+            progress=progress,
+        )
+    return procedure_rows(rows)
 
 
 def noise_cases(settings: NoiseStudySettings) -> Study:
