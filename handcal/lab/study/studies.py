@@ -21,6 +21,7 @@ from handcal.lab.study.noise_report import noise_report
 from handcal.lab.study.procedures import ProcedureRow, procedure_cases, procedure_rows
 from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
+from handcal.lab.study.trials import BEST_ITERATE
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
 from handcal.progress import Progress
 from handcal.report.document import Report
@@ -39,6 +40,8 @@ class StudyResult:
     """The report as PDF and as HTML."""
     noise: NoiseFit | None = None
     """Result of the search for the noise; None without a search."""
+    best_noise: NoiseFit | None = None
+    """The same, by the best iterate of the paper's method."""
 
 
 def run_noise_study(settings: NoiseStudySettings, progress: Progress) -> StudyResult:
@@ -57,9 +60,11 @@ def run_method_comparison(settings: MethodComparisonSettings, progress: Progress
     study = method_cases(settings)
     if not settings.noise_wearers:
         return run_and_report(study, methods_report, settings, progress)
-    noise = fit_noise(study.settings, settings.noise_wearers, progress.part(0.0, 0.0))
+    searching = study.settings, settings.noise_wearers, progress.part(0.0, 0.0)
+    noise, best = fit_noise(*searching), fit_noise(*searching, BEST_ITERATE)
     study = methods_study(replace(study.settings, noise_scale=noise.scale))
-    return replace(run_and_report(study, methods_report, settings, progress), noise=noise)
+    result = run_and_report(study, methods_report, settings, progress)
+    return replace(result, noise=noise, best_noise=best)
 
 
 def run_procedure_study(settings: ProcedureStudySettings, progress: Progress) -> list[ProcedureRow]:
@@ -129,6 +134,8 @@ def run_and_report(
         progress=progress.part(0.0, STUDY_SHARE),
     )
     report = report_of(study.settings, rows)
+    if settings.size == "quick":
+        report = replace(report, lead="A quick look: too few trials for figures to report.")
     writing = progress.part(STUDY_SHARE, 1.0, "Writing the report")
     with resumable():
         files = write_report(folder, report, writing)
