@@ -22,7 +22,7 @@ from handcal.register.prior import EyePrior, eye_prior, posterior
 from handcal.register.results import Results, SolveSettings
 from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
-from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig
+from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
 
 _OUTLINE_FROM_POINTS = 1500
 # Of a registration, where none was made yet: small beside the wearer's own error.
@@ -33,9 +33,9 @@ _REGISTRATION_SIGMA_M = 3e-4
 class PlacementSettings:
     """Places of cursors, and the number of alignments."""
 
-    nearest_m: float = 0.45
-    """Least distance of the hand from the camera, along its axis: a D415 measures nothing nearer
-    at 1280x720 unless a disparity shift is set."""
+    nearest_m: float = 0.44
+    """Least distance of the hand from the camera, along its axis: at 1280x720 a D415, with 1005 px,
+    55 mm and 126 disparities, measures nothing nearer unless a disparity shift is set."""
     farthest_m: float = 0.75
     """Largest such distance."""
     aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
@@ -44,10 +44,13 @@ class PlacementSettings:
     """Places to choose from, beyond the nearest."""
     shown_share: float = 0.6
     """Least share of the hand's outline within each display that is used."""
-    fewest: int = 3
+    fewest: int = 2
     """Alignments of the recommended plan before the eyes are verified."""
-    most: int = 10
+    most: int = 6
     """Alignments after which no other is planned."""
+    checks: int = 2
+    """Largest number of verifications of one eye: the second is for an eye that the first does not
+    lead to *accept*. People see two outlines coincide better than they hold a hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +82,8 @@ def next_alignment(
     """Return a plan's next alignment, or None if none is needed now or the most were made.
 
     Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
-    in turn, each cursor where it tells most. None is needed once every eye is accepted, or is
-    expected to be after its verification.
+    in turn, each cursor where it tells most. None is needed before each eye is verified
+    (`next_check`), nor once every eye is accepted or keeps its offline calibration.
 
     Parameters
     ----------
@@ -110,7 +113,7 @@ def next_alignment(
         If nearly all points of the hand lie at cut edges.
     """
     fewest = settings.fewest if plan == "recommended" else 1
-    is_enough = results is not None and _is_enough(results, usable_eyes)
+    is_enough = results is not None and _is_enough(plan, results, usable_eyes)
     if len(done) >= settings.most or (len(done) >= fewest and is_enough):
         return None
     eyes = planned_eyes(plan, done, usable_eyes)
@@ -137,13 +140,37 @@ def next_alignment(
     )
 
 
-def _is_enough(results: Results, usable_eyes: Sequence[Eye]) -> bool:
-    """Return whether every eye is accepted or kept, or expected to be accepted once verified."""
-    return set(results.verdicts) >= set(usable_eyes) and all(
-        verdict.name != "repeat"
-        or (eye in results.advice and results.advice[eye].is_accepted_once_verified)
-        for eye, verdict in results.verdicts.items()
-    )
+def next_check(
+    results: Results | None,
+    verified: Mapping[Eye, Verification],
+    *,
+    usable_eyes: tuple[Eye, ...] = EYES,
+    settings: PlacementSettings = PlacementSettings(),
+) -> Eye | None:
+    """Return the eye to verify next in the recommended plan, or None if none is to be.
+
+    Each eye once, then each eye again that is not accepted. To be asked when `next_alignment` plans
+    nothing, and again after each check.
+    """
+    if results is None:
+        return None
+    counts = {eye: len(one.earlier) + 1 for eye, one in verified.items()}
+    wanted = [
+        eye
+        for eye in usable_eyes
+        if eye in results.verdicts
+        and counts.get(eye, 0) < settings.checks
+        and (eye not in counts or results.verdicts[eye].name in ("repeat", "keep"))
+    ]
+    return min(wanted, key=lambda eye: counts.get(eye, 0), default=None)
+
+
+def _is_enough(plan: PlanName, results: Results, usable_eyes: Sequence[Eye]) -> bool:
+    """Return whether no alignment is needed now: every eye is accepted or kept, or not verified."""
+    if not set(results.verdicts) >= set(usable_eyes):
+        return False
+    may_verify = plan == "recommended" and not set(results.fused.verified) >= set(usable_eyes)
+    return may_verify or all(one.name != "repeat" for one in results.verdicts.values())
 
 
 def _places(
@@ -223,7 +250,7 @@ def _expected_arcmin(
     if results is not None:
         fused = results.fused
         prior, scale = fused.prior, fused.wearer_scale
-        known = [*fused.observed, *fused.verified.values()]
+        known = list(fused.all_observed)
     known.append(Observation(H, np.zeros(3), registration_m2, wearer_m2))
     _, covariance_m2 = posterior(prior, [one.at(scale) for one in known])
     return float(
