@@ -3,7 +3,8 @@
 The wearer raises the hand once. Every cursor is that hand, moved: to where, by the posterior's
 covariance, an alignment lowers the expected error of both eyes most. The same slip of the wearer
 moves φ less the nearer the hand is, so this is as near as the camera can measure, and where the
-displays show enough of the hand.
+displays show enough of the hand. The cursor is drawn from one view of the camera, so the hand also
+stays near the camera's line of sight to it.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ from handcal.register.verdict import planned_eyes
 from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
 
 _OUTLINE_FROM_POINTS = 1500
-# Of a registration, where none was made yet: small beside the wearer's own error.
+# Error of a registration, and its growth with the angle by which the camera sees the moved hand
+# from another side: its outline is then other points, on a rim of about this radius.
 _REGISTRATION_SIGMA_M = 3e-4
+_RIM_M = 0.010
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +42,7 @@ class PlacementSettings:
     farthest_m: float = 0.75
     """Largest such distance."""
     aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
-    """Places to choose from, to the right of the middle of the displays that are used."""
+    """Places to choose from, to the right of the camera's line of sight to the raised hand."""
     depths_m: tuple[float, ...] = (0.0, 0.04, 0.08)
     """Places to choose from, beyond the nearest."""
     shown_share: float = 0.6
@@ -126,9 +129,7 @@ def next_alignment(
     if not places:
         return Planned(eyes, np.zeros(3), "no other place is on the displays and in camera range")
     errors = [
-        _expected_arcmin(
-            raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, results, solve
-        )
+        _expected_arcmin(raised_m, outline_m, place, rig, eyes, drawn_shift_m, results, solve)
         for place in places
     ]
     best = int(np.argmin(errors))
@@ -183,22 +184,18 @@ def _places(
 ) -> list[Float64]:
     """Return displacements of the raised hand, in H, to places that displays and camera allow.
 
-    The hand stays at its height on the displays: it moves along the line of sight of the eyes'
-    middle, and aside.
+    The hand moves along the camera's line of sight, so that the camera sees the same side of it,
+    and a little aside.
     """
-    viewpoints_m = [invert(view_of_eye(rig.eyes[eye], np.eye(4)))[:3, 3] for eye in eyes]
-    middle_m = np.mean(viewpoints_m, axis=0)
-    centre_m = raised_m.mean(axis=0)
-    line_m = centre_m - middle_m
+    camera_m = rig.T_H_D[:3, 3]
+    line_m = raised_m.mean(axis=0) - camera_m
     depth_m = transform(invert(rig.T_H_D), raised_m)[:, 2].min()
     # Movement along the line of sight changes the depth before the camera at this rate.
     rate = float((rig.T_H_D[:3, :3].T @ line_m)[2])
     places = []
     for aside_m, beyond_m in product(settings.aside_m, settings.depths_m):
         ratio = 1.0 + (settings.nearest_m + beyond_m - depth_m) / rate
-        goal_m = middle_m + ratio * line_m
-        goal_m[0] = middle_m[0] + aside_m
-        place = goal_m - centre_m
+        place = (ratio - 1.0) * line_m + [aside_m, 0.0, 0.0]
         if _is_visible(raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, settings):
             places.append(place)
     return places
@@ -232,21 +229,27 @@ def _is_visible(
 
 
 def _expected_arcmin(
-    hand_m: Float64,
+    raised_m: Float64,
     outline_m: Float64,
+    place: Float64,
     rig: Rig,
     eyes: Sequence[Eye],
     drawn_shift_m: Mapping[Eye, Float64],
     results: Results | None,
     solve: SolveSettings,
 ) -> float:
-    """Return the error to expect on the mean of both eyes after an alignment at a place."""
+    """Return the error to expect on the mean of both eyes after an alignment at a displacement."""
     T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
-    H, wearer_m2 = seen_by(hand_m, outline_m, T_E_H, drawn_shift_m, eyes, rig, solve.fuse)
+    H, wearer_m2 = seen_by(
+        raised_m + place, outline_m + place, T_E_H, drawn_shift_m, eyes, rig, solve.fuse
+    )
     prior: EyePrior = eye_prior(solve.fuse.prior)
     known: list[Observation] = []
     scale = 1.0
-    registration_m2 = _REGISTRATION_SIGMA_M**2 * np.eye(3)
+    line_m = raised_m.mean(axis=0) - rig.T_H_D[:3, 3]
+    before, now = (ray / np.linalg.norm(ray) for ray in (line_m, line_m + place))
+    turned_rad = float(np.linalg.norm(now - before))
+    registration_m2 = (_REGISTRATION_SIGMA_M**2 + (_RIM_M * turned_rad) ** 2) * np.eye(3)
     if results is not None:
         fused = results.fused
         prior, scale = fused.prior, fused.wearer_scale
