@@ -1,0 +1,268 @@
+"""The next alignment of a plan: the eyes to keep open, and the place of the cursor.
+
+The wearer raises the hand once. Every cursor is that hand, moved: to where, by the posterior's
+covariance, an alignment lowers the expected error of both eyes most. The same slip of the wearer
+moves φ less the nearer the hand is, so this is as near as the camera can measure, and where the
+displays show enough of the hand. The cursor is drawn from one view of the camera, so the hand also
+stays near the camera's line of sight to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from handcal.display import eye_projection, view_of_eye
+from handcal.geometry import image_points, invert, project, transform
+from handcal.register.benefit import expected_arcmin
+from handcal.register.fuse import Observation, eye_slice, seen_by
+from handcal.register.prior import EyePrior, eye_prior, posterior
+from handcal.register.results import Results, SolveSettings
+from handcal.register.surface import describe_surface
+from handcal.register.verdict import planned_eyes
+from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
+
+_OUTLINE_FROM_POINTS = 1500
+# Error of a registration, and its growth with the angle by which the camera sees the moved hand
+# from another side: its outline is then other points, on a rim of about this radius.
+_REGISTRATION_SIGMA_M = 3e-4
+_RIM_M = 0.010
+
+
+@dataclass(frozen=True, slots=True)
+class PlacementSettings:
+    """Places of cursors, and the number of alignments."""
+
+    nearest_m: float = 0.44
+    """Least distance of the hand from the camera, along its axis: at 1280x720 a D415, with 1005 px,
+    55 mm and 126 disparities, measures nothing nearer unless a disparity shift is set."""
+    farthest_m: float = 0.75
+    """Largest such distance."""
+    aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
+    """Places to choose from, to the right of the camera's line of sight to the raised hand."""
+    depths_m: tuple[float, ...] = (0.0, 0.04, 0.08)
+    """Places to choose from, beyond the nearest."""
+    shown_share: float = 0.6
+    """Least share of the hand's outline within each display that is used."""
+    fewest: int = 2
+    """Alignments of the recommended plan before the eyes are verified."""
+    most: int = 6
+    """Alignments after which no other is planned."""
+    checks: int = 2
+    """Largest number of verifications of one eye: the second is for an eye that the first does not
+    lead to *accept*. People see two outlines coincide better than they hold a hand."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Planned:
+    """The next alignment."""
+
+    eyes: tuple[Eye, ...]
+    """Eyes to keep open."""
+    displacement_W_m: Float64
+    """(3,); from the raised hand to its cursor."""
+    reason: str
+    """One line."""
+
+
+def next_alignment(
+    raised_W_m: Float64,
+    raised_is_cut: Bool,
+    T_W_H: Float64,
+    rig: Rig,
+    results: Results | None,
+    done: Sequence[tuple[Eye, ...]],
+    drawn_shift_m: Mapping[Eye, Float64],
+    *,
+    plan: PlanName = "recommended",
+    usable_eyes: tuple[Eye, ...] = EYES,
+    settings: PlacementSettings = PlacementSettings(),
+    solve: SolveSettings,
+) -> Planned | None:
+    """Return a plan's next alignment, or None if none is needed now or the most were made.
+
+    Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
+    in turn, each cursor where it tells most. None is needed before each eye is verified
+    (`next_check`), nor once every eye is accepted or keeps its offline calibration.
+
+    Parameters
+    ----------
+    raised_W_m : (N, 3) float64
+        The raised hand.
+    raised_is_cut : (N,) bool
+        True beside a cut edge.
+    T_W_H : (4, 4) float64
+        The headset's pose.
+    rig : Rig
+    results : Results or None
+        Of the alignments so far, solved with the same plan; None before the first.
+    done : sequence of tuple of eye
+        The open eyes of each alignment so far.
+    drawn_shift_m : mapping of eye to (3,) float64
+        φ that the cursor will be drawn with.
+    plan : {"recommended", "paper"}
+    usable_eyes : tuple of eye
+        One eye for a wearer who sees with one.
+    settings : PlacementSettings
+    solve : SolveSettings
+        Its prior and precision of a wearer count before the first alignment.
+
+    Raises
+    ------
+    HandError
+        If nearly all points of the hand lie at cut edges.
+    """
+    fewest = settings.fewest if plan == "recommended" else 1
+    is_enough = results is not None and _is_enough(plan, results, usable_eyes)
+    if len(done) >= settings.most or (len(done) >= fewest and is_enough):
+        return None
+    eyes = planned_eyes(plan, done, usable_eyes)
+    if plan == "paper":
+        return Planned(eyes, np.zeros(3), "the cursor is where the hand is")
+    raised_m = transform(invert(T_W_H), raised_W_m)
+    surface = describe_surface(raised_m, raised_is_cut, _OUTLINE_FROM_POINTS)
+    outline_m = surface.points_m[surface.outline]
+    places = _places(raised_m, outline_m, rig, eyes, drawn_shift_m, settings)
+    if not places:
+        return Planned(eyes, np.zeros(3), "no other place is on the displays and in camera range")
+    errors = [
+        _expected_arcmin(raised_m, outline_m, place, rig, eyes, drawn_shift_m, results, solve)
+        for place in places
+    ]
+    best = int(np.argmin(errors))
+    which = "both eyes" if len(eyes) > 1 else f"the {eyes[0]} eye"
+    return Planned(
+        eyes,
+        T_W_H[:3, :3] @ places[best],
+        f"{errors[best]:.1f}′ expected after an alignment with {which} here",
+    )
+
+
+def next_check(
+    results: Results | None,
+    verified: Mapping[Eye, Verification],
+    *,
+    usable_eyes: tuple[Eye, ...] = EYES,
+    settings: PlacementSettings = PlacementSettings(),
+) -> Eye | None:
+    """Return the eye to verify next in the recommended plan, or None if none is to be.
+
+    Each eye once, then each eye again that is not accepted. To be asked when `next_alignment` plans
+    nothing, and again after each check.
+    """
+    if results is None:
+        return None
+    counts = {eye: len(one.earlier) + 1 for eye, one in verified.items()}
+    wanted = [
+        eye
+        for eye in usable_eyes
+        if eye in results.verdicts
+        and counts.get(eye, 0) < settings.checks
+        and (eye not in counts or results.verdicts[eye].name in ("repeat", "keep"))
+    ]
+    return min(wanted, key=lambda eye: counts.get(eye, 0), default=None)
+
+
+def _is_enough(plan: PlanName, results: Results, usable_eyes: Sequence[Eye]) -> bool:
+    """Return whether no alignment is needed now: every eye is accepted or kept, or not verified."""
+    if not set(results.verdicts) >= set(usable_eyes):
+        return False
+    may_verify = plan == "recommended" and not set(results.fused.verified) >= set(usable_eyes)
+    return may_verify or all(one.name != "repeat" for one in results.verdicts.values())
+
+
+def _places(
+    raised_m: Float64,
+    outline_m: Float64,
+    rig: Rig,
+    eyes: Sequence[Eye],
+    drawn_shift_m: Mapping[Eye, Float64],
+    settings: PlacementSettings,
+) -> list[Float64]:
+    """Return displacements of the raised hand, in H, to places that displays and camera allow.
+
+    The hand moves along the camera's line of sight, so that the camera sees the same side of it,
+    and a little aside.
+    """
+    camera_m = rig.T_H_D[:3, 3]
+    line_m = raised_m.mean(axis=0) - camera_m
+    depth_m = transform(invert(rig.T_H_D), raised_m)[:, 2].min()
+    # Movement along the line of sight changes the depth before the camera at this rate.
+    rate = float((rig.T_H_D[:3, :3].T @ line_m)[2])
+    places = []
+    for aside_m, beyond_m in product(settings.aside_m, settings.depths_m):
+        ratio = 1.0 + (settings.nearest_m + beyond_m - depth_m) / rate
+        place = (ratio - 1.0) * line_m + [aside_m, 0.0, 0.0]
+        if _is_visible(raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, settings):
+            places.append(place)
+    return places
+
+
+def _is_visible(
+    hand_m: Float64,
+    outline_m: Float64,
+    rig: Rig,
+    eyes: Sequence[Eye],
+    drawn_shift_m: Mapping[Eye, Float64],
+    settings: PlacementSettings,
+) -> bool:
+    """Return whether a hand in H is in the camera's range and view, and on the displays."""
+    hand_D_m = transform(invert(rig.T_H_D), hand_m)
+    low_m, high_m = hand_D_m[:, 2].min(), hand_D_m[:, 2].max()
+    if low_m < settings.nearest_m - 1e-3 or high_m > settings.farthest_m:
+        return False
+    camera = rig.depth_intrinsics
+    pixels = image_points(hand_D_m, camera)
+    if not ((pixels >= 0.0) & (pixels <= [camera.width - 1, camera.height - 1])).all():
+        return False
+    for eye in eyes:
+        display = rig.eyes[eye]
+        drawn = eye_projection(display, drawn_shift_m[eye]) @ view_of_eye(display, np.eye(4))
+        pixels = project(drawn, outline_m)
+        last_px = display.width_px - 0.5, display.height_px - 0.5
+        if ((pixels >= -0.5) & (pixels <= last_px)).all(axis=1).mean() < settings.shown_share:
+            return False
+    return True
+
+
+def _expected_arcmin(
+    raised_m: Float64,
+    outline_m: Float64,
+    place: Float64,
+    rig: Rig,
+    eyes: Sequence[Eye],
+    drawn_shift_m: Mapping[Eye, Float64],
+    results: Results | None,
+    solve: SolveSettings,
+) -> float:
+    """Return the error to expect on the mean of both eyes after an alignment at a displacement."""
+    T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
+    H, wearer_m2 = seen_by(
+        raised_m + place, outline_m + place, T_E_H, drawn_shift_m, eyes, rig, solve.fuse
+    )
+    prior: EyePrior = eye_prior(solve.fuse.prior)
+    known: list[Observation] = []
+    scale = 1.0
+    line_m = raised_m.mean(axis=0) - rig.T_H_D[:3, 3]
+    before, now = (ray / np.linalg.norm(ray) for ray in (line_m, line_m + place))
+    turned_rad = float(np.linalg.norm(now - before))
+    registration_m2 = (_REGISTRATION_SIGMA_M**2 + (_RIM_M * turned_rad) ** 2) * np.eye(3)
+    if results is not None:
+        fused = results.fused
+        prior, scale = fused.prior, fused.wearer_scale
+        known = list(fused.all_observed)
+    known.append(Observation(H, np.zeros(3), registration_m2, wearer_m2))
+    _, covariance_m2 = posterior(prior, [one.at(scale) for one in known])
+    return float(
+        np.mean(
+            [
+                expected_arcmin(
+                    rig.eyes[eye], np.zeros(3), covariance_m2[eye_slice(eye), eye_slice(eye)]
+                )
+                for eye in EYES
+            ]
+        )
+    )
