@@ -15,6 +15,7 @@ from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.greetings import Refusal
+from handcal.link.invitation import Invitation
 from handcal.link.messages import Owner
 from handcal.link.reliable import Receipt
 from handcal.link.wire import Keys, Packet, Slot, Welcome
@@ -23,6 +24,7 @@ from tests.helpers import ROOT
 
 PATH = ROOT / "docs/protocol_vectors.json"
 KEY = b"a pairing key of the vectors"
+INVITATION = Invitation("192.168.1.20", 47800, "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
 DEVICE_ID = "0123456789abcdef"
 DEVICE = int(DEVICE_ID, 16)
 NONCE, PC_NONCE, COOKIE = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
@@ -79,6 +81,7 @@ def build() -> dict[str, Any]:
     return {
         "protocol": wire.VERSION,
         "pairing_key": KEY.decode(),
+        "invitation": INVITATION.text,
         "device_id": DEVICE_ID,
         "headset_nonce": NONCE.hex(),
         "pc_nonce": PC_NONCE.hex(),
