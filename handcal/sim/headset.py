@@ -179,6 +179,7 @@ def _told(state: HeadsetState) -> str:
         "" if state.live_W_m is None else f"live {'outline' if state.is_outline else 'hand'}",
         "" if state.target is None else f"target for the {state.target.eye} eye",
         "" if state.shape is None else f"shape of {len(state.shape.corners_W_m)} corners",
+        "" if state.verify is None else f"verify the {state.verify.eye} eye",
         f"open: {' and '.join(state.eyes)}",
         state.prompt,
     ]
