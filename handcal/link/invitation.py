@@ -33,6 +33,8 @@ class Invitation:
     port: int
     code: str
     """One-time code, which becomes the device's pairing key."""
+    digits: str = ""
+    """Short code for a headset that knows the address; not part of the QR code."""
 
     @property
     def text(self) -> str:
