@@ -113,9 +113,16 @@ COMMANDS: Mapping[str, Entry] = {
     "demo": Entry(
         "Calibrate a simulated wearer from start to end, and compare with the truth.", "simulate"
     ),
+    "run": Entry(
+        "Calibrate one wearer without a window, for scripts and for testing headset apps.", "run"
+    ),
     "headset": Entry(
         "Run a virtual headset with a simulated wearer, connected by the real protocol.", "simulate"
     ),
+    "pair": Entry(
+        "Pair a headset: show a QR code and a short code, and wait for the headset.", "pairing"
+    ),
+    "devices": Entry("List the paired headsets; rename or revoke one, by its identity.", "pairing"),
     "record": Entry("Record a camera into a .db3 file or a folder of images.", "cameras"),
     "replay": Entry("Play a recording and segment the hand in every frame.", "cameras"),
     "segment": Entry(

@@ -102,6 +102,8 @@ class Pairing:
             device_number(self.device_id)
         if len(self.name) > MAX_NAME_CHARACTERS:
             raise ValueError(f"a device's name has at most {MAX_NAME_CHARACTERS} characters")
+        if not all(character >= " " for character in self.name):
+            raise ValueError("a device's name has no control characters")
 
 
 class Pairings:

@@ -82,12 +82,14 @@ COMMANDS = {
     "study methods": "--quick --workers 1 --output OUTPUT",
     "bench": "--quick --json OUTPUT/bench.json",
     "doctor": "",
+    "devices": "",
+    "run": "--headset virtual --camera simulator --rig SMALL --output OUTPUT",
 }
 SLOW = {"study noise", "study methods", "bench", "evaluate cube simulate"}
 NEED_MORE = {
     "replay", "evaluate cube capture", "evaluate cube report", "evaluate detector",
     "study recorded", "rig take", "rig camera", "rig stereo", "rig convert", "rig display",
-    "rig make", "rig depth", "evaluate segmentation",
+    "rig make", "rig depth", "evaluate segmentation", "pair",
 }  # fmt: skip
 """Commands whose input would have to be made first; they write as those above."""
 

@@ -19,6 +19,10 @@ def test_a_pc_is_found_while_it_is_announced() -> None:
     assert "lab 3" not in names
 
 
-def test_an_unknown_interface_is_one_clear_line() -> None:
-    with pytest.raises(LinkError, match="cannot use multicast"):
+def test_a_network_without_multicast_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(**_: object) -> None:
+        raise OSError("no such device")
+
+    monkeypatch.setattr("handcal.link.discovery.Zeroconf", refuse)
+    with pytest.raises(LinkError, match="cannot use multicast on the local network: no such"):
         find_pcs(0.1, "192.0.2.77")
