@@ -89,6 +89,10 @@ _RIG: Mapping[str, Entry] = {
         "Check the depth camera against a board at several distances, and put it into a rig file.",
         "rig_files",
     ),
+    "obey": Entry(
+        "Check that a connected headset draws what it is sent, and put that into a rig file.",
+        "display_check",
+    ),
     "check": Entry(
         "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
     ),

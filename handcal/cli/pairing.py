@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from handcal.cli.output import console, show_progress, table, until_interrupted
+from handcal.cli.run import LISTEN
 from handcal.cli.terminal import arg, command, fail, number
 
 _KEYS = arg(
@@ -20,8 +21,7 @@ _KEYS = arg(
 
 @command(
     _KEYS,
-    arg("--host", default="0.0.0.0", metavar="ADDRESS", help="address to listen on"),  # noqa: S104
-    arg("--port", type=number(int, 1, 65535), metavar="N", default=47800, help="UDP port"),
+    *LISTEN,
     arg(
         "--minutes",
         type=number(float, 0.01, 10.0),

@@ -17,6 +17,17 @@ from handcal.io.files import make_folder
 if TYPE_CHECKING:
     from handcal.link.pairing import Pairings
 
+LISTEN = (
+    arg("--host", default="0.0.0.0", metavar="ADDRESS", help="address to listen on"),  # noqa: S104
+    arg("--port", type=number(int, 1, 65535), metavar="N", default=47800, help="UDP port"),
+)
+KEYS = arg(
+    "--keys",
+    type=Path,
+    metavar="FILE",
+    help="file of the paired headsets (default: the key in the environment variable "
+    "HANDCAL_PAIRING_KEY, else the file of the desktop program)",
+)
 _CONTRADICTED = 3
 _SHARE = number(float, 0.0, 1.0)
 
@@ -63,15 +74,8 @@ _SHARE = number(float, 0.0, 1.0)
         default=Path("sessions"),
         help="folder in which the session is created",
     ),
-    arg("--host", default="0.0.0.0", metavar="ADDRESS", help="address to listen on"),  # noqa: S104
-    arg("--port", type=number(int, 1, 65535), metavar="N", default=47800, help="UDP port"),
-    arg(
-        "--keys",
-        type=Path,
-        metavar="FILE",
-        help="file of the paired headsets (default: the key in the environment variable "
-        "HANDCAL_PAIRING_KEY, else the file of the desktop program)",
-    ),
+    *LISTEN,
+    KEYS,
     arg(
         "--patience-s",
         type=number(float, 1.0, 86_400.0),
@@ -112,7 +116,7 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.eyes,
         arguments.patience_s,
     )
-    pairings = _pairings(arguments.keys) if arguments.headset == "network" else None
+    pairings = paired_headsets(arguments.keys) if arguments.headset == "network" else None
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         result = run_calibration(settings, progress, pairings)
     save(arguments.json, result)
@@ -129,7 +133,7 @@ def run(arguments: argparse.Namespace) -> None:
         sys.exit(_CONTRADICTED)
 
 
-def _pairings(path: Path | None) -> Pairings:
+def paired_headsets(path: Path | None) -> Pairings:
     """Return the headsets that may connect: of a file, or one with the key in the environment."""
     from handcal.link.pairing import KEY_VARIABLE, Pairing, Pairings, pairing_file
 

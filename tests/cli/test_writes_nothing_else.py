@@ -74,6 +74,7 @@ COMMANDS = {
     "rig grid": "--png OUTPUT/grid.png",
     "rig check": "RIG --json OUTPUT/checked.json",
     "rig compare": "RIG RIG",
+    "rig obey": "--headset virtual --rig RIG --output OUTPUT/rig.yaml",
     "rig migrate": "RIG --output OUTPUT/rig.yaml",
     "evaluate cube net": "--pdf OUTPUT/net.pdf --cube OUTPUT/cube.json",
     "evaluate cube simulate": "OUTPUT/captures --poses 1",
