@@ -554,7 +554,7 @@ class DisplayCheck:
     app: str
     """The headset that was checked, as it introduced itself."""
     problems: Mapping[Eye, str]
-    """What each eye that was checked does wrong, in one line; empty if it obeys."""
+    """Fault of each eye that was checked, in one line; empty if it obeys."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "problems", MappingProxyType(dict(self.problems)))

@@ -36,7 +36,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     arg(
         "--viewpoint",
         metavar="SOURCE",
-        help="number of the viewpoint camera in the system (default: ask whoever looks through the "
+        help="number of the viewpoint camera in the system (default: ask who looks through the "
         "display)",
     ),
     arg(
@@ -141,7 +141,7 @@ def _observer(viewpoint: str | None) -> Iterator[Observe]:
 
 
 def _ask(eye: Eye, probe: Probe, show: Show) -> Answer:
-    """Ask whoever looks through the display how far the square has moved."""
+    """Ask the person at the display how far the square has moved."""
     answers: dict[str, Answer] = {"1": "whole", "2": "part", "3": "none"}
     console.print(f"Look at the square through the {eye} display ({probe}).")
     while True:

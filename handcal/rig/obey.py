@@ -23,7 +23,7 @@ from handcal.types import Eye, Float64, Projection, Rig, Target, UInt8
 
 Probe: TypeAlias = Literal["control", "shift", "eye shift", "other eye"]
 PROBES: tuple[Probe, ...] = get_args(Probe)
-"""What changes: the square itself, the projection's image, its eye, the other eye's image."""
+"""The thing that changes: the square itself, the projection's image, its eye, the other eye's image."""
 Shown: TypeAlias = Probe | Literal["nothing", "rest"]
 SHIFT_PX = 40.0
 """Expected movement, which is also the side of the square."""
@@ -37,7 +37,7 @@ _AREA_RATIO = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Display:
-    """What both eyes are drawn with, and the square of one."""
+    """Projections of both eyes, and the square of one."""
 
     projections: Mapping[Eye, Projection]
     target: Target | None

@@ -20,7 +20,7 @@ from handcal.types import Eye, Float64, Projection, Rig, UInt8
 DisplayMode: TypeAlias = Literal[
     "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"
 ]
-"""What a headset does with the projection.
+"""Use that a headset makes of the projection.
 
 `obeys`: draws with it. `no-override`: the app's projection has no effect. `one-for-both`: the left
 eye's is used for both. The calibrated view is submitted and reprojected: `depth`, each point at its

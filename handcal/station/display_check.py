@@ -142,7 +142,7 @@ def by_camera(
 
 
 def by_wearer(ask: Callable[[Eye, Probe, Show], Answer]) -> Observe:
-    """Return how the wearer, or whoever looks through the display, observes it.
+    """Return how the wearer, or another person at the display, observes it.
 
     Parameters
     ----------
