@@ -152,7 +152,8 @@ COMMANDS: Mapping[str, Entry] = {
         "Measure accuracy and speed, and compare them with targets and a baseline.", "checks"
     ),
     "doctor": Entry(
-        "Check the installation and the camera, with advice for each problem.", "checks"
+        "Check the installation, the camera and the headset, with advice for each problem.",
+        "checks",
     ),
 }
 

@@ -23,7 +23,7 @@ from handcal.types import Eye, Float64, Projection, Rig, Target, UInt8
 
 Probe: TypeAlias = Literal["control", "shift", "eye shift", "other eye"]
 PROBES: tuple[Probe, ...] = get_args(Probe)
-"""The thing that changes: the square itself, the projection's image, its eye, the other eye's image."""
+"""The change: of the square itself, the projection's image, its eye, the other eye's image."""
 Shown: TypeAlias = Probe | Literal["nothing", "rest"]
 SHIFT_PX = 40.0
 """Expected movement, which is also the side of the square."""
