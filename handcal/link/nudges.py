@@ -1,7 +1,8 @@
 """Messages of a verification: the eye that is verified, and the wearer's nudges.
 
 The wearer moves what one eye draws until the hand's outline covers the hand. A nudge tells all of
-the movement since the verification began, so that the newest message is enough.
+the movement since the verification and the link's session began, so that the newest message is
+enough.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class VerifyRequest:
     """The eye whose drawing the wearer is to move."""
 
     verify_id: int
-    """Ascending from 1."""
+    """Another one for each verification; not 0."""
     eye: Eye
     step_arcmin: float = 1.0
     step_size: float = 0.002

@@ -67,6 +67,8 @@ class Nudge:
     """Time of the last press of a key, on the host's monotonic clock."""
     problem: str = ""
     """As in `Confirmation`."""
+    session: int = 0
+    """The link's session, in which the sums began at zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,6 +377,7 @@ class HeadsetServer(Endpoint):
             self._require_running()
             if self._clock.fit is None:
                 return []
+            session = 0 if self._channel is None else self._channel.session
             found = [
                 Nudge(
                     nudge.verify_id,
@@ -382,6 +385,7 @@ class HeadsetServer(Endpoint):
                     nudge.fits,
                     self._clock.to_host_ns(nudge.t_headset_ns),
                     problem,
+                    session,
                 )
                 for nudge, moved, problem in self._nudges
             ]

@@ -24,7 +24,7 @@ from handcal.rig.obey import (
     judge_display,
     shares_seen,
 )
-from handcal.station.procedure import _rig_name
+from handcal.station.drawing import _rig_name
 from handcal.types import EYES, DisplayCheck, Eye, HeadsetIdentity, Rig, UInt8
 
 Show: TypeAlias = Callable[[Shown], None]
