@@ -5,7 +5,14 @@ import numpy as np
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.report import missing_parts, report_rig
-from handcal.types import CameraIdentity, DepthCheck, HeadsetIdentity, Origin, Rig
+from handcal.types import (
+    CameraIdentity,
+    DepthCheck,
+    DisplayCheck,
+    HeadsetIdentity,
+    Origin,
+    Rig,
+)
 
 RIG = example_rig()
 
@@ -74,7 +81,7 @@ def test_a_depth_that_may_be_biased_is_in_doubt() -> None:
 
 def test_missing_parts_are_told_one_line_each() -> None:
     lines = missing_parts(RIG)
-    assert len(lines) == 6
+    assert len(lines) == 7
     assert all("\n" not in line for line in lines)
     assert "model and serial number are not known: connect it and run 'handcal rig" in lines[0]
     model = replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415"))
@@ -85,6 +92,7 @@ def test_missing_parts_are_told_one_line_each() -> None:
         depth_camera=CameraIdentity("Intel RealSense D415", "123"),
         headset=HeadsetIdentity("0a1b"),
         depth_check=depth_check(0.0),
+        display_check=DisplayCheck("today", "wearer", "0a1b", "", "", {"left": ""}),
         origins={"left": origin, "right": origin, "T_H_D": origin},
     )
     assert missing_parts(whole) == ()
