@@ -37,7 +37,8 @@ namespace Handcal.Link
         double nextHelloS;
         string problem = "", refusal = "";
 
-        /// <param name="invitation">Address of the PC and pairing key, of at least 16 bytes.</param>
+        /// <param name="host">Address of the PC. Empty: nobody is called, but kept projections are shown.</param>
+        /// <param name="pairingKey">At least 16 bytes.</param>
         /// <param name="deviceId">The headset's own number, made once and kept.</param>
         /// <param name="device">The introduction; see <see cref="SetDevice"/>.</param>
         /// <param name="kept">Projections of earlier sessions; the newest are shown.</param>
@@ -55,7 +56,7 @@ namespace Handcal.Link
             handshake = new Handshake(pairingKey, deviceId);
             ShowNewest();
             thread = new Thread(Run) { IsBackground = true, Name = "handcal link" };
-            thread.Start();
+            if (host.Length > 0) thread.Start();
         }
 
         public bool IsConnected
@@ -173,7 +174,7 @@ namespace Handcal.Link
                 for (int i = 0; i < Byes; i++) Send(Envelope.Bye());
                 isClosing = true;
             }
-            thread.Join();
+            if (thread.IsAlive) thread.Join();
         }
 
         void Run()
