@@ -9,7 +9,7 @@ using System.Threading;
 
 namespace Handcal.Link.Tests
 {
-    /// <summary>What the tests ask of the headset's side of the link, by the first argument.</summary>
+    /// <summary>Runs one test of the headset's side of the link, named by the first argument.</summary>
     static class Program
     {
         static int Main(string[] arguments)

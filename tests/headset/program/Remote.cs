@@ -63,7 +63,7 @@ namespace Handcal.Link.Tests
             link.Dispose();
         }
 
-        /// <summary>What is shown; points only if they have changed since they were told.</summary>
+        /// <summary>Tells the state; points only if they have changed since they were told.</summary>
         void Tell()
         {
             HeadsetState state = link.State();

@@ -54,15 +54,15 @@ namespace Handcal
         uint movedId;
         string warning = "";
 
-        /// <summary>What is drawn.</summary>
+        /// <summary>The state that is drawn.</summary>
         public HeadsetState State { get { return drawn; } }
 
-        /// <summary>Whose calibration is drawn with; empty if none is.</summary>
+        /// <summary>The wearer whose calibration is drawn with; empty if there is none.</summary>
         public string Wearer { get { return drawn.Wearer; } }
 
         public bool IsConnected { get { return link != null && link.IsConnected; } }
 
-        /// <summary>What keeps the calibration from being drawn as it should; empty if nothing does.</summary>
+        /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>
         public string Warning { get { return warning; } }
 
         /// <summary>The prompt, or without a connection its state and whose calibration is shown.</summary>

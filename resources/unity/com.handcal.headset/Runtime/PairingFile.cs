@@ -4,7 +4,7 @@ using Handcal.Link;
 
 namespace Handcal
 {
-    /// <summary>What the headset remembers: its identity, the PC, the key, and the calibrations.</summary>
+    /// <summary>The headset's memory: its identity, the PC, the key, and the calibrations.</summary>
     sealed class PairingFile
     {
         readonly string pairingPath, keptPath;
@@ -22,7 +22,7 @@ namespace Handcal
         public byte[] Key { get; private set; } = new byte[Keys.MinPairingKeyBytes];
         public bool IsPaired { get { return Host.Length > 0; } }
 
-        /// <summary>What could not be read or written; empty if all could.</summary>
+        /// <summary>The last failure to read or write; empty if there was none.</summary>
         public string Problem { get; private set; } = "";
 
         public void Store(string host, int port, byte[] key)

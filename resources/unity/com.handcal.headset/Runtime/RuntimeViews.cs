@@ -24,7 +24,7 @@ namespace Handcal
             this.camera = camera;
         }
 
-        /// <summary>What keeps the calibration from being drawn as it should.</summary>
+        /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>
         public string Problem { get; private set; } = "";
 
         /// <summary>Reads the runtime's views; call before they are overridden.</summary>

@@ -14,7 +14,7 @@ namespace Handcal.Link
     public sealed class HeadsetLink : IDisposable
     {
         const double HelloPeriodS = 0.1, RefusedPeriodS = 1.0, SilenceS = 2.0, ReopenPeriodS = 1.0;
-        const int IdleWaitUs = 5000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3;
+        const int IdleWaitUs = 20000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3;
         static readonly Stopwatch Clock = Stopwatch.StartNew();
 
         readonly object gate = new object();
@@ -70,7 +70,7 @@ namespace Handcal.Link
             get { lock (gate) return isDismissed; }
         }
 
-        /// <summary>Why the headset is not connected, for its wearer; empty if there is nothing to say.</summary>
+        /// <summary>The reason for not being connected, for the wearer; empty if none is known.</summary>
         public string Problem
         {
             get { lock (gate) return IsConnected ? "" : refusal.Length > 0 ? refusal : problem; }
@@ -389,7 +389,13 @@ namespace Handcal.Link
 
         Outgoing SendReliably(Slot slot, byte[] envelope)
         {
-            lock (gate) return outbox.Send(slot, envelope, Now);
+            lock (gate)
+            {
+                double nowS = Now;
+                Outgoing message = outbox.Send(slot, envelope, nowS);
+                outbox.SendDue(nowS, SendPacket);
+                return message;
+            }
         }
 
         void Send(byte[] envelope)

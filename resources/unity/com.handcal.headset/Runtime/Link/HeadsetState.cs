@@ -4,7 +4,7 @@ using System.Security.Cryptography;
 
 namespace Handcal.Link
 {
-    /// <summary>What the PC wants the headset to show; a value that no longer changes.</summary>
+    /// <summary>The things that the PC wants shown; a value that no longer changes.</summary>
     public sealed class HeadsetState
     {
         /// <summary>Null until one has come; without points there is nothing to draw.</summary>

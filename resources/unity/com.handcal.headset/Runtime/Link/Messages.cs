@@ -45,7 +45,7 @@ namespace Handcal.Link
         public const int Max = 50000;
         public static readonly Points Nothing = new Points();
         const double QuantumM = 1e-4;
-        readonly double[] originM = new double[0];
+        readonly double[] originM = new double[3];
         readonly byte[] offsets = new byte[0];
 
         Points() { }
@@ -72,14 +72,13 @@ namespace Handcal.Link
         /// <summary>Writes every point's x, y and z: point i to place 3 (first + i · step).</summary>
         public void CopyTo(float[] positionsM, int first, int step)
         {
-            for (int i = 0; i < Count; i++)
+            double x = originM[0], y = originM[1], z = originM[2];
+            int to = 3 * first, skip = 3 * step, end = offsets.Length;
+            for (int from = 0; from < end; from += 6, to += skip)
             {
-                int from = 6 * i, to = 3 * (first + i * step);
-                for (int axis = 0; axis < 3; axis++, from += 2)
-                {
-                    var offset = (short)(offsets[from] | offsets[from + 1] << 8);
-                    positionsM[to + axis] = (float)(originM[axis] + QuantumM * offset);
-                }
+                positionsM[to] = (float)(x + QuantumM * (short)(offsets[from] | offsets[from + 1] << 8));
+                positionsM[to + 1] = (float)(y + QuantumM * (short)(offsets[from + 2] | offsets[from + 3] << 8));
+                positionsM[to + 2] = (float)(z + QuantumM * (short)(offsets[from + 4] | offsets[from + 5] << 8));
             }
         }
     }
@@ -100,7 +99,7 @@ namespace Handcal.Link
         }
     }
 
-    /// <summary>What an eye renders with; matrices by rows, OpenCV axes.</summary>
+    /// <summary>The projection and view of an eye; matrices by rows, OpenCV axes.</summary>
     public sealed class Projection
     {
         const int MaxDisplayPx = 65535;

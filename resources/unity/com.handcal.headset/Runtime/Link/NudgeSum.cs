@@ -2,7 +2,7 @@ using System;
 
 namespace Handcal.Link
 {
-    /// <summary>How far the wearer has moved a drawing since its verification began.</summary>
+    /// <summary>The movement of a drawing by the wearer since its verification began.</summary>
     public struct NudgeSum
     {
         const double MaxArcmin = 300.0, MaxSize = 0.3;
