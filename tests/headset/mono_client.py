@@ -117,8 +117,8 @@ class MonoClient(Closable):
         self, t_headset_ns: int, state: HeadsetState, moved: NudgeSum, fits: bool = False
     ) -> None:
         assert state is self._state
-        sums = f"{moved.right_arcmin!r} {moved.down_arcmin!r} {moved.size!r} {int(fits)}"
-        self._tell(f"nudge {t_headset_ns} {sums}")
+        sums = moved.right_arcmin, moved.down_arcmin, moved.size, fits
+        self._tell(" ".join(["nudge", str(t_headset_ns), *(f"{float(one)!r}" for one in sums)]))
 
     def show_kept(self, wearer: str) -> None:
         self._tell(f"kept {wearer}")

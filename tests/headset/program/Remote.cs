@@ -52,7 +52,7 @@ namespace Handcal.Link.Tests
                             DownArcmin = Number(words[3]),
                             Size = Number(words[4]),
                         };
-                        sent = link.Nudge(Time(words), told, moved, words[5] == "1");
+                        sent = link.Nudge(Time(words), told, moved, Number(words[5]) > 0);
                         break;
                     case "kept": link.ShowKept(words[1]); break;
                     case "state": Tell(); break;

@@ -59,12 +59,8 @@ namespace Handcal
         /// Puts the plane at which the compositor stabilises the picture to the virtual image, where
         /// the calibrated and the submitted view have the same pixels.
         /// </summary>
-        public void SetFocusPlane(HeadsetState state, float distanceM)
+        public void SetFocusPlane(float distanceM)
         {
-            Projection one = state.Left ?? state.Right;
-            if (one == null) return;
-            double found = Matrices.FocusDistanceM(one.Drawn(state.IsOffline), one.POffline, one.WidthPx, one.HeightPx);
-            if (found > 0.1) distanceM = (float)found;
             Transform head = camera.transform;
 #if UNITY_2020_2_OR_NEWER
             SubsystemManager.GetSubsystems(displays);

@@ -31,6 +31,9 @@ namespace Handcal
         [Tooltip("Distance of the virtual image, m, until the calibration tells it.")]
         public float focusDistanceM = 2;
 
+        [Tooltip("The wearer's eye distance, mm, if it is measured, as by eye tracking. 0: it is not.")]
+        public float eyeDistanceMm;
+
         [Tooltip("Show prompts and the state of the connection in front of the wearer.")]
         public bool showsText = true;
 
@@ -75,6 +78,18 @@ namespace Handcal
                     ? "" : "\nShowing the calibration of " + drawn.Wearer + ", rig " + drawn.Rig;
                 if (!pairing.IsPaired) return "Scan the QR code that handcal shows on the PC" + whose;
                 return (link != null && link.Problem.Length > 0 ? link.Problem : "Waiting for the PC") + whose;
+            }
+        }
+
+        /// <summary>Distance of the virtual image, for the compositor's focus plane, m.</summary>
+        public float FocusDistanceM
+        {
+            get
+            {
+                Projection one = drawn.Left ?? drawn.Right;
+                double foundM = one == null
+                    ? 0 : Matrices.FocusDistanceM(one.P, one.POffline, one.WidthPx, one.HeightPx);
+                return foundM > 0.1 ? (float)foundM : focusDistanceM;
             }
         }
 
@@ -151,17 +166,17 @@ namespace Handcal
                 drawing.Show(drawn, showsText ? Text : "");
                 return;
             }
-            drawn = link.State();
-            byte[] kept = link.TakeKept();
-            if (kept != null) pairing.StoreKept(kept);
-            if (views.HasChanged()) link.SetDevice(views.Introduction(deviceName));
-            if (views.Problem.Length > 0 && views.Problem != warning) Warn(views.Problem);
-            if (presses.Read())
+            if (presses.Read())  // of what the last frame showed
             {
                 if (presses.Right != 0 || presses.Down != 0 || presses.Larger != 0)
                     Nudge(presses.Right, presses.Down, presses.Larger);
                 if (presses.IsConfirmed) Confirm();
             }
+            drawn = link.State();
+            byte[] kept = link.TakeKept();
+            if (kept != null) pairing.StoreKept(kept);
+            if (views.HasChanged()) link.SetDevice(Introduction());
+            if (views.Problem.Length > 0 && views.Problem != warning) Warn(views.Problem);
             drawing.Show(drawn, showsText ? Text : "");
         }
 
@@ -182,7 +197,7 @@ namespace Handcal
             cameras.Reset();
             views.Read();
             cameras.Apply(drawn);
-            if (setsFocusPlane) cameras.SetFocusPlane(drawn, focusDistanceM);
+            if (setsFocusPlane) cameras.SetFocusPlane(FocusDistanceM);
         }
 
         void OnPreRender()
@@ -213,7 +228,12 @@ namespace Handcal
             if (!pairing.IsPaired && kept.Count == 0) return;
             // Without a pairing nobody is called, but the kept calibration is drawn.
             link = new HeadsetLink(
-                pairing.Host, pairing.Port, pairing.Key, pairing.DeviceId, views.Introduction(deviceName), kept, NowNs);
+                pairing.Host, pairing.Port, pairing.Key, pairing.DeviceId, Introduction(), kept, NowNs);
+        }
+
+        Device Introduction()
+        {
+            return views.Introduction(deviceName, 0.001 * eyeDistanceMm);
         }
 
         void Disconnect()

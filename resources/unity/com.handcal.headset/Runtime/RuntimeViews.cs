@@ -57,7 +57,7 @@ namespace Handcal
             return views.Count != reported.Count || Moved(reported, views) > ReportedMoveM;
         }
 
-        public Device Introduction(string name)
+        public Device Introduction(string name, double eyeDistanceM)
         {
             reported = views;
             return new Device
@@ -66,7 +66,7 @@ namespace Handcal
                 Runtime = XRSettings.loadedDeviceName + " " + SystemInfo.operatingSystem,
                 App = Application.productName + " " + Application.version,
                 Views = views,
-                EyeDistanceM = views.Count == 2 ? Distance(views[0].TVH, views[1].TVH) : 0,
+                EyeDistanceM = eyeDistanceM,
             };
         }
 
@@ -82,8 +82,9 @@ namespace Handcal
                     & head.TryGetFeatureValue(rotation, out Quaternion eyeTurn)
                     & head.TryGetFeatureValue(CommonUsages.centerEyePosition, out Vector3 headAt)
                     & head.TryGetFeatureValue(CommonUsages.centerEyeRotation, out Quaternion headTurn);
-                if (!isKnown) continue;
-                if (!tangents.ContainsKey(eye)) tangents[eye] = Tangents(camera.GetStereoProjectionMatrix(unityEye));
+                Matrix4x4 projection = camera.GetStereoProjectionMatrix(unityEye);
+                if (!isKnown || projection[0, 0] == 0 || projection[1, 1] == 0) continue;
+                if (!tangents.ContainsKey(eye)) tangents[eye] = Tangents(projection);
                 double[] TVW = Matrices.Invert(Pose(eyeAt, eyeTurn));
                 into.Add(new View
                 {
