@@ -542,6 +542,24 @@ class DepthCheck:
         return (self.scale - 1.0) * depth_m + self.offset_m, float(np.sqrt(variance_m2))
 
 
+@dataclass(frozen=True, slots=True)
+class DisplayCheck:
+    """The check that a headset draws as its projections say, observed from outside."""
+
+    made: str
+    """Date and time, ISO 8601."""
+    observer: Literal["camera", "wearer"]
+    device_id: str
+    runtime: str
+    app: str
+    """The headset that was checked, as it introduced itself."""
+    problems: Mapping[Eye, str]
+    """Fault of each eye that was checked, in one line; empty if it obeys."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "problems", MappingProxyType(dict(self.problems)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
     """The offline calibration: both eye displays and the pose of the depth camera."""
@@ -557,6 +575,8 @@ class Rig:
     headset: HeadsetIdentity | None = None
     depth_check: DepthCheck | None = None
     """The devices of the rig and the check of its depth; empty or None if unknown."""
+    display_check: DisplayCheck | None = None
+    """The check that the headset draws what it is sent; None if there was none."""
 
     __repr__ = brief
 

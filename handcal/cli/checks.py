@@ -6,12 +6,17 @@ import argparse
 import json
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, fail
+from handcal.cli.output import console, save, show_progress, table, until_interrupted
+from handcal.cli.run import KEYS, LISTEN, paired_headsets
+from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import HandcalError
+
+if TYPE_CHECKING:
+    from handcal.station.doctor import Finding
 
 
 @command(
@@ -45,18 +50,60 @@ def bench(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg("--rig", type=Path, metavar="FILE", help="rig file to compare the connected cameras with"),
+    arg("--rig", type=Path, metavar="FILE", help="rig file to compare the connected devices with"),
+    arg("--headset", action="store_true", help="wait for a paired headset, and report on it"),
+    arg(
+        "--stamps",
+        metavar="SOURCE",
+        help="with --headset and --rig: also find pose stamps that are not the time the pose is "
+        "for, by the depth camera (realsense); the wearer holds a hand still and turns the head",
+    ),
+    arg(
+        "--patience-s",
+        type=number(float, 1.0, 86_400.0),
+        metavar="S",
+        default=20.0,
+        help="longest time until the headset connects",
+    ),
+    *LISTEN,
+    KEYS,
 )
 def doctor(arguments: argparse.Namespace) -> None:
-    """Check the installation and the camera, with advice for each problem."""
+    """Check the installation, the camera and the headset, with advice for each problem."""
     from handcal.station.doctor import Health, examine
 
+    if arguments.stamps and not (arguments.headset and arguments.rig):
+        fail("--stamps needs --headset and --rig; see handcal doctor --help", 2)
     findings = examine(arguments.rig)
+    if arguments.headset:
+        findings += _headset_findings(arguments)
     for finding in findings:
         advice = f"\n         → {finding.advice}" if finding.advice else ""
         console.print(f"{finding.health.value:8} {finding.what}: {finding.found}{advice}")
     if any(finding.health is Health.BROKEN for finding in findings):
         raise HandcalError("fix the problems listed above and try again")
+
+
+def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:
+    from handcal.camera.settings import RealSenseSettings
+    from handcal.cli.cameras import open_source
+    from handcal.link.server import HeadsetServer
+    from handcal.rig.rig_file import read_rig
+    from handcal.station.doctor import examine_headset
+
+    pairings = paired_headsets(arguments.keys)
+    if not pairings.all:
+        raise HandcalError("no headset is paired; pair one with handcal pair")
+    rig = read_rig(arguments.rig) if arguments.rig else None
+    with ExitStack() as stack:
+        server = stack.enter_context(HeadsetServer(pairings, (arguments.host, arguments.port)))
+        camera = None
+        if arguments.stamps:
+            source = open_source(arguments.stamps, RealSenseSettings())
+            camera = stack.enter_context(source)
+        is_stopped = stack.enter_context(until_interrupted())
+        progress = stack.enter_context(show_progress(is_stopped))
+        return examine_headset(server, rig, camera, arguments.patience_s, progress)
 
 
 def _bench_window(frames: int) -> dict[str, Any]:

@@ -89,6 +89,10 @@ _RIG: Mapping[str, Entry] = {
         "Check the depth camera against a board at several distances, and put it into a rig file.",
         "rig_files",
     ),
+    "obey": Entry(
+        "Check that a connected headset draws what it is sent, and put that into a rig file.",
+        "display_check",
+    ),
     "check": Entry(
         "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
     ),
@@ -113,9 +117,16 @@ COMMANDS: Mapping[str, Entry] = {
     "demo": Entry(
         "Calibrate a simulated wearer from start to end, and compare with the truth.", "simulate"
     ),
+    "run": Entry(
+        "Calibrate one wearer without a window, for scripts and for testing headset apps.", "run"
+    ),
     "headset": Entry(
         "Run a virtual headset with a simulated wearer, connected by the real protocol.", "simulate"
     ),
+    "pair": Entry(
+        "Pair a headset: show a QR code and a short code, and wait for the headset.", "pairing"
+    ),
+    "devices": Entry("List the paired headsets; rename or revoke one, by its identity.", "pairing"),
     "record": Entry("Record a camera into a .db3 file or a folder of images.", "cameras"),
     "replay": Entry("Play a recording and segment the hand in every frame.", "cameras"),
     "segment": Entry(
@@ -141,7 +152,8 @@ COMMANDS: Mapping[str, Entry] = {
         "Measure accuracy and speed, and compare them with targets and a baseline.", "checks"
     ),
     "doctor": Entry(
-        "Check the installation and the camera, with advice for each problem.", "checks"
+        "Check the installation, the camera and the headset, with advice for each problem.",
+        "checks",
     ),
 }
 

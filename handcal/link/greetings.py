@@ -78,6 +78,11 @@ def refused(nonce: bytes, refusal: Refusal) -> pb.Envelope:
     return pb.Envelope(refused=pb.Refused(nonce=nonce, reason=reason, other=refusal.other))
 
 
+def refused_code(nonce: bytes) -> pb.Envelope:
+    """Make the refusal of a pairing by digits, after too many wrong ones."""
+    return pb.Envelope(refused=pb.Refused(nonce=nonce, reason=pb.REFUSAL_NO_CODE))
+
+
 def read_refused(message: pb.Refused) -> Refusal:
     """Read a refusal; an unknown reason reads as another headset being connected."""
     return Refusal(

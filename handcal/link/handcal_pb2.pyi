@@ -18,21 +18,24 @@ class Refusal(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     REFUSAL_UNSPECIFIED: _ClassVar[Refusal]
     REFUSAL_BUSY: _ClassVar[Refusal]
     REFUSAL_KEY_TAKEN: _ClassVar[Refusal]
+    REFUSAL_NO_CODE: _ClassVar[Refusal]
 EYE_UNSPECIFIED: Eye
 EYE_LEFT: Eye
 EYE_RIGHT: Eye
 REFUSAL_UNSPECIFIED: Refusal
 REFUSAL_BUSY: Refusal
 REFUSAL_KEY_TAKEN: Refusal
+REFUSAL_NO_CODE: Refusal
 
 class Envelope(_message.Message):
-    __slots__ = ("hello", "poses", "confirm", "pong", "device", "nudge", "retry", "refused", "welcome", "ping", "cursor", "live_hand", "prompt", "projection", "target", "shape", "show", "verify", "ack", "bye")
+    __slots__ = ("hello", "poses", "confirm", "pong", "device", "nudge", "pair", "retry", "refused", "welcome", "ping", "cursor", "live_hand", "prompt", "projection", "target", "shape", "show", "verify", "paired", "ack", "bye")
     HELLO_FIELD_NUMBER: _ClassVar[int]
     POSES_FIELD_NUMBER: _ClassVar[int]
     CONFIRM_FIELD_NUMBER: _ClassVar[int]
     PONG_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     NUDGE_FIELD_NUMBER: _ClassVar[int]
+    PAIR_FIELD_NUMBER: _ClassVar[int]
     RETRY_FIELD_NUMBER: _ClassVar[int]
     REFUSED_FIELD_NUMBER: _ClassVar[int]
     WELCOME_FIELD_NUMBER: _ClassVar[int]
@@ -45,6 +48,7 @@ class Envelope(_message.Message):
     SHAPE_FIELD_NUMBER: _ClassVar[int]
     SHOW_FIELD_NUMBER: _ClassVar[int]
     VERIFY_FIELD_NUMBER: _ClassVar[int]
+    PAIRED_FIELD_NUMBER: _ClassVar[int]
     ACK_FIELD_NUMBER: _ClassVar[int]
     BYE_FIELD_NUMBER: _ClassVar[int]
     hello: Hello
@@ -53,6 +57,7 @@ class Envelope(_message.Message):
     pong: Pong
     device: Device
     nudge: Nudge
+    pair: Pair
     retry: Retry
     refused: Refused
     welcome: Welcome
@@ -65,9 +70,10 @@ class Envelope(_message.Message):
     shape: Shape
     show: Show
     verify: Verify
+    paired: Paired
     ack: Ack
     bye: Bye
-    def __init__(self, hello: _Optional[_Union[Hello, _Mapping]] = ..., poses: _Optional[_Union[Poses, _Mapping]] = ..., confirm: _Optional[_Union[Confirm, _Mapping]] = ..., pong: _Optional[_Union[Pong, _Mapping]] = ..., device: _Optional[_Union[Device, _Mapping]] = ..., nudge: _Optional[_Union[Nudge, _Mapping]] = ..., retry: _Optional[_Union[Retry, _Mapping]] = ..., refused: _Optional[_Union[Refused, _Mapping]] = ..., welcome: _Optional[_Union[Welcome, _Mapping]] = ..., ping: _Optional[_Union[Ping, _Mapping]] = ..., cursor: _Optional[_Union[Cursor, _Mapping]] = ..., live_hand: _Optional[_Union[LiveHand, _Mapping]] = ..., prompt: _Optional[_Union[Prompt, _Mapping]] = ..., projection: _Optional[_Union[Projection, _Mapping]] = ..., target: _Optional[_Union[Target, _Mapping]] = ..., shape: _Optional[_Union[Shape, _Mapping]] = ..., show: _Optional[_Union[Show, _Mapping]] = ..., verify: _Optional[_Union[Verify, _Mapping]] = ..., ack: _Optional[_Union[Ack, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
+    def __init__(self, hello: _Optional[_Union[Hello, _Mapping]] = ..., poses: _Optional[_Union[Poses, _Mapping]] = ..., confirm: _Optional[_Union[Confirm, _Mapping]] = ..., pong: _Optional[_Union[Pong, _Mapping]] = ..., device: _Optional[_Union[Device, _Mapping]] = ..., nudge: _Optional[_Union[Nudge, _Mapping]] = ..., pair: _Optional[_Union[Pair, _Mapping]] = ..., retry: _Optional[_Union[Retry, _Mapping]] = ..., refused: _Optional[_Union[Refused, _Mapping]] = ..., welcome: _Optional[_Union[Welcome, _Mapping]] = ..., ping: _Optional[_Union[Ping, _Mapping]] = ..., cursor: _Optional[_Union[Cursor, _Mapping]] = ..., live_hand: _Optional[_Union[LiveHand, _Mapping]] = ..., prompt: _Optional[_Union[Prompt, _Mapping]] = ..., projection: _Optional[_Union[Projection, _Mapping]] = ..., target: _Optional[_Union[Target, _Mapping]] = ..., shape: _Optional[_Union[Shape, _Mapping]] = ..., show: _Optional[_Union[Show, _Mapping]] = ..., verify: _Optional[_Union[Verify, _Mapping]] = ..., paired: _Optional[_Union[Paired, _Mapping]] = ..., ack: _Optional[_Union[Ack, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ("nonce", "time_ns", "cookie", "name")
@@ -98,6 +104,26 @@ class Welcome(_message.Message):
     session: int
     pc_nonce: bytes
     def __init__(self, nonce: _Optional[bytes] = ..., session: _Optional[int] = ..., pc_nonce: _Optional[bytes] = ...) -> None: ...
+
+class Pair(_message.Message):
+    __slots__ = ("nonce", "public_value", "name")
+    NONCE_FIELD_NUMBER: _ClassVar[int]
+    PUBLIC_VALUE_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    nonce: bytes
+    public_value: bytes
+    name: str
+    def __init__(self, nonce: _Optional[bytes] = ..., public_value: _Optional[bytes] = ..., name: _Optional[str] = ...) -> None: ...
+
+class Paired(_message.Message):
+    __slots__ = ("nonce", "public_value", "proof")
+    NONCE_FIELD_NUMBER: _ClassVar[int]
+    PUBLIC_VALUE_FIELD_NUMBER: _ClassVar[int]
+    PROOF_FIELD_NUMBER: _ClassVar[int]
+    nonce: bytes
+    public_value: bytes
+    proof: bytes
+    def __init__(self, nonce: _Optional[bytes] = ..., public_value: _Optional[bytes] = ..., proof: _Optional[bytes] = ...) -> None: ...
 
 class Refused(_message.Message):
     __slots__ = ("nonce", "reason", "other")

@@ -14,6 +14,7 @@ import secrets
 from dataclasses import dataclass, field
 
 from handcal.link import greetings, messages, wire
+from handcal.link.exchange import Exchange
 from handcal.link.pairing import Pairing, Pairings, device_number
 from handcal.link.transport import Address
 from handcal.link.wire import Keys, Packet, Rejection
@@ -74,9 +75,16 @@ class Limiter:
 
 
 class Reception:
-    """Hears hellos, and admits the devices of a list of pairings."""
+    """Hears hellos, and admits the devices of a list of pairings.
+
+    Attributes
+    ----------
+    exchange : Exchange or None
+        Answers those who pair by digits, while digits are shown.
+    """
 
     def __init__(self, pairings: Pairings) -> None:
+        self.exchange: Exchange | None = None
         self._pairings = pairings
         self._heard: dict[int, _Heard] = {}
         self._secret = secrets.token_bytes(32)
@@ -104,7 +112,8 @@ class Reception:
         device = packet.sequence
         found = self._find(device, datagram, now_s)
         if found is None:
-            return Rejection.UNPAIRED
+            exchange = self.exchange
+            return exchange.hear(packet, datagram, now_s) if exchange else Rejection.UNPAIRED
         pairing, keys = found
         hello = greetings.read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)
@@ -143,7 +152,8 @@ class Reception:
             return own
         others = [one for one, _ in self._bound.values()]
         try_all = own is None and bool(others) and self._foreign.allows(now_s)
-        for pairing in (*self._unbound, *(others if try_all else ())):
+        offered = self._pairings.offered(now_s)
+        for pairing in (*self._unbound, *offered, *(others if try_all else ())):
             keys = wire.handshake_keys(pairing.key.encode(), device)
             if wire.is_authentic(keys.to_pc, datagram):
                 return pairing, keys

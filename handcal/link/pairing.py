@@ -6,20 +6,34 @@ import json
 import os
 import re
 import secrets
-from dataclasses import asdict, dataclass
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from threading import RLock
 
 from handcal.errors import FileError, LinkError
+from handcal.io.configuration import configuration_folder
 from handcal.io.files import make_folder, read_limited, write_atomic
+from handcal.io.lock import FileLock
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 
 KEY_VARIABLE = "HANDCAL_PAIRING_KEY"
 MAX_DEVICES = 16
 MAX_NAME_CHARACTERS = 40
+OFFER_S = 600.0
+"""Time within which a device must connect with an offered key."""
+_MAX_OFFERS = 8
+_LOCK_S = 2.0
 _MAX_KEY_BYTES = 1024
 _MAX_FILE_BYTES = MAX_DEVICES * 2 * _MAX_KEY_BYTES
 _DEVICE_ID = re.compile(r"[0-9a-f]{16}")
+
+
+def pairing_file() -> Path:
+    """Return the path of this user's file of paired devices; it need not exist."""
+    return configuration_folder() / "pairing.key"
 
 
 def new_pairing_key() -> str:
@@ -88,22 +102,32 @@ class Pairing:
             device_number(self.device_id)
         if len(self.name) > MAX_NAME_CHARACTERS:
             raise ValueError(f"a device's name has at most {MAX_NAME_CHARACTERS} characters")
+        if not all(character >= " " for character in self.name):
+            raise ValueError("a device's name has no control characters")
 
 
 class Pairings:
-    """The devices that may connect to this PC; safe to use from several threads.
+    """The devices that may connect to this PC; safe to use from several threads and programs.
 
     Parameters
     ----------
     pairings : tuple of Pairing
     path : Path, optional
-        The file that is kept up to date; only this user can read it.
+        The file that is kept up to date; only this user can read it. What other programs change in
+        it is taken over by `refresh`, and before every change.
+
+    Attributes
+    ----------
+    all : tuple of Pairing
+        The devices, and any stored key that belongs to none yet.
     """
 
     def __init__(self, pairings: tuple[Pairing, ...], path: Path | None = None) -> None:
         self.all = pairings[-MAX_DEVICES:]
         self._path = path
+        self._offers: dict[str, float] = {}
         self._lock = RLock()
+        self._stamp = self._look()
 
     @classmethod
     def read(cls, path: Path) -> Pairings:
@@ -114,26 +138,26 @@ class Pairings:
         FileError
             If the file cannot be read, or is damaged. It is left as it is.
         """
-        if not path.exists():
-            return cls((), path)
-        content = read_limited(path, _MAX_FILE_BYTES).strip()
-        try:
-            text = content.decode()
-            if not text.startswith("{"):
-                return cls((Pairing(text),), path)
-            devices = json.loads(text)["devices"]
-            if not isinstance(devices, list) or len(devices) > MAX_DEVICES:
-                raise ValueError(f"more than {MAX_DEVICES} devices")
-            pairings = tuple(Pairing(**device) for device in devices)
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            raise FileError(
-                f"the pairing keys in {path} are damaged; restore the file, or make a new key and "
-                "enter it in every headset"
-            ) from error
-        return cls(pairings, path)
+        pairings = cls((), path)  # looked at before it is read: a later change is noticed
+        pairings.all = _read(path)
+        return pairings
+
+    def refresh(self) -> None:
+        """Take over what another program has changed in the file.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read, or is damaged; the devices known so far stay.
+        """
+        with self._lock:
+            stamp = self._look()
+            if self._path is not None and stamp != self._stamp:
+                self.all = _read(self._path)
+                self._stamp = stamp
 
     def open_key(self) -> str:
-        """Return the key with which the next new device connects; make one if there is none.
+        """Return the stored key with which the next new device connects; make one if needed.
 
         Raises
         ------
@@ -145,11 +169,30 @@ class Pairings:
                 if not pairing.device_id:
                     return pairing.key
             made = Pairing(new_pairing_key())
-            self._change((*self.all, made))
+            self._change(lambda before: (*before, made))
             return made.key
 
+    def offer(self, key: str, now_s: float | None = None) -> None:
+        """Let one new device connect with a key within `OFFER_S`; the key is not stored before."""
+        offered = Pairing(key)
+        with self._lock:
+            self._offers[offered.key] = (time.monotonic() if now_s is None else now_s) + OFFER_S
+            while len(self._offers) > _MAX_OFFERS:
+                del self._offers[next(iter(self._offers))]
+
+    def withdraw(self) -> None:
+        """End all offers."""
+        with self._lock:
+            self._offers.clear()
+
+    def offered(self, now_s: float) -> tuple[Pairing, ...]:
+        """Return the offers that have not ended."""
+        with self._lock:
+            self._offers = {key: end for key, end in self._offers.items() if end > now_s}
+            return tuple(Pairing(key) for key in self._offers)
+
     def bind(self, pairing: Pairing, device_id: str, name: str) -> None:
-        """Give an open key to a device, in place of the device's older key.
+        """Give an open or offered key to a device, in place of the device's older key.
 
         Beyond `MAX_DEVICES` the device that was paired first is forgotten.
 
@@ -158,9 +201,49 @@ class Pairings:
         FileError
             If the file cannot be written; the key belongs to the device until the program ends.
         """
+        bound = Pairing(pairing.key, device_id, name)
+
+        def edit(before: tuple[Pairing, ...]) -> tuple[Pairing, ...]:
+            keep = (one for one in before if one != pairing and one.device_id != device_id)
+            return (*keep, bound)
+
         with self._lock:
-            others = (one for one in self.all if one is not pairing and one.device_id != device_id)
-            self._change((*others, Pairing(pairing.key, device_id, name)))
+            self._offers.pop(pairing.key, None)
+            self._change(edit)
+
+    def rename(self, device_id: str, name: str) -> None:
+        """Give a device another name, for people to read.
+
+        Raises
+        ------
+        LinkError
+            If there is no such device.
+        ValueError
+            If the name is too long.
+        FileError
+            If the file cannot be written.
+        """
+        with self._lock:
+            self._require(device_id)
+            self._change(
+                lambda before: tuple(
+                    replace(one, name=name) if one.device_id == device_id else one for one in before
+                )
+            )
+
+    def revoke(self, device_id: str) -> None:
+        """Forget a device; its session ends, and it connects again only with a new key.
+
+        Raises
+        ------
+        LinkError
+            If there is no such device.
+        FileError
+            If the file cannot be written; the device is refused until the program ends.
+        """
+        with self._lock:
+            self._require(device_id)
+            self._change(lambda before: tuple(one for one in before if one.device_id != device_id))
 
     def renew(self) -> str:
         """Forget every device and return a new key.
@@ -171,12 +254,69 @@ class Pairings:
             If it cannot be written.
         """
         with self._lock:
-            self._change(())
+            self._change(lambda _: ())
             return self.open_key()
 
-    def _change(self, pairings: tuple[Pairing, ...]) -> None:
-        self.all = pairings[-MAX_DEVICES:]
-        if self._path is not None:
-            content = json.dumps({"devices": [asdict(one) for one in self.all]}, indent=2)
-            make_folder(self._path.parent)
-            write_atomic(self._path, f"{content}\n".encode(), mode=0o600)
+    def _require(self, device_id: str) -> None:
+        self.refresh()
+        if not device_id or all(one.device_id != device_id for one in self.all):
+            raise LinkError(f"no device {device_id!r} is paired; see handcal devices")
+
+    def _change(self, edit: Callable[[tuple[Pairing, ...]], tuple[Pairing, ...]]) -> None:
+        """Change the pairings, in memory even if the file cannot be written."""
+        try:
+            if self._path is not None:
+                make_folder(self._path.parent)
+                with _locked(self._path.with_name(f"{self._path.name}.lock")):
+                    self.refresh()
+                    stored = [asdict(one) for one in edit(self.all)[-MAX_DEVICES:]]
+                    content = json.dumps({"devices": stored}, indent=2)
+                    write_atomic(self._path, f"{content}\n".encode(), mode=0o600)
+                    self._stamp = self._look()
+        finally:
+            self.all = edit(self.all)[-MAX_DEVICES:]
+
+    def _look(self) -> tuple[int, int, int] | None:
+        """Return what changes when the file is replaced; None without a file."""
+        with suppress(OSError):
+            if self._path is not None:
+                found = self._path.stat()
+                return found.st_ino, found.st_mtime_ns, found.st_size
+        return None
+
+
+def _read(path: Path) -> tuple[Pairing, ...]:
+    if not path.exists():
+        return ()
+    content = read_limited(path, _MAX_FILE_BYTES).strip()
+    try:
+        text = content.decode()
+        if not text.startswith("{"):
+            return (Pairing(text),)
+        devices = json.loads(text)["devices"]
+        if not isinstance(devices, list) or len(devices) > MAX_DEVICES:
+            raise ValueError(f"more than {MAX_DEVICES} devices")
+        return tuple(Pairing(**device) for device in devices)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise FileError(
+            f"the pairing keys in {path} are damaged; restore the file, or make a new key and "
+            "enter it in every headset"
+        ) from error
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold a lock that others hold only for a moment; FileError if it stays held."""
+    end_s = time.monotonic() + _LOCK_S
+    while True:
+        try:
+            lock = FileLock(path)
+            break
+        except FileError:
+            if time.monotonic() > end_s:
+                raise
+            time.sleep(0.01)
+    try:
+        yield
+    finally:
+        lock.release()

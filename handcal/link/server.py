@@ -19,15 +19,17 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link.clock import ClockEstimator
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
+from handcal.link.exchange import Exchange, new_digits
 from handcal.link.greetings import Refusal
 from handcal.link.handshake import Caller, Limiter, Reception
+from handcal.link.invitation import Invitation, new_code
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.poses import PoseBuffer
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
-from handcal.link.transport import Address, UdpTransport
+from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import Packet, Rejection, Slot, Welcome
 from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection, Shape, Target
 
@@ -36,6 +38,7 @@ _LOG = logging.getLogger(__name__)
 _MAX_CONFIRMATIONS = 64
 _NOTICE_S = 5.0
 _RESTART_S = 0.5
+_REFRESH_S = 1.0
 _VERSION_1_HZ = 20.0
 _VERSION_1_NOTICES_HZ = 1.0
 
@@ -157,6 +160,8 @@ class HeadsetServer(Endpoint):
         self._lost = 0
         self._live_frame = 0
         self._next_ping_s = 0.0
+        self._next_refresh_s = 0.0
+        self._unread = ""
         self._start()
 
     @property
@@ -170,6 +175,35 @@ class HeadsetServer(Endpoint):
         """Wearer and rig of the projections that the headset says it draws with."""
         with self._changed:
             return self._shown
+
+    @property
+    def pairings(self) -> Pairings:
+        """The devices that may connect."""
+        return self._pairings
+
+    def invite(self) -> Invitation:
+        """Let one new device pair within ten minutes, by QR code or digits; end other invitations.
+
+        Raises
+        ------
+        LinkError
+            If this machine has no network, or the link is closed.
+        """
+        host, port = reachable_address(self.address)
+        invitation = Invitation(host, port, new_code(), new_digits())
+        with self._changed:
+            self._require_running()
+            self.withdraw()
+            self._pairings.offer(invitation.code)
+            now_s = time.monotonic()
+            self._reception.exchange = Exchange(self._pairings, invitation.digits, now_s)
+        return invitation
+
+    def withdraw(self) -> None:
+        """End the invitation, if there is one."""
+        with self._changed:
+            self._pairings.withdraw()
+            self._reception.exchange = None
 
     def send_cursor(self, points_W_m: ArrayLike, cursor_id: int) -> Outgoing:
         """Send the frozen hand, (N, 3) of frame W, reliably; no points remove it.
@@ -439,6 +473,7 @@ class HeadsetServer(Endpoint):
                 self._pairings.bind(caller.pairing, caller.device_id, caller.name)
             except FileError as error:
                 _LOG.warning("%s; %s is paired until the program ends", error, caller.device_id)
+            self.withdraw()
         key = caller.pairing.key.encode()
         nonce = secrets.token_bytes(wire.NONCE_BYTES)
         welcome = Welcome(secrets.randbits(64) | 1, caller.nonce, nonce)
@@ -501,6 +536,22 @@ class HeadsetServer(Endpoint):
             return ""
         return "the headset draws other projections or another cursor than it was sent"
 
+    def _refresh(self) -> None:
+        """Take over changes of the pairings; end the session of a device that was revoked."""
+        try:
+            self._pairings.refresh()
+            self._unread = ""
+        except FileError as error:
+            if str(error) != self._unread:
+                self._unread = str(error)
+                _LOG.warning("%s; the devices known so far may connect", error)
+        if self._session is not None and self._channel is not None:
+            caller = self._session.caller
+            known = [(one.key, one.device_id) for one in self._pairings.all]
+            if (caller.pairing.key, caller.device_id) not in known:
+                self._send(pb.Envelope(bye=pb.Bye()))
+                self._channel = None
+
     def _take_pong(self, pong: pb.Pong) -> None:
         now_ns = time.monotonic_ns()
         if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * self._settings.silence_s:
@@ -511,6 +562,9 @@ class HeadsetServer(Endpoint):
         )
 
     def _tick(self, now_s: float) -> None:
+        if now_s >= self._next_refresh_s:
+            self._next_refresh_s = now_s + _REFRESH_S
+            self._refresh()
         if now_s >= self._next_ping_s:
             self._next_ping_s = now_s + self._settings.ping_period_s
             self._send(pb.Envelope(ping=pb.Ping(t_sent_host_ns=time.monotonic_ns())))

@@ -13,6 +13,7 @@ from handcal.types import (
     RIG_PARTS,
     CameraIdentity,
     DepthCheck,
+    DisplayCheck,
     EyeDisplay,
     Float64,
     HeadsetIdentity,
@@ -40,6 +41,8 @@ def check_rig(rig: Rig) -> None:
         _check_headset(rig.headset)
     if rig.depth_check is not None:
         _check_depth_check(rig.depth_check)
+    if rig.display_check is not None:
+        _check_display_check(rig.display_check)
     for part, origin in rig.origins.items():
         require(part in RIG_PARTS, f"origins may be of {', '.join(RIG_PARTS)}, not of {part}")
         _check_origin(f"origins.{part}", origin)
@@ -161,6 +164,16 @@ def _check_depth_check(check: DepthCheck) -> None:
         bool(((values_m >= 0) & (values_m < 1)).all()),
         f"{name}.flatness must be at least 0 and below 1 (metres), and so its σ",
     )
+
+
+def _check_display_check(check: DisplayCheck) -> None:
+    name = "display_check"
+    _check_line(f"{name}.made", check.made, MAX_TEXT)
+    for field in ("device_id", "runtime", "app"):
+        _check_line(f"{name}.{field}", getattr(check, field), MAX_NAME, may_be_empty=True)
+    require(bool(check.problems), f"{name} must be of at least one eye")
+    for eye, problem in check.problems.items():
+        _check_line(f"{name}.{eye}", problem, MAX_TEXT, may_be_empty=True)
 
 
 def _check_covariance(name: str, covariance: Float64) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from handcal.display import arcmin_from_px, view_of_eye
 from handcal.geometry import image_points, invert, transform
-from handcal.types import EYES, RIG_PARTS, DepthCheck, EyeDisplay, Float64, Rig
+from handcal.types import EYES, RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Float64, Rig
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
@@ -59,6 +59,11 @@ def missing_parts(rig: Rig) -> tuple[str, ...]:
             "the depth of the depth camera has not been checked: record the board at several "
             f"distances and run '{_CHECK_DEPTH}'"
         )
+    if rig.display_check is None:
+        lines.append(
+            "nobody has checked that the headset draws what it is sent: run "
+            "'handcal rig obey --rig FILE --output NEW'"
+        )
     lines += [
         f"the origin of {part} is not known: calibrate it again to know its uncertainty"
         for part in RIG_PARTS
@@ -102,6 +107,7 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         else "not told in this file",
     )
     yield depth_finding(rig.depth_check)
+    yield display_finding(rig.display_check)
     for part in RIG_PARTS:
         yield _origin_finding(rig, part)
 
@@ -168,6 +174,21 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
         bool(abs(bias_m[worst]) + 2.0 * sigma_m[worst] <= _LARGEST_BIAS_M),
         f"within {1e3 * _LARGEST_BIAS_M:g} mm, including twice its standard deviation",
     )
+
+
+def display_finding(check: DisplayCheck | None) -> RigFinding:
+    """Return what the check of the displays has found."""
+    what, expected = "Display check", "what is drawn moves as the projections say"
+    if check is None:
+        return RigFinding(what, "not told in this file")
+    found = "; ".join(
+        f"{' and '.join(eye for eye in check.problems if check.problems[eye] == text)}: {text}"
+        for text in dict.fromkeys(check.problems.values())
+        if text
+    )
+    by = f"by {check.observer}, {check.app or 'app not known'}, {check.made}"
+    eyes = " and ".join(check.problems)
+    return RigFinding(what, f"{found or f'{eyes} as sent'} ({by})", not found, expected)
 
 
 def _origin_finding(rig: Rig, part: str) -> RigFinding:

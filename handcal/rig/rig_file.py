@@ -28,6 +28,7 @@ from handcal.types import (
     RIG_PARTS,
     CameraIdentity,
     DepthCheck,
+    DisplayCheck,
     EyeDisplay,
     HeadsetIdentity,
     HeadsetView,
@@ -38,6 +39,7 @@ from handcal.types import (
 )
 
 RIG_VERSION = 3
+_CHECK_TEXTS = "made", "observer", "device_id", "runtime", "app"
 DISPLAY_MODEL = "homography"
 """The display model of `EyeDisplay`, the only one so far: ``K H0 UQ`` and its parameters."""
 MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 10 kB with all that may be known
@@ -84,6 +86,7 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
     _write_depth_camera(storage, rig.depth_intrinsics, rig.depth_camera)
     _write_depth_check(storage, rig.depth_check)
     _write_headset(storage, rig.headset)
+    _write_display_check(storage, rig.display_check)
     _write_origins(storage, rig.origins)
     data = storage.releaseAndGetString().encode()
     require(len(data) <= MAX_RIG_BYTES, f"the rig takes more than {MAX_RIG_BYTES:,} bytes")
@@ -206,6 +209,15 @@ def _write_headset(storage: cv2.FileStorage, headset: HeadsetIdentity | None) ->
                 storage.write("T_V_H", view.T_V_H)
 
 
+def _write_display_check(storage: cv2.FileStorage, check: DisplayCheck | None) -> None:
+    if check is None:
+        return
+    with _map(storage, "display_check"):
+        _write_texts(storage, check, _CHECK_TEXTS)
+        for eye, problem in check.problems.items():
+            storage.write(eye, quoted(problem))
+
+
 def _write_origins(storage: cv2.FileStorage, origins: Mapping[RigPart, Origin]) -> None:
     if not origins:
         return
@@ -242,6 +254,7 @@ def _parse(root: Fields) -> Rig:
             depth_camera=CameraIdentity(*map(depth_camera.text, _CAMERA_TEXTS)),
             headset=_parse_headset(root),
             depth_check=_parse_depth_check(root),
+            display_check=_parse_display_check(root),
         )
     check_rig(rig)
     return rig
@@ -292,6 +305,19 @@ def _parse_depth_check(root: Fields) -> DepthCheck | None:
         ranges_m=flatness[:, :2],
         flatness_m=flatness[:, 2],
         flatness_sigma_m=flatness[:, 3],
+    )
+
+
+def _parse_display_check(root: Fields) -> DisplayCheck | None:
+    if not root.has("display_check"):
+        return None
+    fields = root.section("display_check")
+    made, observer, device_id, runtime, app = map(fields.text, _CHECK_TEXTS)
+    is_wearer = observer == "wearer"
+    require(is_wearer or observer == "camera", "display_check.observer must be camera or wearer")
+    problems = {eye: fields.text(eye) for eye in EYES if fields.has(eye)}
+    return DisplayCheck(
+        made, "wearer" if is_wearer else "camera", device_id, runtime, app, problems
     )
 
 

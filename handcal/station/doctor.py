@@ -7,23 +7,34 @@ import os
 import platform
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
+from handcal.camera.camera import Camera
 from handcal.camera.sdk_devices import Device, connected_devices
 from handcal.camera.usb import explain_absence
-from handcal.errors import HandcalError
+from handcal.errors import CancelledError, HandcalError
 from handcal.hand.shipped import load_detector
 from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
+from handcal.link.server import HeadsetServer
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
+from handcal.progress import Progress
 from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
-from handcal.types import CameraIdentity, Intrinsics
+from handcal.station.headset import (
+    STAMP_ADVICE,
+    headset_problem,
+    headset_state,
+    run_pose_delay,
+)
+from handcal.station.procedure import CalibrationSettings
+from handcal.types import CameraIdentity, Intrinsics, Rig
 
 _PACKAGES = (
     "numpy",
@@ -35,6 +46,9 @@ _PACKAGES = (
     "PySide6-Essentials",
     "pyqtgraph",
 )
+_CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
+_SETTLE_S = 2.0
+_POLL_S = 0.05
 _LEAST_FREE_BYTES = 500 * 2**20
 
 
@@ -78,6 +92,44 @@ def examine(rig: Path | None = None) -> list[Finding]:
         _screen(),
         _disk(),
     ]
+
+
+def examine_headset(
+    server: HeadsetServer,
+    rig: Rig | None,
+    camera: Camera | None,
+    patience_s: float,
+    progress: Progress = Progress(),
+) -> list[Finding]:
+    """Wait for a headset and report on it; with a camera and a rig, also on its pose stamps.
+
+    Never raises, except CancelledError.
+    """
+    end_s = time.monotonic() + patience_s
+    while not server.connected and (left_s := end_s - time.monotonic()) > 0.0:
+        progress.at(1.0 - left_s / patience_s, "Waiting for the headset")
+        time.sleep(_POLL_S)
+    settled_s = time.monotonic() + _SETTLE_S
+    while server.connected and time.monotonic() < settled_s:
+        progress.at(1.0, "Measuring the link")
+        time.sleep(_POLL_S)
+    device, link = server.device, server.statistics()
+    problem = headset_problem(device, link, rig)
+    if not link.connected:
+        return [Finding("Headset", Health.BROKEN, "none connected", problem)]
+    health = Health.LIMITED if problem else Health.GOOD
+    found = [Finding("Headset", health, headset_state(device, link), problem)]
+    if camera is None or rig is None:
+        return found
+    what = "Pose stamps"
+    try:
+        delay = run_pose_delay(server, camera, rig.T_H_D, _CAMERA_LATENCY_S, progress=progress)
+    except CancelledError:
+        raise
+    except HandcalError as error:
+        return [*found, Finding(what, Health.LIMITED, "not checked", str(error))]
+    health, advice = (Health.BROKEN, STAMP_ADVICE) if delay.is_wrong else (Health.GOOD, "")
+    return [*found, Finding(what, health, str(delay), advice)]
 
 
 def _python() -> Finding:

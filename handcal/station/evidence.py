@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.rig.compare import compare_camera
-from handcal.rig.report import depth_finding
+from handcal.rig.report import depth_finding, display_finding
 from handcal.types import CameraIdentity, Frame, Intrinsics, Rig
 
 FROZEN_FRAMES = 4
@@ -55,6 +55,11 @@ class Evidence:
                 f"the rig's depth check found {finding.found}; calibrate the depth camera, or "
                 "check it again",
             )
+
+        if rig.display_check is not None:
+            shown = display_finding(rig.display_check)
+            if not shown.is_fine:
+                self._add("disobeying-display", f"the headset does not obey: {shown.found}")
 
     @property
     def contradictions(self) -> tuple[Contradiction, ...]:

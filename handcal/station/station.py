@@ -21,6 +21,7 @@ from handcal.errors import CameraError, FileError, LinkError
 from handcal.geometry import invert, transform
 from handcal.io.closable import Closable
 from handcal.io.settings import settings_json
+from handcal.link.invitation import Invitation
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
@@ -40,7 +41,7 @@ from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.solve_again import stored_solve_settings
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import Eye, Float64, Frame, Target
+from handcal.types import Eye, Float64, Frame, HeadsetIdentity, Target
 
 _VIEW_PERIOD_S = 0.1
 _STORE_PERIOD_S = 1.0
@@ -128,6 +129,30 @@ class Station(Closable):
     def pairing_key(self) -> str:
         """The key with which the next new headset connects."""
         return self._pairings.open_key()
+
+    @property
+    def pairings(self) -> Pairings:
+        """The headsets that may connect."""
+        return self._pairings
+
+    @property
+    def headset(self) -> HeadsetIdentity | None:
+        """The connected headset, as it introduced itself; None before it has."""
+        return self._link.device
+
+    def invite(self) -> Invitation:
+        """Let one new headset pair within ten minutes, by QR code or digits.
+
+        Raises
+        ------
+        LinkError
+            If this machine has no network.
+        """
+        return self._link.invite()
+
+    def withdraw_invitation(self) -> None:
+        """End the invitation, if there is one."""
+        self._link.withdraw()
 
     @property
     def address(self) -> tuple[str, int]:

@@ -74,6 +74,7 @@ COMMANDS = {
     "rig grid": "--png OUTPUT/grid.png",
     "rig check": "RIG --json OUTPUT/checked.json",
     "rig compare": "RIG RIG",
+    "rig obey": "--headset virtual --rig RIG --output OUTPUT/rig.yaml",
     "rig migrate": "RIG --output OUTPUT/rig.yaml",
     "evaluate cube net": "--pdf OUTPUT/net.pdf --cube OUTPUT/cube.json",
     "evaluate cube simulate": "OUTPUT/captures --poses 1",
@@ -82,12 +83,14 @@ COMMANDS = {
     "study methods": "--quick --workers 1 --output OUTPUT",
     "bench": "--quick --json OUTPUT/bench.json",
     "doctor": "",
+    "devices": "",
+    "run": "--headset virtual --camera simulator --rig SMALL --output OUTPUT",
 }
 SLOW = {"study noise", "study methods", "bench", "evaluate cube simulate"}
 NEED_MORE = {
     "replay", "evaluate cube capture", "evaluate cube report", "evaluate detector",
     "study recorded", "rig take", "rig camera", "rig stereo", "rig convert", "rig display",
-    "rig make", "rig depth", "evaluate segmentation",
+    "rig make", "rig depth", "evaluate segmentation", "pair",
 }  # fmt: skip
 """Commands whose input would have to be made first; they write as those above."""
 

@@ -4,9 +4,11 @@ from pathlib import Path
 import pytest
 
 from handcal.errors import FileError, LinkError
+from handcal.io.lock import FileLock
 from handcal.link.pairing import (
     KEY_VARIABLE,
     MAX_DEVICES,
+    OFFER_S,
     Pairing,
     Pairings,
     new_pairing_key,
@@ -105,3 +107,72 @@ def test_a_damaged_file_is_said_and_left_alone(tmp_path: Path, content: bytes) -
         Pairings.read(path)
     assert "\n" not in str(error.value)
     assert path.read_bytes() == content
+
+
+def test_an_offered_key_is_for_one_device_and_a_limited_time(tmp_path: Path) -> None:
+    path = tmp_path / "pairing.key"
+    pairings = Pairings.read(path)
+    first, second = new_pairing_key(), new_pairing_key()
+    pairings.offer(first, now_s=0.0)
+    pairings.offer(second, now_s=1.0)
+    assert not path.exists()
+    assert [one.key for one in pairings.offered(OFFER_S - 1.0)] == [first, second]
+    pairings.bind(pairings.offered(0.0)[0], "00000000000000ff", "Lab 2")
+    assert Pairings.read(path).all == (Pairing(first, "00000000000000ff", "Lab 2"),)
+    assert [one.key for one in pairings.offered(OFFER_S)] == [second]
+    assert not pairings.offered(OFFER_S + 1.0)
+    pairings.offer(first)
+    pairings.withdraw()
+    assert not pairings.offered(0.0)
+
+
+def test_devices_are_renamed_and_revoked(tmp_path: Path) -> None:
+    path = tmp_path / "pairing.key"
+    pairings = Pairings.read(path)
+    for number in (1, 2):
+        pairings.open_key()
+        pairings.bind(pairings.all[-1], f"{number:016x}", f"Lab {number}")
+    pairings.rename(f"{1:016x}", "Ward")
+    pairings.revoke(f"{2:016x}")
+    assert [one.name for one in Pairings.read(path).all] == ["Ward"]
+    for change in (pairings.revoke, lambda device: pairings.rename(device, "")):
+        with pytest.raises(LinkError, match="see handcal devices"):
+            change(f"{2:016x}")
+    with pytest.raises(ValueError, match="40 characters"):
+        pairings.rename(f"{1:016x}", 41 * "n")
+    assert [one.name for one in Pairings.read(path).all] == ["Ward"]
+
+
+def test_the_changes_of_two_programs_are_both_kept(tmp_path: Path) -> None:
+    path = tmp_path / "pairing.key"
+    one, other = Pairings.read(path), Pairings.read(path)
+    for number, pairings in enumerate((one, other, one, other)):
+        key = new_pairing_key()
+        pairings.offer(key)
+        pairings.bind(Pairing(key), f"{number:016x}", "")
+    one.refresh()
+    assert one.all == other.all == Pairings.read(path).all
+    assert len(one.all) == 4
+
+
+def test_a_file_that_is_damaged_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "pairing.key"
+    pairings = Pairings.read(path)
+    known = Pairing(pairings.open_key())
+    path.write_bytes(b"{")
+    for change in (pairings.refresh, pairings.renew):
+        with pytest.raises(FileError, match="damaged"):
+            change()
+    with pytest.raises(FileError, match="damaged"):
+        pairings.bind(known, "00000000000000ff", "Lab 2")
+    assert path.read_bytes() == b"{"
+
+
+def test_a_lock_that_stays_held_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("handcal.link.pairing._LOCK_S", 0.0)
+    pairings = Pairings.read(tmp_path / "pairing.key")
+    lock = FileLock(tmp_path / "pairing.key.lock")
+    with pytest.raises(FileError, match="in use by process"):
+        pairings.open_key()
+    lock.release()
+    pairings.renew()

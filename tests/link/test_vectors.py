@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
+import re
 import struct
 from collections import defaultdict
 from typing import Any, TypeAlias
@@ -39,9 +40,27 @@ def published() -> dict[str, Any]:
     return read
 
 
-def hkdf(key: bytes, info: bytes) -> bytes:
-    root = hmac.new(b"handcal link 2", key, hashlib.sha256).digest()
-    return hmac.new(root, info + b"\x01", hashlib.sha256).digest()
+def hkdf(key: bytes, info: bytes, salt: bytes = b"handcal link 2", size: int = 32) -> bytes:
+    root = hmac.new(salt, key, hashlib.sha256).digest()
+    block = found = b""
+    for number in range(1, 10):
+        block = hmac.new(root, block + info + bytes([number]), hashlib.sha256).digest()
+        found += block
+    return found[:size]
+
+
+def pi_times_2_to(bits: int) -> int:
+    """Return ⌊2^bits π⌋ by Machin's formula."""
+
+    def arctan_of_inverse(x: int) -> int:
+        total, power, odd = 0, (1 << bits + 64) // x, 1
+        while power:
+            total += power // odd if odd % 4 == 1 else -(power // odd)
+            power //= x * x
+            odd += 2
+        return total
+
+    return 4 * (4 * arctan_of_inverse(5) - arctan_of_inverse(239)) >> 64
 
 
 def keys_of(published: dict[str, Any], kind: str, direction: str) -> bytes:
@@ -122,8 +141,39 @@ def test_the_handshake(published: dict[str, Any]) -> None:
     assert sizes[1] <= 3 * sizes[0]
 
 
+def test_pairing_by_digits(published: dict[str, Any]) -> None:
+    """As docs/protocol.md says it, with the prime from its formula in RFC 3526."""
+    vectors = published["pairing_by_digits"]
+    device, nonce = (bytes.fromhex(published[name]) for name in ("device_id", "headset_nonce"))
+    prime = 2**2048 - 2**1984 - 1 + 2**64 * (pi_times_2_to(1918) + 124476)
+
+    def derive(key: bytes, info: bytes, size: int) -> bytes:
+        return hkdf(key, info, b"handcal pair 2", size)
+
+    info = b"generator" + device + nonce
+    root = int.from_bytes(derive(vectors["digits"].encode(), info, 272), "big") % prime
+    generator = pow(root, 2, prime)
+    secrets = [int(vectors[name], 16) for name in ("headset_secret", "pc_secret")]
+    values = [pow(generator, secret, prime).to_bytes(256, "big") for secret in secrets]
+    for value, name in zip(values, ("pair", "paired"), strict=True):
+        key = b"handcal pair to pc" if name == "pair" else b"handcal pair to headset"
+        header, number, body = opened(bytes.fromhex(vectors[name]), key)
+        assert header == (b"hC", 2, 0, 0, int(published["device_id"], 16), 0, 0, 1)
+        assert (BODIES[number], body[1], body[2]) == (name, [nonce], [value])
+    context = device + nonce + values[0] + values[1]
+    shared = pow(generator, secrets[0] * secrets[1], prime).to_bytes(256, "big")
+    assert derive(shared, b"key" + context, 24).hex() == vectors["pairing_key"]
+    assert derive(shared, b"proof" + context, 16).hex() == vectors["proof"]
+    assert body[3] == [bytes.fromhex(vectors["proof"])]
+    assert len(vectors["paired"]) <= len(vectors["pair"]) + 2 * 16
+
+
+def test_the_invitation(published: dict[str, Any]) -> None:
+    assert re.fullmatch(r"HANDCAL://[0-9.]+:[0-9]{1,5}/[A-Z2-7]{26}", published["invitation"])
+
+
 def test_every_message_is_sealed_in_its_slot(published: dict[str, Any]) -> None:
-    seen = {"hello", "retry", "welcome", "refused"}
+    seen = {"hello", "retry", "welcome", "refused", "pair", "paired"}
     for direction in ("to_pc", "to_headset"):
         key = keys_of(published, "session", direction)
         for sequence, one in enumerate(published[direction], 1):

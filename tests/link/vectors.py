@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from handcal.geometry import rigid
-from handcal.link import greetings, messages, nudges, wire
+from handcal.link import exchange, greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.greetings import Refusal
+from handcal.link.invitation import Invitation
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.reliable import Receipt
@@ -24,6 +25,9 @@ from tests.helpers import ROOT
 
 PATH = ROOT / "docs/protocol_vectors.json"
 KEY = b"a pairing key of the vectors"
+INVITATION = Invitation("192.168.1.20", 47800, "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
+DIGITS = "01234567"
+SECRET, PC_SECRET = int("9b" * 32, 16), int("c5" * 32, 16)
 DEVICE_ID = "0123456789abcdef"
 DEVICE = int(DEVICE_ID, 16)
 NONCE, PC_NONCE, COOKIE = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
@@ -84,10 +88,12 @@ def build() -> dict[str, Any]:
     return {
         "protocol": wire.VERSION,
         "pairing_key": KEY.decode(),
+        "invitation": INVITATION.text,
         "device_id": DEVICE_ID,
         "headset_nonce": NONCE.hex(),
         "pc_nonce": PC_NONCE.hex(),
         "session": f"{WELCOME.session:016x}",
+        "pairing_by_digits": _pairing_by_digits(),
         "keys": {"handshake": _hex(greeting), "session": _hex(session)},
         "handshake": [
             _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS, b"", "Lab 2")),
@@ -104,6 +110,25 @@ def build() -> dict[str, Any]:
             "both_and_cursor": drawn.hex(),
             "both_and_cursor_offline": offline.hex(),
         },
+    }
+
+
+def _pairing_by_digits() -> dict[str, str]:
+    """Return an exchange with fixed secrets."""
+    value = exchange.public_value(DIGITS, DEVICE, NONCE, SECRET)
+    pc_value = exchange.public_value(DIGITS, DEVICE, NONCE, PC_SECRET)
+    agreed = exchange.agree(DEVICE, NONCE, value, pc_value, SECRET, is_pc=False)
+    keys = exchange.PUBLIC_KEYS
+    request = _greeting(keys.to_pc, exchange.pair(NONCE, value, "Lab 2"))
+    answer = _greeting(keys.to_headset, exchange.paired(NONCE, pc_value, agreed.proof))
+    return {
+        "digits": DIGITS,
+        "headset_secret": f"{SECRET:064x}",
+        "pc_secret": f"{PC_SECRET:064x}",
+        "pair": request["datagram"],
+        "paired": answer["datagram"],
+        "proof": agreed.proof.hex(),
+        "pairing_key": agreed.key,
     }
 
 

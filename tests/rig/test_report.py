@@ -5,7 +5,14 @@ import numpy as np
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.report import missing_parts, report_rig
-from handcal.types import CameraIdentity, DepthCheck, HeadsetIdentity, Origin, Rig
+from handcal.types import (
+    CameraIdentity,
+    DepthCheck,
+    DisplayCheck,
+    HeadsetIdentity,
+    Origin,
+    Rig,
+)
 
 RIG = example_rig()
 
@@ -26,7 +33,7 @@ def test_exchanged_eyes_are_told() -> None:
     assert doubtful(exchanged) == {"Viewpoints": "left and right are exchanged"}
 
 
-def test_a_depth_camera_that_looks_away_is_told() -> None:
+def test_a_depth_camera_that_looks_away_is_reported() -> None:
     turned = replace(RIG, T_H_D=RIG.T_H_D @ rigid([np.radians(30.0), 0.0, 0.0]))
     assert set(doubtful(turned)) == {
         f"{eye}: seen by the depth camera at 0.4 to 0.6 m" for eye in ("left", "right")
@@ -39,7 +46,7 @@ def test_a_display_too_near_and_a_viewpoint_too_far_are_told() -> None:
     assert {"left: z(C0→S)", "left: C0 from V"} <= set(found)
 
 
-def test_a_part_that_was_not_good_is_told_with_its_reason() -> None:
+def test_a_part_that_was_not_good_is_reported_with_its_reason() -> None:
     origin = Origin("grid", "today", 3, 0.2, "bad", "the camera moved", ("x_m",), np.eye(1))
     found = doubtful(replace(RIG, origins={"left": origin}))
     assert found == {"Calibration of left": "bad: the camera moved (grid, today)"}
@@ -74,7 +81,7 @@ def test_a_depth_that_may_be_biased_is_in_doubt() -> None:
 
 def test_missing_parts_are_told_one_line_each() -> None:
     lines = missing_parts(RIG)
-    assert len(lines) == 6
+    assert len(lines) == 7
     assert all("\n" not in line for line in lines)
     assert "model and serial number are not known: connect it and run 'handcal rig" in lines[0]
     model = replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415"))
@@ -85,6 +92,7 @@ def test_missing_parts_are_told_one_line_each() -> None:
         depth_camera=CameraIdentity("Intel RealSense D415", "123"),
         headset=HeadsetIdentity("0a1b"),
         depth_check=depth_check(0.0),
+        display_check=DisplayCheck("today", "wearer", "0a1b", "", "", {"left": ""}),
         origins={"left": origin, "right": origin, "T_H_D": origin},
     )
     assert missing_parts(whole) == ()

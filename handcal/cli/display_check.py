@@ -1,0 +1,153 @@
+"""``handcal rig obey``: the check that a headset draws what it is sent."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from handcal.cli.output import console
+from handcal.cli.run import KEYS, LISTEN, paired_headsets
+from handcal.cli.terminal import arg, command, number
+from handcal.errors import HandcalError
+from handcal.io.files import make_folder
+
+if TYPE_CHECKING:
+    from handcal.link.server import HeadsetServer
+    from handcal.rig.obey import Probe
+    from handcal.station.display_check import Answer, Observe, Show
+    from handcal.types import Eye, Rig
+
+_MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"
+
+
+@command(
+    arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
+    arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+    arg(
+        "--headset",
+        choices=("network", "virtual"),
+        default="network",
+        help="a paired headset that connects; or a simulated one before a simulated camera",
+    ),
+    arg(
+        "--viewpoint",
+        metavar="SOURCE",
+        help="number of the viewpoint camera in the system (default: ask who looks through the "
+        "display)",
+    ),
+    arg(
+        "--eyes",
+        choices=("both", "left", "right"),
+        default="both",
+        help="the eyes to check",
+    ),
+    arg(
+        "--mode",
+        choices=_MODES,
+        default="obeys",
+        help="what the simulated headset does with the projection; see docs/offline.md",
+    ),
+    arg(
+        "--patience-s",
+        type=number(float, 1.0, 86_400.0),
+        metavar="S",
+        default=120.0,
+        help="longest time until a headset connects",
+    ),
+    *LISTEN,
+    KEYS,
+)
+def obey(arguments: argparse.Namespace) -> None:
+    """Check that a connected headset draws what it is sent, and put that into a rig file."""
+    from handcal.rig.report import display_finding
+    from handcal.rig.rig_file import read_rig, write_rig
+    from handcal.station.display_check import run_display_check
+    from handcal.types import EYES
+
+    rig = read_rig(arguments.rig)
+    eyes = EYES if arguments.eyes == "both" else (arguments.eyes,)
+    with ExitStack() as stack:
+        if arguments.headset == "virtual":
+            server, observe = stack.enter_context(_simulated(rig, arguments.mode))
+        else:
+            server = stack.enter_context(_network(arguments))
+            observe = stack.enter_context(_observer(arguments.viewpoint))
+        is_asked = arguments.headset == "network" and arguments.viewpoint is None
+        made = run_display_check(
+            server, rig, observe, "wearer" if is_asked else "camera", eyes=eyes
+        )
+    finding = display_finding(made)
+    console.print(f"{'good' if finding.is_fine else 'bad'}: {finding.found}", markup=False)
+    make_folder(arguments.output.parent)
+    write_rig(arguments.output, replace(rig, display_check=made))
+    console.print(str(arguments.output), markup=False)
+    if not finding.is_fine:
+        raise HandcalError("the headset does not draw what it is sent; see above")
+
+
+@contextmanager
+def _simulated(rig: Rig, mode: str) -> Iterator[tuple[HeadsetServer, Observe]]:
+    from handcal.link.client import HeadsetClient
+    from handcal.link.pairing import new_device_id, new_pairing_key
+    from handcal.link.server import HeadsetServer
+    from handcal.sim.display import DISPLAY_MODES, SimulatedDisplay
+    from handcal.station.display_check import by_camera
+    from handcal.types import HeadsetIdentity
+
+    key = new_pairing_key().encode()
+    identity = HeadsetIdentity(new_device_id(), "Simulated display", "simulator", mode)
+    with (
+        HeadsetServer(key) as server,
+        HeadsetClient(server.address, key, identity) as client,
+    ):
+        server.wait_connected(10.0)
+        camera = SimulatedDisplay(client, rig, next(one for one in DISPLAY_MODES if one == mode))
+        yield server, by_camera(camera, camera.place, settle_s=0.0)
+
+
+@contextmanager
+def _network(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
+    from handcal.link.server import HeadsetServer
+
+    pairings = paired_headsets(arguments.keys)
+    if not pairings.all:
+        raise HandcalError("no headset is paired; pair one with handcal pair")
+    with HeadsetServer(pairings, (arguments.host, arguments.port)) as server:
+        console.print("Waiting for the headset")
+        server.wait_connected(arguments.patience_s)
+        yield server
+
+
+@contextmanager
+def _observer(viewpoint: str | None) -> Iterator[Observe]:
+    from handcal.camera.viewpoint import open_viewpoint
+    from handcal.station.display_check import by_camera, by_wearer
+
+    if viewpoint is None:
+        yield by_wearer(_ask)
+        return
+    if not viewpoint.isdecimal():
+        raise HandcalError("the viewpoint camera must be a live one: give its number")
+
+    def ready(eye: Eye) -> None:
+        console.input(f"Put the camera before the {eye} eye's display, then press Enter ")
+
+    with open_viewpoint(int(viewpoint)) as camera:
+        yield by_camera(camera, ready)
+
+
+def _ask(eye: Eye, probe: Probe, show: Show) -> Answer:
+    """Ask the person at the display how far the square has moved."""
+    answers: dict[str, Answer] = {"1": "whole", "2": "part", "3": "none"}
+    console.print(f"Look at the square through the {eye} display ({probe}).")
+    while True:
+        console.input("Press Enter, and watch how far it moves to the right ")
+        show(probe)
+        typed = console.input("1: its own width  2: less or more  3: not at all  Enter: again ")
+        if typed.strip() in answers:
+            return answers[typed.strip()]
+        show("rest")

@@ -1,0 +1,146 @@
+"""``handcal run``: a calibration without a window."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
+from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
+from handcal.cli.terminal import arg, command, number
+from handcal.errors import LinkError
+from handcal.io.files import make_folder
+
+if TYPE_CHECKING:
+    from handcal.link.pairing import Pairings
+
+LISTEN = (
+    arg("--host", default="0.0.0.0", metavar="ADDRESS", help="address to listen on"),  # noqa: S104
+    arg("--port", type=number(int, 1, 65535), metavar="N", default=47800, help="UDP port"),
+)
+KEYS = arg(
+    "--keys",
+    type=Path,
+    metavar="FILE",
+    help="file of the paired headsets (default: the key in the environment variable "
+    "HANDCAL_PAIRING_KEY, else the file of the desktop program)",
+)
+_CONTRADICTED = 3
+_SHARE = number(float, 0.0, 1.0)
+
+
+@command(
+    arg(
+        "--headset",
+        choices=("network", "virtual"),
+        required=True,
+        help="a paired headset that connects; or the virtual one, with a simulated wearer",
+    ),
+    arg(
+        "--camera",
+        metavar="SOURCE",
+        required=True,
+        help="realsense; simulator, with the virtual headset; or the path of a recording, which is "
+        "played in a loop",
+    ),
+    arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
+    arg(
+        "--plan",
+        choices=("paper",),
+        default="paper",
+        help="alignments to make: as many as --alignments says, where the hand is",
+    ),
+    arg(
+        "--alignments",
+        type=number(int, 1, 20),
+        default=1,
+        metavar="K",
+        help="number of alignments; with --eyes each, of each eye",
+    ),
+    arg(
+        "--eyes",
+        choices=("both", "each"),
+        default="both",
+        help="align both eyes at once, or each eye alone",
+    ),
+    arg("--wearer", default="", metavar="NAME", help="name or code of the wearer"),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        default=Path("sessions"),
+        help="folder in which the session is created",
+    ),
+    *LISTEN,
+    KEYS,
+    arg(
+        "--patience-s",
+        type=number(float, 1.0, 86_400.0),
+        metavar="S",
+        default=120.0,
+        help="longest time for the wearer and the headset to do one step",
+    ),
+    arg("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of the simulated wearer"),
+    arg("--loss", type=_SHARE, metavar="P", default=0.0, help="virtual headset: datagrams lost"),
+    arg("--reorder", type=_SHARE, metavar="P", default=0.0, help="virtual headset: and reordered"),
+    *REALSENSE_OPTIONS,
+    json=True,
+)
+def run(arguments: argparse.Namespace) -> None:
+    """Calibrate one wearer without a window, for scripts and for testing headset apps."""
+    from handcal.station.run import RunSettings, run_calibration
+    from handcal.station.settings import StationSettings
+
+    is_recording = arguments.camera not in ("realsense", "simulator")
+    station = StationSettings(
+        source="recording" if is_recording else arguments.camera,
+        recording=arguments.camera if is_recording else "",
+        realsense=realsense_of(arguments),
+        headset=arguments.headset,
+        host=arguments.host,
+        port=arguments.port,
+        rig=str(arguments.rig),
+        seed=arguments.seed,
+        loss=arguments.loss,
+        reorder=arguments.reorder,
+        sessions=str(make_folder(arguments.output)),
+    )
+    settings = RunSettings(
+        station,
+        arguments.wearer,
+        arguments.plan,
+        arguments.alignments,
+        arguments.eyes,
+        arguments.patience_s,
+    )
+    pairings = paired_headsets(arguments.keys) if arguments.headset == "network" else None
+    with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
+        result = run_calibration(settings, progress, pairings)
+    save(arguments.json, result)
+    shown_table = table("eye", "φ solved, mm", "± σ, mm", "verdict", "headset applied it")
+    for eye, found in result["eyes"].items():
+        shift, sigma = triple(found["shift_mm"]), triple(found["sigma_mm"])
+        is_applied = "yes" if found["projection_acked"] else "no"
+        shown_table.add_row(eye, shift, sigma, found["verdict"], is_applied)
+    console.print(shown_table)
+    for eye, found in result["eyes"].items():
+        console.print(f"{eye}: {found['verdict']}: {found['reason']}", markup=False)
+    console.print(f"Session: {result['session']}", markup=False)
+    if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
+        sys.exit(_CONTRADICTED)
+
+
+def paired_headsets(path: Path | None) -> Pairings:
+    """Return the headsets that may connect: of a file, or one with the key in the environment."""
+    from handcal.link.pairing import KEY_VARIABLE, Pairing, Pairings, pairing_file
+
+    key = os.environ.get(KEY_VARIABLE, "")
+    if path is not None or not key:
+        return Pairings.read(path or pairing_file())
+    try:
+        return Pairings((Pairing(key),))
+    except ValueError as error:
+        raise LinkError(f"{error}; see {KEY_VARIABLE}") from error

@@ -1,0 +1,112 @@
+"""Discovery of the PC on the local network: DNS-SD over multicast DNS (RFC 6762, RFC 6763)."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+import time
+from dataclasses import dataclass
+
+from zeroconf import Error, ServiceBrowser, ServiceInfo, ServiceListener, Zeroconf
+
+from handcal.errors import LinkError
+from handcal.io.closable import Closable
+from handcal.link.transport import Address
+from handcal.link.wire import VERSION
+
+SERVICE = "_handcal._udp.local."
+_MAX_FOUND = 32
+_MAX_NAME = 60
+
+
+@dataclass(frozen=True, slots=True)
+class FoundPC:
+    """A PC that invites a headset."""
+
+    name: str
+    address: Address
+
+
+class Announcement(Closable):
+    """Announces the PC on the local network until closed; construction takes about a second.
+
+    Raises
+    ------
+    LinkError
+        If the network does not allow it; pairing works without, if the address is typed.
+    """
+
+    def __init__(self, address: Address, name: str = "", interface: str = "") -> None:
+        name = (name or socket.gethostname()).split(".")[0][:_MAX_NAME] or "handcal"
+        host, port = address
+        info = ServiceInfo(
+            SERVICE,
+            f"{name}.{SERVICE}",
+            port=port,
+            addresses=[ipaddress.ip_address(host.partition("%")[0]).packed],
+            properties={"protocol": str(VERSION)},
+            server=f"{name}.local.",
+        )
+        self._zeroconf = _open(interface)
+        try:
+            self._zeroconf.register_service(info, allow_name_change=True)
+        except (Error, OSError) as error:
+            self._zeroconf.close()
+            raise LinkError(f"cannot announce this PC on the local network: {error}") from error
+
+    def close(self) -> None:
+        """Take the announcement back; safe to call twice."""
+        self._zeroconf.close()
+
+
+def find_pcs(timeout_s: float = 2.0, interface: str = "") -> list[FoundPC]:
+    """Return the PCs that announce themselves on the local network now.
+
+    Raises
+    ------
+    LinkError
+        If the network does not allow it.
+    """
+    zeroconf = _open(interface)
+    names = _Names()
+    try:
+        browser = ServiceBrowser(zeroconf, SERVICE, names)
+        time.sleep(timeout_s)  # that nobody else answers cannot be known
+        browser.cancel()
+        found = (_look_up(zeroconf, name) for name in sorted(names.found)[:_MAX_FOUND])
+        return [one for one in found if one is not None]
+    finally:
+        zeroconf.close()
+
+
+def _look_up(zeroconf: Zeroconf, name: str) -> FoundPC | None:
+    info = zeroconf.get_service_info(SERVICE, name)
+    addresses = info.parsed_addresses() if info is not None else []
+    if info is None or not addresses or not info.port:
+        return None
+    shown = "".join(one for one in name.removesuffix(f".{SERVICE}") if one >= " ")
+    return FoundPC(shown[:_MAX_NAME], (addresses[0], info.port))
+
+
+class _Names(ServiceListener):
+    """Collects the names of services."""
+
+    def __init__(self) -> None:
+        self.found: set[str] = set()
+
+    def add_service(self, zc: Zeroconf, type_: str, name: str) -> None:  # noqa: ARG002
+        if len(self.found) < _MAX_FOUND:
+            self.found.add(name)
+
+    def update_service(self, zc: Zeroconf, type_: str, name: str) -> None:
+        pass
+
+    def remove_service(self, zc: Zeroconf, type_: str, name: str) -> None:  # noqa: ARG002
+        self.found.discard(name)
+
+
+def _open(interface: str) -> Zeroconf:
+    try:
+        return Zeroconf(interfaces=[interface]) if interface else Zeroconf()
+    except (Error, OSError) as error:
+        raise LinkError(f"cannot use multicast on the local network: {error}") from error

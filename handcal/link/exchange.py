@@ -1,0 +1,179 @@
+"""Agreement on a pairing key by a few digits (SPEKE: IEEE 1363.2, ISO/IEC 11770-4).
+
+Both ends raise the same secret generator, derived from the digits, to a random power modulo the
+2,048-bit prime of RFC 3526. Who overhears or takes part without the digits learns nothing by which
+to try digits afterwards: every guess costs one attempt with the PC, which allows only a few.
+"""
+
+from __future__ import annotations
+
+import hmac
+import re
+import secrets
+from dataclasses import dataclass
+
+from handcal.link import greetings, messages, wire
+from handcal.link import handcal_pb2 as pb
+from handcal.link.messages import MalformedError
+from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings
+from handcal.link.wire import NONCE_BYTES, Packet, Rejection
+
+DIGITS = 8
+MAX_ATTEMPTS = 5
+"""Attempts that are answered; one of them succeeds by chance with 5 in 10⁸."""
+PUBLIC_KEYS = wire.Keys(to_headset=b"handcal pair to headset", to_pc=b"handcal pair to pc")
+"""Keys of the datagrams, known to everyone: they only tell that a datagram is whole."""
+PROOF_BYTES = 16
+PRIME = int(
+    "FFFFFFFFFFFFFFFFC90FDAA22168C234C4C6628B80DC1CD129024E088A67CC74"
+    "020BBEA63B139B22514A08798E3404DDEF9519B3CD3A431B302B0A6DF25F1437"
+    "4FE1356D6D51C245E485B576625E7EC6F44C42E9A637ED6B0BFF5CB6F406B7ED"
+    "EE386BFB5A899FA5AE9F24117C4B1FE649286651ECE45B3DC2007CB8A163BF05"
+    "98DA48361C55D39A69163FA8FD24CF5F83655D23DCA3AD961C62F356208552BB"
+    "9ED529077096966D670C354E4ABC9804F1746C08CA18217C32905E462E36CE3B"
+    "E39E772C180E86039B2783A2EC07A28FB5C55DF06F4C52C9DE2BCBF695581718"
+    "3995497CEA956AE515D2261898FA051015728E5A8AACAA68FFFFFFFFFFFFFFFF",
+    16,
+)
+VALUE_BYTES = 256
+_SALT = b"handcal pair 2"
+_SECRET_BITS = 256
+_GENERATOR_BYTES = VALUE_BYTES + 16  # the remainder is then as good as uniform
+_KEY_BYTES = 24
+_NOT_DIGITS = re.compile(r"[^0-9]")
+
+
+@dataclass(frozen=True, slots=True)
+class Agreed:
+    """The result of an exchange, the same at both ends if both had the same digits."""
+
+    key: str
+    """The pairing key: 48 hexadecimal digits, as text."""
+    proof: bytes
+    """The PC sends it, so that the headset knows a wrong code at once."""
+
+
+def new_digits() -> str:
+    """Return new random digits."""
+    return f"{secrets.randbelow(10**DIGITS):0{DIGITS}}"
+
+
+def read_digits(text: str) -> str:
+    """Return the digits in a text as typed, with any spaces; ValueError if there are not 8."""
+    digits = _NOT_DIGITS.sub("", text)
+    if len(digits) != DIGITS:
+        raise ValueError(f"the code has {DIGITS} digits, not {len(digits)}")
+    return digits
+
+
+def new_secret() -> int:
+    """Return a new random exponent."""
+    return secrets.randbits(_SECRET_BITS) | 1
+
+
+def public_value(digits: str, device: int, nonce: bytes, secret: int) -> bytes:
+    """Return what an end sends: the generator of this attempt to the power of its secret."""
+    info = b"generator" + _attempt(device, nonce)
+    root = int.from_bytes(wire.hkdf(digits.encode(), _SALT, info, _GENERATOR_BYTES), "big") % PRIME
+    # A square generates the subgroup of prime order, so that nothing leaks about the digits.
+    return pow(root, 2 * secret, PRIME).to_bytes(VALUE_BYTES, "big")
+
+
+def agree(
+    device: int, nonce: bytes, headset_value: bytes, pc_value: bytes, secret: int, is_pc: bool
+) -> Agreed:
+    """Return the pairing key from both public values and one's own secret.
+
+    Raises
+    ------
+    MalformedError
+        If the other's public value is none.
+    """
+    other = headset_value if is_pc else pc_value
+    if len(other) != VALUE_BYTES or not 1 < (value := int.from_bytes(other, "big")) < PRIME - 1:
+        raise MalformedError("no public value")
+    shared = pow(value, secret, PRIME).to_bytes(VALUE_BYTES, "big")
+    context = _attempt(device, nonce) + headset_value + pc_value
+    return Agreed(
+        wire.hkdf(shared, _SALT, b"key" + context, _KEY_BYTES).hex(),
+        wire.hkdf(shared, _SALT, b"proof" + context, PROOF_BYTES),
+    )
+
+
+def _attempt(device: int, nonce: bytes) -> bytes:
+    return device.to_bytes(8, "big") + nonce
+
+
+class Exchange:
+    """The PC's side: answers a few attempts while the digits are shown.
+
+    Parameters
+    ----------
+    pairings : Pairings
+        The agreed key is offered here; only the headset that has it can connect with it.
+    digits : str
+    now_s : float
+    """
+
+    def __init__(self, pairings: Pairings, digits: str, now_s: float) -> None:
+        self._pairings = pairings
+        self._digits = digits
+        self._until_s = now_s + OFFER_S
+        self._answers: dict[tuple[int, bytes], pb.Envelope] = {}
+
+    def hear(self, packet: Packet, datagram: bytes, now_s: float) -> bytes | Rejection:
+        """Return the datagram to answer with, or the reason for no answer.
+
+        Raises
+        ------
+        MalformedError
+            If the datagram is whole, but asks for no pairing.
+        """
+        if now_s > self._until_s or not wire.is_authentic(PUBLIC_KEYS.to_pc, datagram):
+            return Rejection.UNPAIRED
+        message = read_pair(messages.parse(packet.payload))
+        attempt = packet.sequence, message.nonce
+        if attempt not in self._answers:
+            if len(self._answers) >= MAX_ATTEMPTS:
+                refused = greetings.refused_code(message.nonce)
+                return greetings.seal(PUBLIC_KEYS.to_headset, packet.sequence, refused)
+            self._answers[attempt] = self._answer(packet.sequence, message, now_s)
+        return greetings.seal(PUBLIC_KEYS.to_headset, packet.sequence, self._answers[attempt])
+
+    def _answer(self, device: int, message: pb.Pair, now_s: float) -> pb.Envelope:
+        secret = new_secret()
+        value = public_value(self._digits, device, message.nonce, secret)
+        agreed = agree(device, message.nonce, message.public_value, value, secret, is_pc=True)
+        self._pairings.offer(agreed.key, now_s)
+        return paired(message.nonce, value, agreed.proof)
+
+
+def pair(nonce: bytes, value: bytes, name: str) -> pb.Envelope:
+    """Make the headset's request."""
+    return pb.Envelope(pair=pb.Pair(nonce=nonce, public_value=value, name=name))
+
+
+def read_pair(envelope: pb.Envelope) -> pb.Pair:
+    """Return the request in an envelope."""
+    message = envelope.pair
+    if envelope.WhichOneof("body") != "pair" or len(message.nonce) != NONCE_BYTES:
+        raise MalformedError("a pairing begins with a nonce")
+    messages.read_text(message.name, MAX_NAME_CHARACTERS)
+    return message
+
+
+def paired(nonce: bytes, value: bytes, proof: bytes) -> pb.Envelope:
+    """Make the PC's answer."""
+    return pb.Envelope(paired=pb.Paired(nonce=nonce, public_value=value, proof=proof))
+
+
+def finish(message: pb.Paired, device: int, nonce: bytes, value: bytes, secret: int) -> str | None:
+    """Return the headset's pairing key from the PC's answer; None if the digits are wrong.
+
+    Raises
+    ------
+    MalformedError
+        If the answer is malformed.
+    """
+    agreed = agree(device, nonce, value, message.public_value, secret, is_pc=False)
+    return agreed.key if hmac.compare_digest(agreed.proof, message.proof) else None

@@ -1,0 +1,94 @@
+"""An invitation to pair: the PC's address and a one-time code, as a text and as a QR code."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from dataclasses import dataclass
+
+import segno
+
+from handcal.errors import LinkError
+
+CODE_CHARACTERS = 26
+_ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"
+_BORDER = 4
+_TEXT = re.compile(
+    rf"HANDCAL://(?:\[(?P<ipv6>[0-9A-F:.]+)\]|(?P<host>[A-Z0-9.-]+)):(?P<port>[0-9]{{1,5}})"
+    rf"/(?P<code>[{_ALPHABET}]{{{CODE_CHARACTERS}}})(?:\?.*)?"
+)
+
+
+def new_code() -> str:
+    """Return a new random one-time code of 130 bits; it is a pairing key."""
+    return "".join(secrets.choice(_ALPHABET) for _ in range(CODE_CHARACTERS))
+
+
+@dataclass(frozen=True, slots=True)
+class Invitation:
+    """Everything that a headset needs in order to connect for the first time."""
+
+    host: str
+    """Address of the PC in numbers, or its name."""
+    port: int
+    code: str
+    """One-time code, which becomes the device's pairing key."""
+    digits: str = ""
+    """Short code for a headset that knows the address; not part of the QR code."""
+
+    @property
+    def text(self) -> str:
+        """The text of the QR code, as ``HANDCAL://192.168.1.20:47800/ABCDEFGHIJKLMNOPQRSTUVWXYZ``.
+
+        In capitals, which a QR code holds in less space.
+        """
+        host = self.host.partition("%")[0].upper()
+        return f"HANDCAL://{f'[{host}]' if ':' in host else host}:{self.port}/{self.code}"
+
+
+def read_invitation(text: str) -> Invitation:
+    """Return the invitation in a text, scanned or typed; capitals do not matter.
+
+    Raises
+    ------
+    LinkError
+        If it is none.
+    """
+    found = _TEXT.fullmatch(text.strip().upper())
+    if found is None or not 0 < int(found["port"]) < 65536:
+        raise LinkError("this is no invitation of handcal; scan the QR code of handcal pair")
+    return Invitation((found["ipv6"] or found["host"]).lower(), int(found["port"]), found["code"])
+
+
+def qr_matrix(text: str) -> tuple[tuple[bool, ...], ...]:
+    """Return the QR code of a text by rows, with its border; True is dark."""
+    rows = segno.make_qr(text, error="m").matrix_iter(border=_BORDER)
+    return tuple(tuple(bool(module) for module in row) for row in rows)
+
+
+def qr_svg(text: str) -> str:
+    """Return the QR code of a text as SVG, black on white, one unit for each module."""
+    rows = qr_matrix(text)
+    dark = "".join(
+        f"M{x} {y}h1v1h-1z"
+        for y, row in enumerate(rows)
+        for x, is_dark in enumerate(row)
+        if is_dark
+    )
+    size = len(rows)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size} {size}" '
+        f'shape-rendering="crispEdges"><path fill="#fff" d="M0 0h{size}v{size}H0z"/>'
+        f'<path d="{dark}"/></svg>'
+    )
+
+
+def qr_lines(text: str) -> list[str]:
+    """Return the QR code of a text as lines of half blocks, to print black on white."""
+    rows = [*qr_matrix(text)]
+    if len(rows) % 2:
+        rows.append((False,) * len(rows))
+    return [
+        "".join(" ▄▀█"[2 * above + below] for above, below in zip(*pair, strict=True))
+        for pair in zip(rows[::2], rows[1::2], strict=True)
+    ]

@@ -1,0 +1,129 @@
+"""The commands for paired headsets."""
+
+import re
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from handcal.cli.main import main
+from handcal.link import inviting
+from handcal.link.client import HeadsetClient
+from handcal.link.invitation import read_invitation
+from handcal.link.pairing import Pairing, Pairings
+from handcal.types import HeadsetIdentity
+from tests.helpers import eventually
+
+DEVICE, OTHER = "00000000000000aa", "00000000000000bb"
+PORT = 47941
+
+
+@pytest.fixture
+def handcal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    def run(*arguments: object) -> None:
+        monkeypatch.setattr(sys, "argv", ["handcal", *map(str, arguments)])
+        main()
+
+    return run
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> Path:
+    path = tmp_path / "pairing.key"
+    pairings = Pairings.read(path)
+    for device, name in ((DEVICE, "Lab 1"), (OTHER, "[bold]Lab 2")):
+        key = f"the pairing key of {device}"
+        pairings.bind(Pairing(key), device, name)
+    return path
+
+
+def test_devices_are_listed_renamed_and_revoked(
+    handcal: Callable[..., None], keys: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    handcal("devices", "--keys", keys)
+    shown = capsys.readouterr().out
+    assert re.search(rf"{DEVICE} +Lab 1", shown)
+    assert "[bold]Lab 2" in shown
+    assert "the pairing key" not in shown
+    handcal("devices", "--keys", keys, "--rename", DEVICE, "Ward", "--revoke", OTHER)
+    shown = capsys.readouterr().out
+    assert re.search(rf"{DEVICE} +Ward", shown)
+    assert OTHER not in shown
+    handcal("devices", "--keys", keys, "--revoke", DEVICE)
+    assert "handcal pair" in capsys.readouterr().out
+    assert Pairings.read(keys).all == ()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "problem"),
+    [
+        (["--revoke", "ff"], 1, "no device 'ff' is paired"),
+        (["--rename", DEVICE, 41 * "n"], 2, "40 characters"),
+        (["--rename", DEVICE, "two\nlines"], 2, "control characters"),
+    ],
+)
+def test_a_wrong_device_or_name_changes_nothing(
+    handcal: Callable[..., None],
+    keys: Path,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    code: int,
+    problem: str,
+) -> None:
+    before = keys.read_bytes()
+    with pytest.raises(SystemExit) as ended:
+        handcal("devices", "--keys", keys, *words)
+    error = capsys.readouterr().err
+    assert ended.value.code == code
+    assert problem in error
+    assert error.count("\n") == 1
+    assert keys.read_bytes() == before
+
+
+def test_a_damaged_file_is_said_and_kept(
+    handcal: Callable[..., None], keys: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys.write_bytes(b"{")
+    for command in ("devices", "pair"):
+        with pytest.raises(SystemExit):
+            handcal(command, "--keys", keys)
+        assert "damaged; restore the file" in capsys.readouterr().err
+    assert keys.read_bytes() == b"{"
+
+
+def test_a_headset_is_paired_by_what_is_shown(
+    handcal: Callable[..., None],
+    keys: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown: list[str] = []
+
+    class Silent:
+        def __init__(self, _address: object) -> None: ...
+        def __enter__(self) -> None: ...
+        def __exit__(self, *_: object) -> None: ...
+
+    monkeypatch.setattr(inviting, "Announcement", Silent)
+
+    def connect() -> None:
+        def is_shown() -> bool:
+            shown.append(capsys.readouterr().out)
+            return "type HANDCAL://" in "".join(shown)
+
+        eventually(is_shown, 20.0)
+        invitation = read_invitation("".join(shown).split("type ")[1].split()[0])
+        address = (invitation.host, invitation.port)
+        with HeadsetClient(address, invitation.code.encode(), HeadsetIdentity("c" * 16)) as client:
+            client.wait_connected(5.0)
+
+    thread = threading.Thread(target=connect)
+    thread.start()
+    handcal("pair", "--keys", keys, "--host", "127.0.0.1", "--port", PORT)
+    thread.join()
+    text = "".join(shown) + capsys.readouterr().out
+    assert f"Paired: a headset ({'c' * 16})" in text
+    assert re.search(r"type \d{4} \d{4}", text)
+    assert Pairings.read(keys).all[-1].device_id == "c" * 16
