@@ -33,6 +33,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         files = [file for source in sources for file in sorted(source.glob("*.cs"))]
         kind = "exe" if name.endswith(".exe") else "library"
         options = ["-langversion:7", "-warn:4", "-warnaserror", f"-target:{kind}"]
+        options += ["-r:System.Numerics.dll"]  # part of .NET Standard
         options += [f"-define:{defines}"] if defines else []
         command = ["mcs", *options, f"-out:{folder / name}", *map(str, files)]
         run = subprocess.run(command, capture_output=True, text=True)

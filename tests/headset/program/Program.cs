@@ -22,6 +22,8 @@ namespace Handcal.Link.Tests
                 case "pose": Lines(Numbers.Pose); break;
                 case "focus": Lines(Numbers.Focus); break;
                 case "invitation": Lines(Invited); break;
+                case "digits": Console.WriteLine(Vectors.Digits(Console.In)); break;
+                case "pair": Console.WriteLine(Paired(arguments)); break;
                 case "hostile": Lines(Hostile); break;
                 case "run": new Remote(arguments).Run(); break;
                 case "time": Timing.Run(arguments); break;
@@ -40,6 +42,15 @@ namespace Handcal.Link.Tests
         {
             if (!Invitation.TryRead(text, out Invitation one)) return "none";
             return one.Host + " " + one.Port + " " + Encoding.ASCII.GetString(one.Key);
+        }
+
+        /// <summary>Arguments: host, port, digits, identity. Returns the key or the problem.</summary>
+        static string Paired(string[] arguments)
+        {
+            ulong device = ulong.Parse(arguments[4], NumberStyles.HexNumber);
+            byte[] key = Digits.Pair(
+                arguments[1], int.Parse(arguments[2]), arguments[3], device, "Lab-2", 5, out string problem);
+            return key == null ? problem : Encoding.ASCII.GetString(key);
         }
 
         /// <summary>Reads any bytes as a payload of the PC; anything but MalformedException is a fault.</summary>
@@ -181,6 +192,18 @@ namespace Handcal.Link.Tests
             var outbox = new HMACSHA256(keys.ToPc);
             for (int i = 0; i < outgoing.Count; i++)
                 Tell("to_pc", Seal(outbox, session, (ulong)i + 1, outgoing[i].Key, outgoing[i].Value));
+        }
+
+        /// <summary>Reads digits, identity, nonce, secret, name and the PC's answer; returns request and key.</summary>
+        public static string Digits(TextReader input)
+        {
+            string digits = input.ReadLine();
+            ulong device = ulong.Parse(input.ReadLine(), NumberStyles.HexNumber);
+            var exchange = new Digits(digits, device, Bytes(input.ReadLine()), Bytes(input.ReadLine()));
+            string request = Hex(exchange.Request(input.ReadLine()));
+            byte[] answer = Bytes(input.ReadLine());
+            bool isEnd = exchange.TryRead(answer, answer.Length, out byte[] key, out string problem);
+            return request + " " + isEnd + " " + (key == null ? problem : Encoding.ASCII.GetString(key));
         }
 
         static KeyValuePair<Slot, byte[]> Message(Slot slot, byte[] payload)

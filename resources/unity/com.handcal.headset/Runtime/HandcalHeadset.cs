@@ -1,5 +1,7 @@
 using System;
+using System.Collections.Concurrent;
 using System.Diagnostics;
+using System.Threading.Tasks;
 using Handcal.Link;
 using UnityEngine;
 using Debug = UnityEngine.Debug;
@@ -46,6 +48,8 @@ namespace Handcal
         /// </summary>
         public Func<long> PoseTimeNs;
 
+        const double PairPatienceS = 5;
+        readonly ConcurrentQueue<Action> agreed = new ConcurrentQueue<Action>();  // from another thread
         HeadsetLink link;
         PairingFile pairing;
         HeadsetState drawn = new HeadsetState();
@@ -76,7 +80,7 @@ namespace Handcal
                 if (IsConnected) return drawn.Prompt;
                 string whose = drawn.Left == null && drawn.Right == null
                     ? "" : "\nShowing the calibration of " + drawn.Wearer + ", rig " + drawn.Rig;
-                if (!pairing.IsPaired) return "Scan the QR code that handcal shows on the PC" + whose;
+                if (!pairing.IsPaired) return "Scan the QR code that handcal shows on the PC, or type its address and digits" + whose;
                 return (link != null && link.Problem.Length > 0 ? link.Problem : "Waiting for the PC") + whose;
             }
         }
@@ -100,13 +104,35 @@ namespace Handcal
         }
 
         /// <summary>
-        /// Pairs with the PC of an invitation, scanned or typed; false if the text is none.
+        /// Pairs with the PC by the text of its QR code, scanned or typed; or by its address and the
+        /// 8 digits that it shows, "192.168.1.20:47800 12345678". False if the text is neither.
         /// </summary>
         public bool Pair(string text)
         {
-            if (!Invitation.TryRead(text, out Invitation one)) return false;
-            pairing.Store(one.Host, one.Port, one.Key);
-            Connect();
+            if (Invitation.TryRead(text, out Invitation one))
+            {
+                pairing.Store(one.Host, one.Port, one.Key);
+                Connect();
+                return true;
+            }
+            string[] parts = (text ?? "").Trim().Split(new[] { ' ' }, 2);
+            if (parts.Length < 2 || !Invitation.TrySplit(parts[0], out string host, out int port)) return false;
+            ulong device = pairing.DeviceId;
+            string name = Introduction().Name;
+            Task.Run(() =>
+            {
+                byte[] key = Digits.Pair(host, port, parts[1], device, name, PairPatienceS, out string problem);
+                agreed.Enqueue(() =>
+                {
+                    if (key == null)
+                    {
+                        Warn(problem);
+                        return;
+                    }
+                    pairing.Store(host, port, key);
+                    Connect();
+                });
+            });
             return true;
         }
 
@@ -161,6 +187,7 @@ namespace Handcal
 
         void Update()
         {
+            while (agreed.TryDequeue(out Action connect)) connect();
             if (link == null)
             {
                 drawing.Show(drawn, showsText ? Text : "");

@@ -88,7 +88,7 @@ namespace Handcal.Link
                 else if (body == (int)Body.Refused && field == 2) reason = message.Number();
                 else if (body == (int)Body.Refused && field == 3) other = Check.Text(message.Text(), 40);
             }
-            if (!AreEqual(echo, nonce)) return Rejection.Replayed;
+            if (!Keys.AreEqual(echo, nonce)) return Rejection.Replayed;
             switch ((Body)body)
             {
                 case Body.Retry:
@@ -120,14 +120,6 @@ namespace Handcal.Link
         {
             nonce = Keys.RandomBytes(Keys.NonceBytes);
             cookie = new byte[0];
-        }
-
-        static bool AreEqual(byte[] a, byte[] b)
-        {
-            if (a.Length != b.Length) return false;
-            for (int i = 0; i < a.Length; i++)
-                if (a[i] != b[i]) return false;
-            return true;
         }
     }
 }

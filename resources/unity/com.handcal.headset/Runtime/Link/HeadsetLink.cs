@@ -183,7 +183,7 @@ namespace Handcal.Link
             {
                 try
                 {
-                    if (socket == null) socket = Open();
+                    if (socket == null) socket = Open(host, port);
                     bool hasArrived = socket.Poll(IdleWaitUs, SelectMode.SelectRead);
                     lock (gate)
                     {
@@ -210,7 +210,7 @@ namespace Handcal.Link
         }
 
         /// <summary>True if nobody listens there yet, or a datagram is unreadable: go on.</summary>
-        static bool IsHarmless(SocketException error)
+        internal static bool IsHarmless(SocketException error)
         {
             return error.SocketErrorCode == SocketError.ConnectionReset
                 || error.SocketErrorCode == SocketError.ConnectionRefused
@@ -218,7 +218,7 @@ namespace Handcal.Link
                 || error.SocketErrorCode == SocketError.WouldBlock;
         }
 
-        Socket Open()
+        internal static Socket Open(string host, int port)
         {
             IPAddress[] addresses = Dns.GetHostAddresses(host);
             if (addresses.Length == 0) throw new SocketException((int)SocketError.HostNotFound);

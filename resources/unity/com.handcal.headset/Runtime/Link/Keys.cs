@@ -9,6 +9,7 @@ namespace Handcal.Link
     {
         public const int MinPairingKeyBytes = 16;
         public const int NonceBytes = 16;
+        const int KeyBytes = 32;
         static readonly byte[] Salt = Encoding.ASCII.GetBytes("handcal link 2");
 
         public readonly byte[] ToPc;
@@ -16,8 +17,8 @@ namespace Handcal.Link
 
         Keys(byte[] pairingKey, string kind, byte[] context)
         {
-            ToPc = Hkdf(pairingKey, Join(Encoding.ASCII.GetBytes(kind + " to pc"), context));
-            ToHeadset = Hkdf(pairingKey, Join(Encoding.ASCII.GetBytes(kind + " to headset"), context));
+            ToPc = Hkdf(pairingKey, Salt, Join(Encoding.ASCII.GetBytes(kind + " to pc"), context), KeyBytes);
+            ToHeadset = Hkdf(pairingKey, Salt, Join(Encoding.ASCII.GetBytes(kind + " to headset"), context), KeyBytes);
         }
 
         /// <summary>The keys of a device's handshakes.</summary>
@@ -42,23 +43,38 @@ namespace Handcal.Link
             return bytes;
         }
 
-        /// <summary>32 bytes by HKDF-SHA256 (RFC 5869): one block is enough.</summary>
-        static byte[] Hkdf(byte[] key, byte[] info)
+        /// <summary>Bytes by HKDF-SHA256 (RFC 5869).</summary>
+        internal static byte[] Hkdf(byte[] key, byte[] salt, byte[] info, int size)
         {
-            byte[] root;
-            using (var extract = new HMACSHA256(Salt)) root = extract.ComputeHash(key);
+            byte[] root, block = new byte[0];
+            using (var extract = new HMACSHA256(salt)) root = extract.ComputeHash(key);
+            var derived = new byte[size];
             using (var expand = new HMACSHA256(root))
-                return expand.ComputeHash(Join(info, new byte[] { 1 }));
+            {
+                for (int at = 0; at < size; at += block.Length)
+                {
+                    block = expand.ComputeHash(Join(block, info, new[] { (byte)(at / 32 + 1) }));
+                    Buffer.BlockCopy(block, 0, derived, at, Math.Min(block.Length, size - at));
+                }
+            }
+            return derived;
         }
 
-        static byte[] BigEndian(ulong value)
+        internal static bool AreEqual(byte[] a, byte[] b)
+        {
+            int difference = a.Length ^ b.Length;
+            for (int i = 0; i < Math.Min(a.Length, b.Length); i++) difference |= a[i] ^ b[i];
+            return difference == 0;
+        }
+
+        internal static byte[] BigEndian(ulong value)
         {
             var bytes = new byte[8];
             Datagram.WriteBigEndian(bytes, 0, 8, value);
             return bytes;
         }
 
-        static byte[] Join(params byte[][] parts)
+        internal static byte[] Join(params byte[][] parts)
         {
             int size = 0;
             foreach (byte[] part in parts) size += part.Length;

@@ -37,6 +37,8 @@ namespace Handcal.Link
         Show = 18,
         Verify = 19,
         Nudge = 20,
+        Pair = 21,
+        Paired = 22,
     }
 
     /// <summary>Points of frame W: each is origin + 0.1 mm × (x, y, z).</summary>

@@ -1,7 +1,7 @@
 using Handcal;
 using UnityEngine;
 
-/// <summary>Asks for the text under the PC's QR code while the headset is not paired.</summary>
+/// <summary>Asks for the PC's address and digits, or the text under its QR code.</summary>
 public sealed class PairByTyping : MonoBehaviour
 {
     public HandcalHeadset headset;
@@ -10,7 +10,7 @@ public sealed class PairByTyping : MonoBehaviour
     /// <summary>Opens the keyboard: call it from a button or a voice command.</summary>
     public void Ask()
     {
-        keyboard = TouchScreenKeyboard.Open("HANDCAL://");
+        keyboard = TouchScreenKeyboard.Open("");
     }
 
     void Update()
