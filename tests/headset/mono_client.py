@@ -93,7 +93,7 @@ class MonoClient(Closable):
 
     @property
     def refusal(self) -> str:
-        """What is wrong with the connection, for the wearer."""
+        """The problem of the connection, for the wearer."""
         return _text(self.told.get("problem", ""))
 
     def state(self) -> HeadsetState:

@@ -14,7 +14,7 @@ namespace Handcal.Link
     public sealed class HeadsetLink : IDisposable
     {
         const double HelloPeriodS = 0.1, RefusedPeriodS = 1.0, SilenceS = 2.0, ReopenPeriodS = 1.0;
-        const int IdleWaitUs = 20000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3;
+        const int IdleWaitUs = 20000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3, EndMs = 1000;
         static readonly Stopwatch Clock = Stopwatch.StartNew();
 
         readonly object gate = new object();
@@ -174,7 +174,7 @@ namespace Handcal.Link
                 for (int i = 0; i < Byes; i++) Send(Envelope.Bye());
                 isClosing = true;
             }
-            if (thread.IsAlive) thread.Join();
+            if (thread.IsAlive) thread.Join(EndMs);  // it may wait for a name server
         }
 
         void Run()
