@@ -3,9 +3,11 @@
 # Arguments go to pytest: -m quick for a check within two minutes, -m "" for every test.
 set -euo pipefail
 lock=installer/requirements.lock # everything, also what the checks and the extras need
-test_packages=(xvfb xauth xdotool poppler-utils) # real windows on a virtual screen, and PDF pages
+# Real windows on a virtual screen, PDF pages, and the headset's program in C#.
+test_packages=(xvfb xauth xdotool poppler-utils mono-mcs mono-runtime)
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
+export HANDCAL_REQUIRE_MONO=1 # installed above: no test may be skipped for want of it
 export OMP_NUM_THREADS=1 # two threads on two busy cores are slower than one
 export PATH="$root/.venv/bin:$PATH"
 ruff check

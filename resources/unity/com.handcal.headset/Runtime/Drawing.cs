@@ -1,0 +1,134 @@
+using System;
+using Handcal.Link;
+using UnityEngine;
+using Cursor = Handcal.Link.Cursor;
+
+namespace Handcal
+{
+    /// <summary>
+    /// Draws what the PC wants shown. Points and shapes are fixed in the space of the camera's
+    /// parent, in which poses are sent; the target is fixed to the eye's camera.
+    /// </summary>
+    sealed class Drawing : IDisposable
+    {
+        static readonly int[] Quadrilateral = { 0, 1, 1, 2, 2, 3, 3, 0 };
+        static readonly int[] Cube = { 0, 1, 1, 2, 2, 3, 3, 0, 4, 5, 5, 6, 6, 7, 7, 4, 0, 4, 1, 5, 2, 6, 3, 7 };
+        static readonly Color Blue = new Color(0.2f, 0.5f, 1), Red = new Color(1, 0.15f, 0.1f);
+        const float DotPx = 3, LinePx = 2, TextDistanceM = 2;
+
+        readonly Strokes cursor, live, shape, target;
+        readonly TextMesh text;
+        Cursor shownCursor;
+        LiveHand shownLive;
+        Shape shownShape;
+        Target shownTarget;
+        int shownVersion;
+
+        public Drawing(Transform head)
+        {
+            cursor = new Strokes("cursor", head.parent, Color.white, DotPx, false);
+            live = new Strokes("live hand", head.parent, Blue, DotPx, false);
+            shape = new Strokes("shape", head.parent, Color.white, LinePx, false);
+            target = new Strokes("target", head, Color.white, LinePx, true);
+            var holder = new GameObject("handcal text");
+            holder.transform.SetParent(head, false);
+            holder.transform.localPosition = new Vector3(0, -0.12f * TextDistanceM, TextDistanceM);
+            text = holder.AddComponent<TextMesh>();
+            text.anchor = TextAnchor.UpperCenter;
+            text.alignment = TextAlignment.Center;
+            text.fontSize = 64;
+            text.characterSize = 0.006f * TextDistanceM;
+        }
+
+        public void Show(HeadsetState state, string line)
+        {
+            if (text.text != line) text.text = line;
+            ShowCursor(state.Cursor);
+            ShowLive(state.Live);
+            if (shownShape != state.Shape) ShowShape(state.Shape);
+            if (shownTarget != state.Target) ShowTarget(state.Target);
+        }
+
+        /// <summary>Draws only what belongs to the eye that is rendered next.</summary>
+        public void BeginEye(Eyes eye)
+        {
+            cursor.BeginEye(eye);
+            live.BeginEye(eye);
+            shape.BeginEye(eye);
+            target.BeginEye(eye);
+        }
+
+        public void Dispose()
+        {
+            cursor.Dispose();
+            live.Dispose();
+            shape.Dispose();
+            target.Dispose();
+            UnityEngine.Object.Destroy(text.gameObject);
+        }
+
+        void ShowCursor(Cursor shown)
+        {
+            if (shownCursor == shown) return;
+            shownCursor = shown;
+            Points points = shown == null ? Points.Nothing : shown.Points;
+            var positionsM = new float[3 * points.Count];
+            points.CopyTo(positionsM, 0, 1);
+            cursor.Begin(points.Count);
+            for (int i = 0; i < points.Count; i++) cursor.Set(i, Unity(positionsM, i), Unity(positionsM, i));
+            cursor.End();
+        }
+
+        void ShowLive(LiveHand shown)
+        {
+            int version = shown == null ? 0 : shown.Version;
+            if (shownLive == shown && shownVersion == version) return;
+            shownLive = shown;
+            shownVersion = version;
+            int count = shown == null ? 0 : shown.Count;
+            live.Begin(count);
+            if (count == 0) return;
+            live.Color = shown.IsRed ? Red : Blue;
+            live.Eyes = shown.Eyes;
+            for (int i = 0; i < count; i++)
+            {
+                int to = shown.IsOutline ? (i + 1) % count : i;
+                live.Set(i, Unity(shown.PositionsM, i), Unity(shown.PositionsM, to));
+            }
+            live.End();
+        }
+
+        void ShowShape(Shape shown)
+        {
+            shownShape = shown;
+            if (shown != null) shape.Eyes = shown.Eyes;
+            ShowEdges(shape, shown == null ? new double[0] : shown.CornersWM, 1);
+        }
+
+        void ShowTarget(Target shown)
+        {
+            shownTarget = shown;
+            if (shown != null) target.Eyes = shown.Eye;
+            ShowEdges(target, shown == null ? new double[0] : shown.CornersVM, -1);
+        }
+
+        /// <summary>Draws a quadrilateral or a cube. Of OpenGL's camera axes, z turns as well.</summary>
+        static void ShowEdges(Strokes strokes, double[] cornersM, int zSign)
+        {
+            int[] edges = cornersM.Length == 24 ? Cube : cornersM.Length == 12 ? Quadrilateral : new int[0];
+            var corners = new Vector3[cornersM.Length / 3];
+            for (int i = 0; i < corners.Length; i++)
+                corners[i] = new Vector3(
+                    (float)cornersM[3 * i], -(float)cornersM[3 * i + 1], zSign * (float)cornersM[3 * i + 2]);
+            strokes.Begin(edges.Length / 2);
+            for (int i = 0; i < edges.Length; i += 2) strokes.Set(i / 2, corners[edges[i]], corners[edges[i + 1]]);
+            strokes.End();
+        }
+
+        /// <summary>Point i, from OpenCV's axes to Unity's.</summary>
+        static Vector3 Unity(float[] positionsM, int i)
+        {
+            return new Vector3(positionsM[3 * i], -positionsM[3 * i + 1], positionsM[3 * i + 2]);
+        }
+    }
+}

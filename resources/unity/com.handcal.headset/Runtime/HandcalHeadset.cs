@@ -1,0 +1,279 @@
+using System;
+using System.Collections.Concurrent;
+using System.Diagnostics;
+using System.Threading.Tasks;
+using Handcal.Link;
+using UnityEngine;
+using Debug = UnityEngine.Debug;
+
+namespace Handcal
+{
+    /// <summary>
+    /// Makes the headset's camera one that handcal calibrates: it connects to the PC, sends poses,
+    /// draws each eye with its calibrated projection and the rig's view, shows what the PC asks
+    /// for, and confirms. Built-in render pipeline, multi-pass.
+    /// </summary>
+    [RequireComponent(typeof(Camera))]
+    [DisallowMultipleComponent]
+    [AddComponentMenu("handcal/handcal headset")]
+    public sealed class HandcalHeadset : MonoBehaviour
+    {
+        [Tooltip("The text under the PC's QR code (handcal pair). Empty: as paired before, or call Pair.")]
+        public string invitation = "";
+
+        [Tooltip("Name by which the PC calls this headset. Empty: the device's own.")]
+        public string deviceName = "";
+
+        [Tooltip("Time from the camera's pose to its display, ms, where the app sets no PoseTimeNs.")]
+        public float poseDelayMs;
+
+        [Tooltip("Stabilise the picture at the virtual image, where reprojection takes nothing of the correction.")]
+        public bool setsFocusPlane = true;
+
+        [Tooltip("Distance of the virtual image, m, until the calibration tells it.")]
+        public float focusDistanceM = 2;
+
+        [Tooltip("The wearer's eye distance, mm, if it is measured, as by eye tracking. 0: it is not.")]
+        public float eyeDistanceMm;
+
+        [Tooltip("Show prompts and the state of the connection in front of the wearer.")]
+        public bool showsText = true;
+
+        [Tooltip("Word to confirm by (Windows devices, with the Microphone capability). Empty: none.")]
+        public string confirmWord = "confirm";
+
+        /// <summary>
+        /// The time that the camera's present pose is for, ns on <see cref="NowNs"/>'s clock: the
+        /// predicted time of display where the runtime tells it. Null: now + poseDelayMs.
+        /// </summary>
+        public Func<long> PoseTimeNs;
+
+        const double PairPatienceS = 5;
+        readonly ConcurrentQueue<Action> agreed = new ConcurrentQueue<Action>();  // from another thread
+        HeadsetLink link;
+        PairingFile pairing;
+        HeadsetState drawn = new HeadsetState();
+        EyeCameras cameras;
+        Drawing drawing;
+        Presses presses;
+        RuntimeViews views;
+        NudgeSum moved;
+        uint movedId;
+        string warning = "";
+
+        /// <summary>The state that is drawn.</summary>
+        public HeadsetState State { get { return drawn; } }
+
+        /// <summary>The wearer whose calibration is drawn with; empty if there is none.</summary>
+        public string Wearer { get { return drawn.Wearer; } }
+
+        public bool IsConnected { get { return link != null && link.IsConnected; } }
+
+        /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>
+        public string Warning { get { return warning; } }
+
+        /// <summary>The prompt, or without a connection its state and whose calibration is shown.</summary>
+        public string Text
+        {
+            get
+            {
+                if (IsConnected) return drawn.Prompt;
+                string whose = drawn.Left == null && drawn.Right == null
+                    ? "" : "\nShowing the calibration of " + drawn.Wearer + ", rig " + drawn.Rig;
+                if (!pairing.IsPaired) return "Scan the QR code that handcal shows on the PC, or type its address and digits" + whose;
+                return (link != null && link.Problem.Length > 0 ? link.Problem : "Waiting for the PC") + whose;
+            }
+        }
+
+        /// <summary>Distance of the virtual image, for the compositor's focus plane, m.</summary>
+        public float FocusDistanceM
+        {
+            get
+            {
+                Projection one = drawn.Left ?? drawn.Right;
+                double foundM = one == null
+                    ? 0 : Matrices.FocusDistanceM(one.P, one.POffline, one.WidthPx, one.HeightPx);
+                return foundM > 0.1 ? (float)foundM : focusDistanceM;
+            }
+        }
+
+        /// <summary>The headset's clock, ns.</summary>
+        public static long NowNs()
+        {
+            return (long)(Stopwatch.GetTimestamp() * (1e9 / Stopwatch.Frequency));
+        }
+
+        /// <summary>
+        /// Pairs with the PC by the text of its QR code, scanned or typed; or by its address and the
+        /// 8 digits that it shows, "192.168.1.20:47800 12345678". False if the text is neither.
+        /// </summary>
+        public bool Pair(string text)
+        {
+            if (Invitation.TryRead(text, out Invitation one))
+            {
+                pairing.Store(one.Host, one.Port, one.Key);
+                Connect();
+                return true;
+            }
+            string[] parts = (text ?? "").Trim().Split(new[] { ' ' }, 2);
+            if (parts.Length < 2 || !Invitation.TrySplit(parts[0], out string host, out int port)) return false;
+            ulong device = pairing.DeviceId;
+            string name = Introduction().Name;
+            Task.Run(() =>
+            {
+                byte[] key = Digits.Pair(host, port, parts[1], device, name, PairPatienceS, out string problem);
+                agreed.Enqueue(() =>
+                {
+                    if (key == null)
+                    {
+                        Warn(problem);
+                        return;
+                    }
+                    pairing.Store(host, port, key);
+                    Connect();
+                });
+            });
+            return true;
+        }
+
+        /// <summary>The wearer says that the hand covers the cursor, or the outline when verifying.</summary>
+        public void Confirm()
+        {
+            ConfirmAt(NowNs());
+        }
+
+        /// <summary>Moves the drawing of the eye that is verified by some steps, each way ±1.</summary>
+        public void Nudge(int right, int down, int larger)
+        {
+            if (link == null || drawn.Verify == null) return;
+            moved = Moved().Plus(drawn.Verify, right, down, larger);
+            link.Nudge(NowNs(), drawn, moved, false);
+        }
+
+        /// <summary>The wearers whose calibrations this headset keeps, the newest first.</summary>
+        public string[] KeptWearers()
+        {
+            return link == null ? new string[0] : link.KeptWearers();
+        }
+
+        /// <summary>Draws with a kept calibration until the PC sends another; false if there is none.</summary>
+        public bool ShowKept(string wearer)
+        {
+            return link != null && link.ShowKept(wearer);
+        }
+
+        void OnEnable()
+        {
+            var eyes = GetComponent<Camera>();
+            pairing = new PairingFile(Application.persistentDataPath);
+            cameras = new EyeCameras(eyes);
+            drawing = new Drawing(transform);
+            presses = new Presses(confirmWord, ConfirmAt);
+            views = new RuntimeViews(eyes);
+            Application.onBeforeRender += SendPose;
+            if (invitation.Length > 0 && !Pair(invitation))
+                Warn("The invitation is not one of handcal: copy the whole text under the QR code.");
+            else if (link == null) Connect();
+        }
+
+        void OnDisable()
+        {
+            Application.onBeforeRender -= SendPose;
+            Disconnect();
+            presses.Dispose();
+            drawing.Dispose();
+            cameras.Reset();
+        }
+
+        void Update()
+        {
+            while (agreed.TryDequeue(out Action connect)) connect();
+            if (link == null)
+            {
+                drawing.Show(drawn, showsText ? Text : "");
+                return;
+            }
+            if (presses.Read())  // of what the last frame showed
+            {
+                if (presses.Right != 0 || presses.Down != 0 || presses.Larger != 0)
+                    Nudge(presses.Right, presses.Down, presses.Larger);
+                if (presses.IsConfirmed) Confirm();
+            }
+            drawn = link.State();
+            byte[] kept = link.TakeKept();
+            if (kept != null) pairing.StoreKept(kept);
+            if (views.HasChanged()) link.SetDevice(Introduction());
+            if (views.Problem.Length > 0 && views.Problem != warning) Warn(views.Problem);
+            drawing.Show(drawn, showsText ? Text : "");
+        }
+
+        // After every script that moves the camera.
+        [BeforeRenderOrder(30000)]
+        void SendPose()
+        {
+            if (link == null) return;
+            // In the space of the camera's parent, in which everything is drawn as well.
+            Vector3 p = transform.localPosition;
+            Quaternion q = transform.localRotation;
+            long timeNs = PoseTimeNs != null ? PoseTimeNs() : NowNs() + (long)(1e6 * poseDelayMs);
+            link.SendPose(Matrices.FromUnity(p.x, p.y, p.z, q.x, q.y, q.z, q.w), timeNs);
+        }
+
+        void OnPreCull()
+        {
+            cameras.Reset();
+            views.Read();
+            cameras.Apply(drawn);
+            if (setsFocusPlane) cameras.SetFocusPlane(FocusDistanceM);
+        }
+
+        void OnPreRender()
+        {
+            drawing.BeginEye(cameras.ActiveEye);
+        }
+
+        void ConfirmAt(long timeNs)
+        {
+            if (link == null) return;
+            if (drawn.Verify != null) link.Nudge(timeNs, drawn, Moved(), true);
+            else if (drawn.Cursor != null && drawn.Cursor.Points.Count > 0) link.Confirm(timeNs, drawn);
+        }
+
+        /// <summary>The nudges of the present verification; a new one begins at zero.</summary>
+        NudgeSum Moved()
+        {
+            if (movedId != drawn.Verify.Id) moved = new NudgeSum();
+            movedId = drawn.Verify.Id;
+            return moved;
+        }
+
+        void Connect()
+        {
+            Disconnect();
+            Kept kept = pairing.ReadKept();
+            if (pairing.Problem.Length > 0) Warn(pairing.Problem);
+            if (!pairing.IsPaired && kept.Count == 0) return;
+            // Without a pairing nobody is called, but the kept calibration is drawn.
+            link = new HeadsetLink(
+                pairing.Host, pairing.Port, pairing.Key, pairing.DeviceId, Introduction(), kept, NowNs);
+        }
+
+        Device Introduction()
+        {
+            return views.Introduction(deviceName, 0.001 * eyeDistanceMm);
+        }
+
+        void Disconnect()
+        {
+            if (link == null) return;
+            link.Dispose();
+            link = null;
+        }
+
+        void Warn(string text)
+        {
+            warning = text;
+            Debug.LogWarning("handcal: " + text, this);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+using System;
+using System.Text;
+
+namespace Handcal.Link
+{
+    /// <summary>
+    /// The PC's address and the pairing key, from the text of a QR code or as typed; protocol.md,
+    /// "Pairing by QR code".
+    /// </summary>
+    public sealed class Invitation
+    {
+        const string Scheme = "HANDCAL://";
+        const int CodeCharacters = 26;
+        public readonly string Host;
+        public readonly int Port;
+        public readonly byte[] Key;
+
+        Invitation(string host, int port, byte[] key)
+        {
+            Host = host;
+            Port = port;
+            Key = key;
+        }
+
+        /// <summary>Reads an invitation; false if the text is none.</summary>
+        public static bool TryRead(string text, out Invitation invitation)
+        {
+            invitation = null;
+            string all = (text ?? "").Trim().Split('?')[0].ToUpperInvariant();
+            if (!all.StartsWith(Scheme, StringComparison.Ordinal)) return false;
+            int slash = all.IndexOf('/', Scheme.Length);
+            if (slash < 0) return false;
+            string address = all.Substring(Scheme.Length, slash - Scheme.Length);
+            string code = all.Substring(slash + 1);
+            bool isCode = code.Length == CodeCharacters;
+            foreach (char one in code) isCode &= (one >= 'A' && one <= 'Z') || (one >= '2' && one <= '7');
+            if (!isCode || !TrySplit(address, out string host, out int port)) return false;
+            invitation = new Invitation(host, port, Encoding.ASCII.GetBytes(code));
+            return true;
+        }
+
+        /// <summary>Splits HOST:PORT or [IPV6]:PORT.</summary>
+        public static bool TrySplit(string address, out string host, out int port)
+        {
+            host = "";
+            port = 0;
+            int colon = address.LastIndexOf(':');
+            if (colon < 1) return false;
+            host = address.Substring(0, colon);
+            bool isBracketed = host[0] == '[' && host[host.Length - 1] == ']';
+            if (isBracketed) host = host.Substring(1, host.Length - 2);
+            else if (host.IndexOf(':') >= 0) return false;
+            return host.Length > 0
+                && int.TryParse(address.Substring(colon + 1), System.Globalization.NumberStyles.None,
+                    System.Globalization.CultureInfo.InvariantCulture, out port)
+                && port > 0 && port < 65536;
+        }
+    }
+}

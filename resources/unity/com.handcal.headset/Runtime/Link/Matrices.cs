@@ -1,0 +1,127 @@
+using System;
+
+namespace Handcal.Link
+{
+    /// <summary>
+    /// Conversions between handcal's matrices (OpenCV axes: x right, y down, z forward; pixel
+    /// centres at whole numbers) and Unity's. All matrices are lists of numbers by rows.
+    /// </summary>
+    public static class Matrices
+    {
+        /// <summary>
+        /// The 4×4 for Camera.SetStereoProjectionMatrix: from OpenGL's axes in V (x right, y up,
+        /// z back) to clip space, the eye's translation included.
+        /// </summary>
+        public static double[] UnityProjection(double[] P, int widthPx, int heightPx, double nearM, double farM)
+        {
+            double scale = 1 / Math.Sqrt(P[8] * P[8] + P[9] * P[9] + P[10] * P[10]);
+            double zScale = (farM + nearM) / (farM - nearM), zOffset = -2 * farM * nearM / (farM - nearM);
+            var clip = new double[16];
+            for (int i = 0; i < 4; i++)
+            {
+                double u = scale * P[i], v = scale * P[4 + i], depth = scale * P[8 + i];
+                double sign = i == 1 || i == 2 ? -1 : 1;  // from OpenGL's axes to OpenCV's
+                clip[i] = sign * (2 * (u + 0.5 * depth) / widthPx - depth);
+                clip[4 + i] = sign * (depth - 2 * (v + 0.5 * depth) / heightPx);
+                clip[8 + i] = sign * (zScale * depth + (i == 3 ? zOffset : 0));
+                clip[12 + i] = sign * depth;
+            }
+            return clip;
+        }
+
+        /// <summary>
+        /// The 4×4 for Camera.SetStereoViewMatrix, to be multiplied with the head's worldToLocal:
+        /// T_V_H from Unity's axes of the head to OpenGL's of the camera.
+        /// </summary>
+        public static double[] UnityViewFromHead(double[] TVH)
+        {
+            var view = new double[16];
+            for (int row = 0; row < 3; row++)
+                for (int column = 0; column < 4; column++)
+                    view[4 * row + column] =
+                        (row == 0 ? 1 : -1) * (column == 1 ? -1 : 1) * TVH[4 * row + column];
+            view[15] = 1;
+            return view;
+        }
+
+        /// <summary>
+        /// The upper 3×4 in OpenCV's axes of a pose given as Unity's position and quaternion; the
+        /// quaternion, which float32 leaves a little long or short, is normalised.
+        /// </summary>
+        public static double[] FromUnity(
+            double x, double y, double z, double qx, double qy, double qz, double qw)
+        {
+            double norm = Math.Sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
+            // Mirrored in y: the axis of a rotation mirrors, and its sense turns.
+            double a = -qx / norm, b = qy / norm, c = -qz / norm, w = qw / norm;
+            return new[]
+            {
+                1 - 2 * (b * b + c * c), 2 * (a * b - c * w), 2 * (a * c + b * w), x,
+                2 * (a * b + c * w), 1 - 2 * (a * a + c * c), 2 * (b * c - a * w), -y,
+                2 * (a * c - b * w), 2 * (b * c + a * w), 1 - 2 * (a * a + b * b), z,
+            };
+        }
+
+        /// <summary>The inverse of a rotation and a translation, and their product.</summary>
+        public static double[] Invert(double[] T)
+        {
+            var inverse = new double[12];
+            for (int row = 0; row < 3; row++)
+                for (int k = 0; k < 3; k++)
+                {
+                    inverse[4 * row + k] = T[4 * k + row];
+                    inverse[4 * row + 3] -= T[4 * k + row] * T[4 * k + 3];
+                }
+            return inverse;
+        }
+
+        public static double[] Multiply(double[] A, double[] B)
+        {
+            var product = new double[12];
+            for (int row = 0; row < 3; row++)
+                for (int column = 0; column < 4; column++)
+                {
+                    double sum = column == 3 ? A[4 * row + 3] : 0;
+                    for (int k = 0; k < 3; k++) sum += A[4 * row + k] * B[4 * k + column];
+                    product[4 * row + column] = sum;
+                }
+            return product;
+        }
+
+        /// <summary>
+        /// Distance from V of the plane in which every point has one pixel in both projections: the
+        /// display's virtual image, and the place for the compositor's focus plane. 0 if the
+        /// projections are too alike to tell; then the plane does not matter.
+        /// </summary>
+        public static double FocusDistanceM(double[] P, double[] POffline, int widthPx, int heightPx)
+        {
+            double slopes = 0, products = 0;
+            foreach (double u in new[] { 0.0, widthPx - 1.0 })
+                foreach (double v in new[] { 0.0, heightPx - 1.0 })
+                {
+                    double[] one = Ray(P, u, v), other = Ray(POffline, u, v);
+                    for (int axis = 0; axis < 2; axis++)
+                    {
+                        double slope = one[2 + axis] - other[2 + axis];
+                        slopes += slope * slope;
+                        products += slope * (one[axis] - other[axis]);
+                    }
+                }
+            return slopes < 1e-12 ? 0 : Math.Max(0, -products / slopes);
+        }
+
+        /// <summary>The line of a pixel: x and y at z = 0 in V, and their slopes over z.</summary>
+        static double[] Ray(double[] P, double u, double v)
+        {
+            // A pixel gives two planes: (P1 - u P3) · p = 0 and (P2 - v P3) · p = 0.
+            double a = P[0] - u * P[8], b = P[1] - u * P[9], c = P[2] - u * P[10], d = P[3] - u * P[11];
+            double e = P[4] - v * P[8], f = P[5] - v * P[9], g = P[6] - v * P[10], h = P[7] - v * P[11];
+            double det = a * f - b * e;
+            return new[]
+            {
+                (b * h - d * f) / det, (d * e - a * h) / det,
+                (b * g - c * f) / det, (c * e - a * g) / det,
+            };
+        }
+    }
+}

@@ -1,0 +1,131 @@
+using System;
+using System.Collections.Generic;
+using Handcal.Link;
+using UnityEngine;
+using UnityEngine.XR;
+
+namespace Handcal
+{
+    /// <summary>
+    /// The eyes' views as the runtime reports them, for the headset's introduction; and what in the
+    /// project keeps the calibrated ones from being drawn.
+    /// </summary>
+    sealed class RuntimeViews
+    {
+        const double ReportedMoveM = 1e-4, WarnedMoveM = 5e-4, PeriodS = 1;
+        readonly Camera camera;
+        readonly List<InputDevice> devices = new List<InputDevice>();
+        readonly Dictionary<Eyes, double[]> tangents = new Dictionary<Eyes, double[]>();
+        List<View> views = new List<View>(), reported = new List<View>(), first;
+        double nextS;
+
+        public RuntimeViews(Camera camera)
+        {
+            this.camera = camera;
+        }
+
+        /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>
+        public string Problem { get; private set; } = "";
+
+        /// <summary>Reads the runtime's views; call before they are overridden.</summary>
+        public void Read()
+        {
+            if (!camera.stereoEnabled || Time.realtimeSinceStartup < nextS) return;
+            nextS = Time.realtimeSinceStartup + PeriodS;
+            if (XRSettings.stereoRenderingMode != XRSettings.StereoRenderingMode.MultiPass)
+                Problem = "The project renders in a single pass, which ignores calibrated projections: "
+                    + "set XR Plug-in Management > Render Mode to Multi Pass.";
+            else if (UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline != null)
+                Problem = "The project uses a scriptable render pipeline, which ignores calibrated projections: "
+                    + "use the built-in one.";
+            var found = new List<View>();
+            AddView(found, Eyes.Left, Camera.StereoscopicEye.Left, CommonUsages.leftEyePosition, CommonUsages.leftEyeRotation);
+            AddView(found, Eyes.Right, Camera.StereoscopicEye.Right, CommonUsages.rightEyePosition, CommonUsages.rightEyeRotation);
+            views = found;
+            if (found.Count < 2) return;
+            first = first ?? found;
+            double movedM = Moved(first, found);
+            if (movedM > WarnedMoveM && Problem.Length == 0)
+                Problem = "The runtime has moved its view by " + (1000 * movedM).ToString("0.0")
+                    + " mm since the start. handcal draws with the rig's view; switch the runtime's own "
+                    + "calibration off if you can.";
+        }
+
+        /// <summary>True if the views have changed since the last introduction.</summary>
+        public bool HasChanged()
+        {
+            return views.Count != reported.Count || Moved(reported, views) > ReportedMoveM;
+        }
+
+        public Device Introduction(string name, double eyeDistanceM)
+        {
+            reported = views;
+            return new Device
+            {
+                Name = name.Length > 0 ? name : SystemInfo.deviceName,
+                Runtime = XRSettings.loadedDeviceName + " " + SystemInfo.operatingSystem,
+                App = Application.productName + " " + Application.version,
+                Views = views,
+                EyeDistanceM = eyeDistanceM,
+            };
+        }
+
+        void AddView(
+            List<View> into, Eyes eye, Camera.StereoscopicEye unityEye,
+            InputFeatureUsage<Vector3> position, InputFeatureUsage<Quaternion> rotation)
+        {
+            devices.Clear();
+            InputDevices.GetDevicesAtXRNode(XRNode.Head, devices);
+            foreach (InputDevice head in devices)
+            {
+                bool isKnown = head.TryGetFeatureValue(position, out Vector3 eyeAt)
+                    & head.TryGetFeatureValue(rotation, out Quaternion eyeTurn)
+                    & head.TryGetFeatureValue(CommonUsages.centerEyePosition, out Vector3 headAt)
+                    & head.TryGetFeatureValue(CommonUsages.centerEyeRotation, out Quaternion headTurn);
+                Matrix4x4 projection = camera.GetStereoProjectionMatrix(unityEye);
+                if (!isKnown || projection[0, 0] == 0 || projection[1, 1] == 0) continue;
+                if (!tangents.ContainsKey(eye)) tangents[eye] = Tangents(projection);
+                double[] TVW = Matrices.Invert(Pose(eyeAt, eyeTurn));
+                into.Add(new View
+                {
+                    Eye = eye,
+                    TVH = Matrices.Multiply(TVW, Pose(headAt, headTurn)),
+                    Tangents = tangents[eye],
+                    WidthPx = Math.Max(1, XRSettings.eyeTextureWidth),
+                    HeightPx = Math.Max(1, XRSettings.eyeTextureHeight),
+                });
+                return;
+            }
+        }
+
+        static double[] Pose(Vector3 p, Quaternion q)
+        {
+            return Matrices.FromUnity(p.x, p.y, p.z, q.x, q.y, q.z, q.w);
+        }
+
+        /// <summary>Left, right, up and down edge of a projection: x/z or y/z with y down.</summary>
+        internal static double[] Tangents(Matrix4x4 m)
+        {
+            return new double[]
+            {
+                (m[0, 2] - 1) / m[0, 0], (m[0, 2] + 1) / m[0, 0],
+                -(m[1, 2] + 1) / m[1, 1], (1 - m[1, 2]) / m[1, 1],
+            };
+        }
+
+        static double Moved(List<View> before, List<View> now)
+        {
+            double most = 0;
+            for (int i = 0; i < Math.Min(before.Count, now.Count); i++)
+                most = Math.Max(most, Distance(before[i].TVH, now[i].TVH));
+            return most;
+        }
+
+        static double Distance(double[] TVH, double[] other)
+        {
+            double[] eye = Matrices.Invert(TVH), otherEye = Matrices.Invert(other);
+            double x = eye[3] - otherEye[3], y = eye[7] - otherEye[7], z = eye[11] - otherEye[11];
+            return Math.Sqrt(x * x + y * y + z * z);
+        }
+    }
+}

@@ -1,0 +1,78 @@
+"""Whole calibrations by the C# link and the real station: the simulated wearer wears it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from handcal.cli.demo import DemoSettings, run_demo
+from handcal.io.resources import resource_path
+from handcal.progress import Progress
+from handcal.station.procedure import CalibrationSettings, State
+from handcal.station.settings import StationSettings
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
+from handcal.types import EYES
+from tests.headset.mono_client import command
+from tests.helpers import Patience
+
+pytestmark = [pytest.mark.process, pytest.mark.slow]
+SEED = 3
+
+Calibrate = Callable[[DemoSettings], dict[str, Any]]
+
+
+@pytest.fixture
+def calibrate(program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calibrate:
+    """Return a function that runs the demo with the C# link in the virtual headset."""
+    monkeypatch.setattr("handcal.sim.process.program_command", lambda: command(program))
+    rig = resource_path("example_rig.yaml")
+    return lambda settings: run_demo(settings, rig, tmp_path, Progress())
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+def test_a_calibration(calibrate: Calibrate, loss: float) -> None:
+    result = calibrate(DemoSettings(seed=SEED, loss=loss, reorder=loss))
+    error_arcmin = result["reprojection_arcmin"]
+    assert error_arcmin["after"] < 0.5 * error_arcmin["before"]
+    assert result["link"]["projection_acked"] == {"left": True, "right": True}
+    assert all(result["eyes"][eye]["evidence"] == [] for eye in EYES)
+    if loss:
+        assert result["link"]["lost"] > 0.15 * result["link"]["sent"]
+
+
+def test_either_side_is_restarted_during_a_calibration(
+    program: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    headset_of: Callable[[int], int],
+) -> None:
+    monkeypatch.setattr("handcal.sim.process.program_command", lambda: command(program))
+    calibration = CalibrationSettings(match_tolerance_s=2.0)
+    settings = StationSettings(seed=SEED, sessions=str(tmp_path), calibration=calibration)
+    with Station(settings, "Ada") as station:
+        _step_until(
+            station, lambda seen: seen.observation is not None and seen.observation.is_steady
+        )
+        station.calibration.make_cursor(EYES)
+        os.kill(headset_of(os.getpid()), signal.SIGKILL)
+        station.restart_headset()
+        _step_until(station, lambda seen: seen.procedure.state is State.ALIGNED)
+        path = station.session.path
+    with Station(settings, resume=path) as station:  # the PC's program anew
+        _step_until(station, lambda seen: seen.link.pose_rate_hz > 0)
+        station.calibration.solve()
+        station.calibration.apply()
+        _step_until(station, lambda seen: seen.procedure.state is State.APPLIED)
+        assert station.calibration.projection_acked == {"left": True, "right": True}
+
+
+def _step_until(station: Station, condition: Callable[[Snapshot], bool]) -> None:
+    patience = Patience(60.0)
+    while not condition(station.step()):
+        assert not patience.is_over(), "it did not come"
