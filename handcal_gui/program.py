@@ -243,6 +243,12 @@ class Program(QObject):
         self.wizard_panel.plan_changed.connect(
             lambda plan: self._remember(replace(self._preferences, plan=plan))
         )
+        self.wizard_panel.hold_changed.connect(
+            lambda is_held: self._remember(replace(self._preferences, runs_itself=not is_held))
+        )
+        self.window.arrangement_changed.connect(
+            lambda chosen: self._remember(replace(self._preferences, arrangement=chosen))
+        )
         panels = self.window.panels
         panels.session.export_requested.connect(lambda: self.export())
         panels.session.inspect_requested.connect(self.inspect)
@@ -277,6 +283,7 @@ class Program(QObject):
             "review": preferences.review_layout,
         }
         self.window.restore_layouts({page: text for page, text in layouts.items() if text})
+        self.window.use_arrangement(preferences.arrangement)
 
     def _use_theme(self) -> None:
         use_theme(self._preferences.theme)
@@ -284,7 +291,10 @@ class Program(QObject):
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
-        self.live.start(open_station, self._preferences.plan)
+        verdict = self._preferences.station.calibration.solve.verdict
+        self.wizard_panel.picture.result.set_target(verdict.target_arcmin)
+        is_held = not self._preferences.runs_itself
+        self.live.start(open_station, self._preferences.plan, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
 

@@ -25,6 +25,7 @@ from handcal_gui.window import MainWindow, Panel
 _POLL_MS = 4
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
+    Step.ALIGN: "rotation",
     Step.SOLVE: "results",
     Step.VERIFY: "results",
     Step.SAVE: "session",
@@ -72,7 +73,9 @@ class CalibrationController(QObject):
         self._snapshot: Snapshot | None = None
         self._is_watching = False
         panels = window.panels
-        self._turns: deque[Panel] = deque((panels.cloud, panels.rotation, panels.wearer_view))
+        self._turns: deque[Panel] = deque(
+            (panels.cloud, panels.rotation, panels.wearer_view, wizard_panel.picture)
+        )
         self._visible: set[object] = set()  # panels
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
@@ -87,12 +90,14 @@ class CalibrationController(QObject):
         """The snapshot shown; None while no calibration is running."""
         return self._snapshot
 
-    def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
-        """End the present calibration and open a station."""
+    def start(
+        self, open_station: Callable[[], Station], plan: EyePlan, *, is_held: bool = True
+    ) -> None:
+        """End the present calibration and open a station; if held, no step runs by itself."""
         self.stop()
         self._is_watching = self._is_broken = False
         self._doing = self._shown = 0
-        self._wizard_panel.start(Wizard(plan))
+        self._wizard_panel.start(Wizard(plan), is_held=is_held)
         self._engine = EngineThread(open_station, self)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
@@ -227,19 +232,21 @@ class CalibrationController(QObject):
         # Even while hidden: they may be used before the next snapshot.
         always = panels.fine_tune, panels.trials
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
-        self._turns.rotate()
-        waiting = tuple(self._turns)[1:]
-        for panel in panels.all():
-            if panel in always or (panel in self._visible and panel not in waiting):
-                panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
+        self._turns.rotate()
+        picture = self._wizard_panel.picture
+        turns = [one for one in self._turns if one is picture or one in self._visible]
+        for panel in (*panels.all(), picture):
+            is_due = panel is turns[0] if panel in self._turns else panel in self._visible
+            if panel in always or is_due:
+                panel.show_snapshot(snapshot)
         self._window.banner.show_condition(
             snapshot.problem
             or snapshot.camera.problem
             or snapshot.link_problem
             or snapshot.contradiction
         )
-        self._watch_views(panels.wearer_view in self._visible)
+        self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
 
     def _catch_up(self, panel: Panel, is_visible: bool) -> None:

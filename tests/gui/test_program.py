@@ -86,7 +86,8 @@ class Technician:
 def file(tmp_path: Path) -> PreferencesFile:
     path = tmp_path / "config" / "preferences.json"
     path.parent.mkdir()
-    path.write_text(json.dumps({"station": {"sessions": str(tmp_path / "sessions")}}))
+    station = {"sessions": str(tmp_path / "sessions")}
+    path.write_text(json.dumps({"station": station, "runs_itself": False}))
     path.with_name("pairing.key").write_text(KEY)
     return PreferencesFile(path)
 
@@ -197,6 +198,44 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert stored.wearers == ("Ada",)
     assert stored.sessions == (str(record.path),)
     assert stored.station == studio.settings
+
+
+def test_steps_run_by_themselves_after_one_press(live: Technician, studio: Any) -> None:
+    QTest.keyClick(live.program.window, Qt.Key.Key_H)  # the station is held at first
+    live.press_space_for(Action.NEXT)
+    for eye in ("left", "right"):
+        studio.camera.shows = "cursor"
+        live.wait_for_state(State.ALIGN)
+        assert live.snapshot.procedure.eyes == (eye,)
+        live.wait(lambda: studio.headset.shown.cursor_W_m is not None)
+        studio.camera.shows = "live"
+        live.wait(lambda: is_turned(live))
+        studio.headset.confirm()
+        live.wait_for_state(State.APPLIED)
+    assert [one.eyes for one in live.record.alignments.values()] == [("left",), ("right",)]
+    assert live.banner == ""
+
+
+def test_back_and_a_key_hold_the_steps_that_run_by_themselves(
+    live: Technician, studio: Any, file: PreferencesFile
+) -> None:
+    ring = live.child(QWidget, "wizardRing")
+    QTest.keyClick(live.program.window, Qt.Key.Key_H)
+    assert file.load()[0].runs_itself
+    live.press_space_for(Action.NEXT)  # no hand is shown yet
+    live.wait(lambda: ring.share == 0.0)
+    live.child(QPushButton, "wizardOther0").click()
+    live.wait(lambda: live.can(Action.NEXT))
+    studio.camera.shows = "cursor"
+    live.press_space_for(Action.NEXT)
+    live.wait(lambda: "Hand found" in shown_checks(live))
+    live.qtbot.wait(1000)
+    assert live.program.wizard_panel.shown is not None
+    assert live.program.wizard_panel.shown.step is Step.SHOW_HAND
+    assert ring.share is None
+    assert file.load()[0].runs_itself  # going back is for this wearer only
+    QTest.keyClick(live.program.window, Qt.Key.Key_H)
+    live.wait_for_state(State.ALIGN)
 
 
 def test_space_never_discards_wherever_tab_leads(live: Technician, studio: Any) -> None:

@@ -125,7 +125,14 @@ def preferences(tmp_path: Path) -> Path:
     station = {"sessions": str(tmp_path / "sessions"), "seed": 1, "rig": str(rig)}
     export = {"formats": ["report", "csv"]}
     path.write_text(
-        json.dumps({"station": station, "export": export, "export_folder": str(tmp_path / "out")})
+        json.dumps(
+            {
+                "station": station,
+                "export": export,
+                "export_folder": str(tmp_path / "out"),
+                "runs_itself": False,
+            }
+        )
     )
     return path
 

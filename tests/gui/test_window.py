@@ -35,7 +35,7 @@ from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.window import MainWindow
 from tests.gui.views import all_views
 
-TABBED = ("results", "fine_tune", "trials", "session", "link")
+TABBED = ("wearer_view", "results", "trials", "session", "link")
 
 
 @pytest.fixture
@@ -109,6 +109,47 @@ def test_layouts_are_remembered_for_each_page(
     again.window.close()
 
 
+def test_one_key_leaves_the_guide_alone_and_this_is_remembered(
+    qtbot: QtBot, program: Program, tmp_path: Path
+) -> None:
+    window = program.window
+    window.show_page("live")
+    window.docks["link"].close()
+    window.activateWindow()
+    qtbot.waitActive(window)
+    press(window, Qt.Key.Key_F11)
+    assert shown(window) == set()
+    window.bring_up("results")
+    window.go_to("results")
+    window.show_page("review")
+    assert shown(window) == {"cloud", "results", "trials", "session"}
+    window.show_page("live")
+    assert shown(window) == set()
+    again = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(again.window)
+    again.window.show_page("live")
+    assert shown(again.window) == set()
+    again.window.close()
+    press(window, Qt.Key.Key_F11)
+    assert shown(window) == set(window.docks) - {"link"}
+
+
+def test_the_guide_is_the_largest_thing_in_the_window(window: MainWindow) -> None:
+    for size_px in ((960, 510), (1280, 690), (1366, 738), (1920, 1050), (3840, 2160)):
+        window.show_page("start")
+        window.resize(*size_px)
+        window.show_page("live")
+        window.reset_layout()
+        QApplication.processEvents()
+        assert window.size().toTuple() == size_px
+        guide = window.centralWidget()
+        assert guide is not None
+        for name in shown(window):
+            dock = window.docks[name]
+            if is_in_front(window, name):
+                assert dock.width() * dock.height() < guide.width() * guide.height()
+
+
 @pytest.mark.parametrize("text", ["", "garbage", "AAAA"])
 def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -> None:
     window.restore_layouts({"live": text})
@@ -170,7 +211,7 @@ def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: M
     window.docks["link"].setFloating(True)
     qtbot.waitUntil(lambda: has_title(window, "link"))
     assert not has_title(window, "trials")
-    for name in ("fine_tune", "trials", "session"):
+    for name in ("wearer_view", "trials", "session"):
         window.docks[name].hide()
     qtbot.waitUntil(lambda: has_title(window, "results"))
 
@@ -201,10 +242,10 @@ def test_a_step_brings_up_its_panel_but_not_over_work(qtbot: QtBot, window: Main
     window.show_page("live")
     window.bring_up("session")
     qtbot.waitUntil(lambda: is_in_front(window, "session"))
-    window.go_to("fine_tune")
-    qtbot.waitUntil(lambda: is_in_front(window, "fine_tune"))
+    window.go_to("trials")
+    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
     window.bring_up("results")
-    assert is_in_front(window, "fine_tune")
+    assert is_in_front(window, "trials")
 
 
 def test_panels_are_reached_by_keys(qtbot: QtBot, window: MainWindow) -> None:

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from handcal.register.verdict import Advice
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
@@ -23,6 +24,10 @@ PLANS: dict[EyePlan, str] = {
 _DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
 _LEAST_ALIGN_NS = 1_500_000_000
 _UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
+_SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
+"""Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
+_MOST_BY_ITSELF = 2
+"""Most further alignments of an eye that are begun without asking."""
 _SENDS_UNUSABLE = "Draws with a result that should not be used"
 
 
@@ -94,6 +99,10 @@ class WizardView:
     others: tuple[ButtonSpec, ...] = ()
     note: str = ""
     """The last event or current activity, such as a refusal; empty if none."""
+    runs_after_s: float | None = None
+    """Time for which the main button is enabled before it presses itself; None if it never does."""
+    unearned: frozenset[Step] = frozenset()
+    """Earlier steps that were left without what they are for."""
 
 
 def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ...]:
@@ -122,7 +131,7 @@ class Wizard:
 
     def __init__(self, plan: EyePlan = "each") -> None:
         self.plan = plan
-        self._repeat: Eye | None = None
+        self._repeat: tuple[Eye, ...] | None = None
         self._free = Step.CONNECT
 
     def step(self, snapshot: Snapshot) -> Step:
@@ -154,7 +163,8 @@ class Wizard:
                 to_verify = is_another and self._free is Step.SHOW_HAND
                 self._free = Step.VERIFY if to_verify else STEPS[place - 1]
             case Action.ANOTHER | Action.REPEAT_LEFT | Action.REPEAT_RIGHT:
-                self._repeat = _REPEATS.get(action)
+                advice = _advice(snapshot) if self._is_complete(snapshot) else None
+                self._repeat = _REPEATS.get(action, advice.eyes if advice else None)
                 self._free = Step.SHOW_HAND
             case _:
                 raise ValueError(f"{action} is an action of the engine")
@@ -166,8 +176,11 @@ class Wizard:
     def eyes(self, snapshot: Snapshot) -> tuple[Eye, ...]:
         """Return the eyes that the next alignment is for."""
         if self._repeat is not None:
-            return (self._repeat,)
+            return self._repeat
         return next_eyes(self.plan, snapshot.procedure.alignments.values())
+
+    def _is_complete(self, snapshot: Snapshot) -> bool:
+        return is_complete(self.plan, snapshot.procedure.alignments.values())
 
     def _connect(self, snapshot: Snapshot) -> WizardView:
         camera, link = snapshot.camera, snapshot.link
@@ -191,7 +204,7 @@ class Wizard:
             Step.CONNECT,
             "Put the headset on the wearer and wait until camera and headset are connected.",
             checks,
-            ButtonSpec(Action.NEXT, "Next", is_ready),
+            ButtonSpec(Action.NEXT, "Begin", is_ready),
         )
 
     def _show_hand(self, snapshot: Snapshot) -> WizardView:
@@ -204,6 +217,7 @@ class Wizard:
             (_hand_check(snapshot),),
             ButtonSpec(Action.NEXT, "Next", _hand_check(snapshot).holds),
             (back,),
+            runs_after_s=_SHOWN_S,
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
@@ -215,6 +229,7 @@ class Wizard:
             (_hand_check(snapshot), Precondition("Hand held still", is_steady)),
             ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady),
             (ButtonSpec(Action.BACK, "&Back"),),
+            runs_after_s=_STILL_S,
         )
 
     def _align(self, snapshot: Snapshot) -> WizardView:
@@ -253,6 +268,7 @@ class Wizard:
                 (aligned,),
                 ButtonSpec(Action.SOLVE, "Solve"),
                 (redo,),
+                runs_after_s=_SHOWN_S,
             )
         verdicts = _verdict_checks(snapshot)
         if procedure.state is State.APPLYING:
@@ -275,7 +291,13 @@ class Wizard:
         elif kept:
             instruction = f"Send the projections to the headset, those of {_names(kept)} offline."
         return WizardView(
-            Step.SOLVE, instruction, (aligned, *verdicts), send, others, snapshot.problem
+            Step.SOLVE,
+            instruction,
+            (aligned, *verdicts),
+            send,
+            others,
+            snapshot.problem,
+            runs_after_s=_READ_S,
         )
 
     def _verify(self, snapshot: Snapshot) -> WizardView:
@@ -288,7 +310,7 @@ class Wizard:
                 ButtonSpec(Action.SOLVE, "Solve"),
                 (ButtonSpec(Action.ANOTHER, "&Add alignment"),),
             )
-        if not is_complete(self.plan, snapshot.procedure.alignments.values()):
+        if not self._is_complete(snapshot):
             eyes = _names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
@@ -296,46 +318,66 @@ class Wizard:
                 checks,
                 ButtonSpec(Action.ANOTHER, f"Align {eyes}"),
                 (ButtonSpec(Action.NEXT, "Finish with &one eye"),),
+                runs_after_s=_READ_S,
             )
-        instruction = (
-            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
-            "add an alignment or fine-tune φ."
+        each = (
+            ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
+            ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
         )
-        if any(check.verdict == "repeat" for check in checks):
-            instruction = (
-                "The wearer looks at the raised hand. Not accepted yet: add the alignments "
-                "advised below, unless the outline fits."
+        if advice := _advice(snapshot):
+            eyes = _names(advice.eyes)
+            few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
+            return WizardView(
+                Step.VERIFY,
+                f"Not accepted yet: align {eyes} again, or keep the result as it is.",
+                checks,
+                ButtonSpec(Action.ANOTHER, f"Add {eyes}"),
+                (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
+                runs_after_s=_ADVICE_S if few else None,
+            )
+        if any(check.verdict not in (None, "accept", "keep") for check in checks):
+            return WizardView(
+                Step.VERIFY,
+                "Do not use this result. Follow the advice below, then add alignments.",
+                checks,
+                ButtonSpec(Action.ANOTHER, "Add alignment"),
+                (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
             )
         return WizardView(
             Step.VERIFY,
-            instruction,
+            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
+            "add an alignment or fine-tune φ.",
             checks,
             ButtonSpec(Action.NEXT, "It fits"),
-            (
-                ButtonSpec(Action.ANOTHER, "&Add alignment"),
-                ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
-                ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
-            ),
+            (ButtonSpec(Action.ANOTHER, "&Add alignment"), *each),
         )
 
     def _save(self, snapshot: Snapshot) -> WizardView:
-        where = snapshot.session_path
+        checks = (
+            Precondition(f"Saved in {snapshot.session_path}", not snapshot.problem),
+            *_verdict_checks(snapshot),
+        )
         others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
+        is_verified = len(checks) > 1 and all(check.holds for check in checks[1:])
+        unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
         if snapshot.record.is_finished:
             return WizardView(
                 Step.SAVE,
                 "The session is complete. Take the headset off, or continue with the next wearer.",
-                (Precondition(f"Saved in {where}", True),),
+                checks,
                 ButtonSpec(Action.NEXT_WEARER, "Next wearer"),
                 others,
+                unearned=unearned,
             )
         return WizardView(
             Step.SAVE,
             "Everything is already saved. Finish the session when you are done.",
-            (Precondition(f"Saved in {where}", not snapshot.problem),),
+            checks,
             ButtonSpec(Action.FINISH, "Finish session"),
             others,
             snapshot.problem,
+            runs_after_s=None if snapshot.problem else _READ_S,
+            unearned=unearned,
         )
 
 
@@ -350,7 +392,20 @@ _VIEWS = {
 }
 
 
-_REPEATS: dict[Action, Eye] = {Action.REPEAT_LEFT: "left", Action.REPEAT_RIGHT: "right"}
+_REPEATS: dict[Action, tuple[Eye, ...]] = {
+    Action.REPEAT_LEFT: ("left",),
+    Action.REPEAT_RIGHT: ("right",),
+}
+
+
+def _advice(snapshot: Snapshot) -> Advice | None:
+    """Return the advice for the eye with the largest expected error; None if none is to repeat."""
+    results = snapshot.procedure.results
+    if results is None:
+        return None
+    repeated = [eye for eye in results.advice if results.verdicts[eye].name == "repeat"]
+    worst = max(repeated, key=lambda eye: results.benefits[eye].after_arcmin, default=None)
+    return None if worst is None else results.advice[worst]
 
 
 def _hand_check(snapshot: Snapshot) -> Precondition:
