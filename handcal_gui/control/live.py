@@ -17,6 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
+from handcal_gui.control.conditions import Conditions
 from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.steps import Action, Step, Wizard
 from handcal_gui.pages.wizard.wizard import WizardPanel
@@ -31,6 +32,8 @@ _PANELS_OF_STEPS = {
     Step.SAVE: "session",
 }
 """The panel to show when a step begins."""
+_SLOW_EVERY = 2
+"""On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
 _RECORD = "record the trial"
 
 
@@ -72,6 +75,7 @@ class CalibrationController(QObject):
         self._is_broken = False
         self._snapshot: Snapshot | None = None
         self._is_watching = False
+        self._conditions = Conditions()
         panels = window.panels
         self._turns: deque[Panel] = deque(
             (panels.cloud, panels.rotation, panels.wearer_view, wizard_panel.picture)
@@ -97,6 +101,7 @@ class CalibrationController(QObject):
         self.stop()
         self._is_watching = self._is_broken = False
         self._doing = self._shown = 0
+        self._conditions = Conditions()
         self._wizard_panel.start(Wizard(plan), is_held=is_held)
         self._engine = EngineThread(open_station, self)
         self._engine.opened.connect(self._on_opened)
@@ -225,6 +230,8 @@ class CalibrationController(QObject):
         if snapshot is None or snapshot is self._snapshot:
             return
         self._shown = shown
+        condition = self._conditions.condition(snapshot)
+        snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
             self._comparison.use(snapshot.record, self._solve_settings)
         self._snapshot = snapshot
@@ -238,14 +245,10 @@ class CalibrationController(QObject):
         turns = [one for one in self._turns if one is picture or one in self._visible]
         for panel in (*panels.all(), picture):
             is_due = panel is turns[0] if panel in self._turns else panel in self._visible
+            is_due &= not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
             if panel in always or is_due:
                 panel.show_snapshot(snapshot)
-        self._window.banner.show_condition(
-            snapshot.problem
-            or snapshot.camera.problem
-            or snapshot.link_problem
-            or snapshot.contradiction
-        )
+        self._window.banner.show_condition(condition)
         self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
 

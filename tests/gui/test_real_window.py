@@ -229,6 +229,8 @@ def calibrated_and_exported(window: Window, technician: Technician) -> SessionRe
         technician.wait_until("alignment_saved", eye)  # the wearer confirms in the headset
         technician.press_space_until("applied", eye)
         window.shoot(f"real-3-applied-{eye}")
+    time.sleep(2.0)
+    window.press("alt+i")  # keep it as it is, if more alignments are advised
     technician.press_space_until("finished")
     session = technician.session()
     assert session is not None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from handcal_gui.pages.wizard.steps import ButtonSpec, Step, WizardView
+from handcal_gui.pages.wizard.steps import Action, Step, WizardView
+
+_LAPSE_S = 0.4
+"""A main button that is disabled for less time is not waited for from the start again."""
 
 
 class Automatic:
@@ -16,8 +19,8 @@ class Automatic:
 
     def __init__(self) -> None:
         self.is_held = False
-        self._shown: tuple[Step, ButtonSpec] | None = None
-        self._since_s = 0.0
+        self._shown: tuple[Step, Action, str] | None = None
+        self._since_s = self._enabled_s = 0.0
         self._tries = 0
 
     def share(self, view: WizardView, now_s: float) -> float | None:
@@ -30,7 +33,7 @@ class Automatic:
         now_s : float
             The time on any monotonic clock.
         """
-        shown = view.step, view.main
+        shown = view.step, view.main.action, view.main.label
         if shown != self._shown:
             is_same_step = self._shown is not None and self._shown[0] is view.step
             self._tries = self._tries if is_same_step else 0
@@ -38,10 +41,13 @@ class Automatic:
         if self.is_held or view.runs_after_s is None:
             self._since_s = now_s
             return None
-        if not view.main.is_enabled:
-            return 0.0
+        if view.main.is_enabled:
+            self._enabled_s = now_s
+        elif now_s - self._enabled_s > _LAPSE_S:
+            self._since_s = now_s
         wait_s = view.runs_after_s * 2**self._tries
-        return min((now_s - self._since_s) / wait_s, 1.0)
+        share = min((now_s - self._since_s) / wait_s, 1.0)
+        return share if view.main.is_enabled else min(share, 0.99)
 
     def note_pressed(self, now_s: float) -> None:
         """Start to wait again, twice as long, as the step may have failed."""

@@ -215,7 +215,7 @@ class Wizard:
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
             (_hand_check(snapshot),),
-            ButtonSpec(Action.NEXT, "Next", _hand_check(snapshot).holds),
+            ButtonSpec(Action.NEXT, "Next", _is_placed(snapshot)),
             (back,),
             runs_after_s=_SHOWN_S,
         )
@@ -247,7 +247,7 @@ class Wizard:
             Step.ALIGN,
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
             (hand, Precondition(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
-            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
+            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", _is_placed(snapshot) and is_due),
             (ButtonSpec(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
             procedure.refusal,
         )
@@ -408,9 +408,14 @@ def _advice(snapshot: Snapshot) -> Advice | None:
     return None if worst is None else results.advice[worst]
 
 
+def _is_placed(snapshot: Snapshot) -> bool:
+    return snapshot.observation is not None and snapshot.observation.hand is not None
+
+
 def _hand_check(snapshot: Snapshot) -> Precondition:
     seen = snapshot.observation
-    if seen is not None and seen.hand is not None:
+    # A hand that is seen without a problem is placed with one of the next frames.
+    if _is_placed(snapshot) or (seen and seen.cloud is not None and not seen.problem):
         return Precondition("Hand found", True)
     problem = seen.problem if seen is not None else ""
     return Precondition(sentence(problem or "no hand in view"), False)

@@ -25,9 +25,20 @@ def test_the_share_grows_while_the_button_is_enabled() -> None:
 def test_a_hand_that_moves_begins_again() -> None:
     automatic = Automatic()
     automatic.share(VIEW, 0.0)
+    automatic.share(VIEW, 1.0)
     assert automatic.share(RESTLESS, 1.9) == 0.0
-    assert automatic.share(VIEW, 3.0) == 0.0
-    assert automatic.share(VIEW, 4.0) == 0.5
+    assert automatic.share(VIEW, 2.0) == pytest.approx(0.05)
+    assert automatic.share(VIEW, 2.9) == 0.5
+
+
+def test_a_frame_without_a_hand_does_not_begin_again_but_presses_nothing() -> None:
+    automatic = Automatic()
+    for s in (0.0, 1.0, 1.9):
+        automatic.share(VIEW, s)
+    share = automatic.share(RESTLESS, 2.1)
+    assert share is not None
+    assert 0.9 < share < 1.0
+    assert automatic.share(VIEW, 2.2) == 1.0
 
 
 def test_another_step_begins_again() -> None:
