@@ -18,7 +18,7 @@ from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
 
-Theme: TypeAlias = Literal["system", "light", "dark"]
+Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 _MOST_WEARERS, _MOST_SESSIONS = 20, 8
 
 

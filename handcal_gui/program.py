@@ -41,6 +41,7 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
+from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
@@ -157,6 +158,7 @@ class Program(QObject):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.remembered.connect(self._remember_export)
         dialog.open()
+        keep_on_screen(dialog)
         return dialog
 
     def inspect(self) -> None:
@@ -179,6 +181,7 @@ class Program(QObject):
         wizard.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         wizard.rig_saved.connect(self._use_rig)
         wizard.open()
+        keep_on_screen(wizard)
         return wizard
 
     def evaluate(self) -> EvaluationWindow:
@@ -196,6 +199,7 @@ class Program(QObject):
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(self._remember_evaluation)
         window.show()
+        keep_on_screen(window)
         return window
 
     def close(self) -> None:
@@ -332,6 +336,7 @@ class Program(QObject):
 
     def _edit_preferences(self) -> None:
         dialog = PreferencesDialog(self._preferences, self.window)
+        keep_on_screen(dialog)
         if dialog.exec():
             self._remember(dialog.preferences())
             self._use_theme()

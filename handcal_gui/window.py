@@ -24,11 +24,10 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDockWidget,
-    QFrame,
     QMainWindow,
-    QScrollArea,
     QStackedWidget,
     QStatusBar,
+    QTabBar,
     QTabWidget,
     QWidget,
 )
@@ -47,14 +46,15 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
+_CHILDREN_ONLY = Qt.FindChildOption.FindDirectChildrenOnly
 _NARROWEST_PX, _WIDEST_PX = 360, 560
 """Limits of the initial width of a column of docks."""
-_SMALL_PX = 1200, 680
+_SMALL_PX = 1200, 690
 """Width and height below which all docks of a window are tabs."""
 _LEFT_COLUMN, _RIGHT_COLUMN = ("camera", "cloud", "rotation"), ("results", "fine_tune")
 _LEFT, _RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
@@ -137,7 +137,7 @@ class MainWindow(QMainWindow):
         self._pages: dict[Page, QWidget] = {"start": start, "live": wizard, "review": review}
         self._stack = QStackedWidget()
         for page in self._pages.values():
-            self._stack.addWidget(_scrollable(page))
+            self._stack.addWidget(scrollable(page))
         middle = QWidget()
         vbox(
             self.banner,
@@ -202,6 +202,8 @@ class MainWindow(QMainWindow):
         self._guide.picture.set_camera(is_small or self._arrangement == "station")
         layout = self._layouts.get(page, self._default_layouts[is_small])
         self.restoreState(layout, _LAYOUT_VERSION)
+        if self.minimumSizeHint().height() > self.screen().availableGeometry().height():
+            self.restoreState(self._default_layouts[is_small], _LAYOUT_VERSION)
         for name, dock in self._docks.items():
             belongs = name in self._docks_of_page
             if not belongs:
@@ -372,6 +374,8 @@ class MainWindow(QMainWindow):
             elif not shared and title is not None:
                 dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
                 title.deleteLater()
+        for bar in self.findChildren(QTabBar, options=_CHILDREN_ONLY):
+            bar.setElideMode(Qt.TextElideMode.ElideNone)
         self._draw_title_buttons()  # Qt recreates them with the titles
 
     def _make_menus(self) -> None:
@@ -423,11 +427,3 @@ def _press(widget: QWidget | None) -> None:
         widget.click()
     elif isinstance(widget, QComboBox) and not widget.isEditable():
         widget.showPopup()
-
-
-def _scrollable(page: QWidget) -> QScrollArea:
-    area = QScrollArea()
-    area.setWidget(page)
-    area.setWidgetResizable(True)
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    return area

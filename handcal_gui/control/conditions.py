@@ -80,8 +80,8 @@ class Conditions:
         elif now_s - self._rate_since_s >= _SLOW_S:
             self.is_slow, self._rate_since_s = not self.is_slow, None
             self._slow_text = (
-                f"only {rate_hz:.0f} frames a second are processed, and {_FAST_HZ:.0f} are needed: "
-                "close other programs, and plug a camera into a USB 3 port"
+                f"frames per second: only {rate_hz:.0f} of the {_SLOW_HZ:.0f} that are needed; "
+                "close other programs, and plug the camera into a USB 3 port"
                 if self.is_slow
                 else ""
             )

@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from PySide6.QtCore import Qt
@@ -18,6 +19,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
+    QScrollArea,
     QTabWidget,
     QWidget,
 )
@@ -32,6 +34,7 @@ from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, Wiz
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow
 from tests.gui.views import all_views
 
@@ -148,6 +151,38 @@ def test_the_guide_is_the_largest_thing_in_the_window(window: MainWindow) -> Non
             dock = window.docks[name]
             if is_in_front(window, name):
                 assert dock.width() * dock.height() < guide.width() * guide.height()
+
+
+@pytest.mark.parametrize("arrangement", ["panels", "station"])
+@pytest.mark.parametrize("size_px", [(960, 510), (1280, 690), (1366, 738)])
+def test_no_step_needs_scrolling(
+    program: Program,
+    snapshot: Maker,
+    size_px: tuple[int, int],
+    arrangement: Literal["panels", "station"],
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.show_page("start")
+    window.resize(*size_px)
+    window.use_arrangement(arrangement)
+    window.show_page("live")
+    window.reset_layout()
+    area = guide.parent().parent()
+    assert isinstance(area, QScrollArea)
+    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
+    for state in states:
+        seen = snapshot(state)
+        guide.show_snapshot(seen)
+        guide.picture.show_snapshot(seen)
+        for _ in range(3):
+            QApplication.processEvents()
+        assert window.size().toTuple() == size_px
+        bars = area.horizontalScrollBar(), area.verticalScrollBar()
+        assert [bar.maximum() for bar in bars] == [0, 0], state
+    card = window.findChild(ResultCard)
+    assert isinstance(card, ResultCard)
+    assert card.visibleRegion().boundingRect() == card.rect()
+    assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()
 
 
 @pytest.mark.parametrize("text", ["", "garbage", "AAAA"])

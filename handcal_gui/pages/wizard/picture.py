@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QLabel, QStackedLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QLabel, QStackedLayout, QWidget
 
 from handcal.hand.overlay import contour_px
 from handcal.station.snapshot import Snapshot
@@ -21,6 +22,8 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _BLINK_MS = 800
 _LEAST_PX = 80, 48
+_WIDE = 2.2
+"""Width over height above which the result stands beside the eyes."""
 _OF_THE_HAND = frozenset({Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR})
 OF_THE_RESULT = frozenset({Step.VERIFY, Step.SAVE})
 """Steps whose picture shows the result."""
@@ -58,7 +61,7 @@ class GuidePicture(QWidget):
         self.result.blink_toggled.connect(self._set_blinking)
         views = QWidget()
         columns = hbox(*((one, 1) for one in self._columns.values()), spacing=SPACING_PX)
-        vbox((columns, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
+        self._layout = vbox((columns, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
         self._nothing, self._views = QWidget(), views
         self._stack = QStackedLayout(self)
         for page in (self._nothing, self._camera, self._views):
@@ -85,7 +88,16 @@ class GuidePicture(QWidget):
         else:
             self._show_camera(snapshot)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Put the result beside the eyes if that makes them larger."""
+        super().resizeEvent(event)
+        is_wide = self.width() > max(_WIDE * self.height(), 2 * self.result.sizeHint().width())
+        directions = QBoxLayout.Direction
+        self._layout.setDirection(directions.LeftToRight if is_wide else directions.TopToBottom)
+        self._layout.setStretchFactor(self.result, 1 if is_wide else 0)
+
     def _show_camera(self, snapshot: Snapshot) -> None:
+        self.result.hide()  # or it takes its room in the layout
         self._stack.setCurrentWidget(self._camera if self._has_camera else self._nothing)
         if not self._has_camera:
             return
