@@ -27,6 +27,7 @@ UInt16: TypeAlias = NDArray[np.uint16]
 Eye: TypeAlias = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
 EyePlan: TypeAlias = Literal["both", "each", "left", "right"]
+PlanName: TypeAlias = Literal["paper", "recommended"]
 RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp", "icp-open3d"]
@@ -394,6 +395,22 @@ class Verdict:
 
     name: VerdictName
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """One eye's check by the wearer, who moves the drawing until it covers the hand."""
+
+    before_m: tuple[float, float, float]
+    """φ with which the hand's outline was first drawn."""
+    nudge_arcmin: tuple[float, float]
+    """Movement of the drawing by the wearer, to the right and down."""
+    after_m: tuple[float, float, float]
+    """φ with which the drawing covered the hand."""
+    nudge_size: float = 0.0
+    """Relative growth of the drawing by the wearer."""
+    hand_E_m: tuple[float, float, float] | None = None
+    """Centre of the hand then, in the eye's E; None if unknown: the check is then not fused."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

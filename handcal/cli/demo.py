@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,18 +22,22 @@ from handcal.progress import Progress
 from handcal.register.fuse import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig
+from handcal.sim.hand import Side
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
+from handcal.station.former import SLIP_M
+from handcal.station.plan import NextStep, PlanSettings, StepName
 from handcal.station.procedure import Calibration, Observation, State
 from handcal.station.settings import StationSettings
+from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EYES, Eye, EyeDistance, Float64, Rig
+from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
 
 _DELIVERY_S = 5.0
 _PATIENCE_S = 60.0
 _RULER_SIGMA_M = 0.001
-_RULER = 1  # its random numbers are not the wearer's
+_RULER, _SLIP = 1, 2  # their random numbers are not the wearer's
 _PATIENCE_STEPS = 300
 """Minimum number of station steps before giving up, so that a slow computer gets more time."""
 
@@ -44,9 +48,21 @@ class DemoSettings:
 
     seed: int = 1
     """Seed of the wearer, the hand, the room and all noise."""
+    plan: PlanName = "paper"
     alignments: int = 1
-    """Number of alignments; of each eye, if `eyes` is ``"each"``."""
-    eyes: Literal["both", "each"] = "both"
+    """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
+    recommended plan decides by itself."""
+    eyes: EyePlan = "both"
+    """One eye for a wearer who sees with one."""
+    verify: bool = True
+    """True if each eye is verified at the end of the recommended plan."""
+    former: str = ""
+    """Path of a stored session with whose φ to begin; empty: the offline calibration."""
+    slipped: bool = False
+    """True if the headset sits otherwise than in the session `former`, by a movement drawn from the
+    seed."""
+    side: Side | None = None
+    """The hand that is raised; None: as the seed has it."""
     loss: float = 0.0
     reorder: float = 0.0
     """Share of the link's datagrams lost, and reordered, in each direction."""
@@ -97,13 +113,25 @@ def run_demo(
             measured.value_m if measured and settings.eye_distance == "headset" else None
         ),
         sessions=str(output),
+        side=settings.side,
+        slip_m=_slip_m(settings),
+        plan=PlanSettings(
+            settings.plan,
+            _usable_eyes(settings),
+            is_automatic=_is_automatic(settings),
+            verify=settings.verify,
+        ),
     )
-    with Station(station_settings, "Simulated wearer") as station:
+    former = Path(settings.former) if settings.former else None
+    with Station(station_settings, "Simulated wearer", former=former) as station:
         if settings.eye_distance == "ruler":
             station.calibration.set_eye_distance(measured)
         progress.at(0.0, "Connecting to the virtual headset")
         try:
-            observations = _follow_plan(station, settings, progress)
+            if _is_automatic(settings):
+                watch = _watch_plan(station, progress)
+            else:
+                watch = _follow_plan(station, settings, progress)
         except ContradictedError as error:
             return _contradicted(station, settings, error.contradiction)
         statistics = _delivered(station)
@@ -113,12 +141,17 @@ def run_demo(
         "seed": settings.seed,
         "session": str(station.session.path),
         "alignments": len(calibration.alignments),
+        "plan": settings.plan,
+        "seconds": watch.seconds,
         **_judge(calibration, station, settings),
         "guard": {
             "rejected": calibration.refused,
             "accepted_deg": max(
-                float(np.degrees(np.linalg.norm(alignment.rotation_rad)))
-                for alignment in calibration.alignments.values()
+                (
+                    float(np.degrees(np.linalg.norm(alignment.rotation_rad)))
+                    for alignment in calibration.alignments.values()
+                ),
+                default=None,
             ),
         },
         "link": {
@@ -127,7 +160,7 @@ def run_demo(
             "acked": statistics.acked,
             "projection_acked": calibration.projection_acked,
         },
-        "timing_ms": _timing(calibration, rig, observations),
+        "timing_ms": _timing(calibration, rig, watch.seen),
     }
 
 
@@ -168,14 +201,24 @@ def _contradicted(
     }
 
 
-def _draw_eyes(seed: int) -> dict[Eye, Float64]:
+def _slip_m(settings: DemoSettings) -> tuple[float, float, float]:
+    """Return how the headset has slipped, E axes."""
+    if not settings.slipped:
+        return 0.0, 0.0, 0.0
+    x_m, y_m, z_m = np.random.default_rng([settings.seed, _SLIP]).normal(0.0, SLIP_M)
+    return float(x_m), float(y_m), float(z_m)
+
+
+def _draw_eyes(settings: DemoSettings) -> dict[Eye, Float64]:
     """Draw the wearer's φ as the virtual headset does."""
-    return draw_eyes(np.random.default_rng(seed), WearerSettings())
+    wearer = WearerSettings(slip_m=_slip_m(settings))
+    return draw_eyes(np.random.default_rng(settings.seed), wearer)
 
 
 def _true_eye_distance_m(seed: int, worn_rig: Rig) -> float:
     left_m, right_m = (
-        eye_position_m(worn_rig.eyes[eye], shift_m) for eye, shift_m in _draw_eyes(seed).items()
+        eye_position_m(worn_rig.eyes[eye], shift_m)
+        for eye, shift_m in draw_eyes(np.random.default_rng(seed), WearerSettings()).items()
     )
     return float(np.linalg.norm(right_m - left_m))
 
@@ -201,63 +244,122 @@ def _delivered(station: Station) -> LinkStatistics:
     return statistics
 
 
-def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -> list[Observation]:
-    """Do every planned alignment; solve and apply after each."""
-    calibration = station.calibration
-    each: tuple[tuple[Eye, ...], ...] = (
-        (EYES,) if settings.eyes == "both" else (("left",), ("right",))
-    )
-    plan = each * settings.alignments
-    observations: list[Observation] = []
+def _usable_eyes(settings: DemoSettings) -> tuple[Eye, ...]:
+    return (settings.eyes,) if settings.eyes in ("left", "right") else EYES
 
-    def watch(until: Callable[[Observation], bool], complaint: str) -> None:
+
+def _is_automatic(settings: DemoSettings) -> bool:
+    """Return whether the station follows the plan by itself; else the script does."""
+    return settings.plan == "recommended" or bool(settings.former)
+
+
+@dataclass(slots=True)
+class _Watch:
+    """Watches a station step by step."""
+
+    station: Station
+    seen: list[Observation] = field(default_factory=list)
+    began_s: float | None = None
+    ended_s: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first sight of the hand to the newest result."""
+        return 0.0 if self.began_s is None else self.ended_s - self.began_s
+
+    def until(self, is_reached: Callable[[Snapshot, Observation], bool], complaint: str) -> None:
+        """Step until something is reached; HandcalError after a while or for a problem."""
         deadline_s = time.monotonic() + _PATIENCE_S
         steps = 0
         while time.monotonic() < deadline_s or steps < _PATIENCE_STEPS:
             steps += 1
-            station.require_headset()
-            snapshot = station.step()
+            self.station.require_headset()
+            snapshot = self.station.step()
             if snapshot.problem:
                 raise HandcalError(snapshot.problem)
-            if snapshot.observation is not None:
-                observations.append(snapshot.observation)
-                _require_no_contradiction(calibration, snapshot.observation)
-                if until(snapshot.observation):
+            observation = snapshot.observation
+            if observation is not None:
+                self.seen.append(observation)
+                if self.began_s is None and observation.hand is not None:
+                    self.began_s = time.monotonic()
+                _require_no_contradiction(self.station.calibration, observation)
+                if is_reached(snapshot, observation):
+                    self.ended_s = time.monotonic()
                     return
         raise HandcalError(f"{complaint} within {_PATIENCE_S:.0f} s")
+
+
+def _watch_plan(station: Station, progress: Progress) -> _Watch:
+    """Let the station follow its plan to the end."""
+    watch = _Watch(station)
+    last: NextStep | None = None
+
+    def is_other(snapshot: Snapshot, _seen: Observation) -> bool:
+        step = snapshot.procedure.next_step
+        is_new = step is not None and (step.name, step.eyes) != (last and (last.name, last.eyes))
+        return is_new and (step is None or step.name not in _PASSING)
+
+    share = 0.0
+    while last is None or last.name is not StepName.DONE:
+        watch.until(
+            is_other, f"the wearer did not get beyond: {last.text if last else 'the start'}"
+        )
+        last = station.plan.next_step(watch.seen[-1].is_steady)
+        share += 0.15 * (0.9 - share)  # how many steps remain is not known
+        progress.at(share, f"{' and '.join(last.eyes)} {last.text}".strip())
+    return watch
+
+
+_PASSING = (StepName.SOLVE, StepName.APPLY, StepName.WAIT, StepName.CURSOR, StepName.VERIFY)
+
+
+def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -> _Watch:
+    """Do every planned alignment of the paper's plan; solve and apply after each."""
+    calibration = station.calibration
+    each: tuple[tuple[Eye, ...], ...] = {
+        "both": (EYES,),
+        "each": (("left",), ("right",)),
+        "left": (("left",),),
+        "right": (("right",),),
+    }[settings.eyes]
+    plan = each * settings.alignments
+    watch = _Watch(station)
 
     for number, eyes in enumerate(plan):
         which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
         label = f"Alignment {number + 1} of {len(plan)}, {which}"
         progress.at((number + 0.1) / len(plan), f"{label}: waiting for a steady hand")
-        watch(
-            lambda seen: seen.is_steady and calibration.is_applied,
+        watch.until(
+            lambda _, seen: seen.is_steady and calibration.is_applied,
             "the wearer did not hold the hand still",
         )
         calibration.make_cursor(eyes)
         progress.at((number + 0.3) / len(plan), f"{label}: wearer aligns")
-        watch(lambda seen: seen.state is State.ALIGNED, "the wearer did not align the hand")
+        watch.until(
+            lambda _, seen: seen.state is State.ALIGNED, "the wearer did not align the hand"
+        )
         progress.at((number + 0.9) / len(plan), f"{label}: solving")
         calibration.solve()
         calibration.apply()
         calibration.wait_applied()
         progress.at((number + 1.0) / len(plan), f"{label}: applied and acknowledged")
-    return observations
+    return watch
 
 
 def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -> dict[str, Any]:
     """Compare the result with the wearer's true eyes."""
     assert calibration.results is not None
     results, rig, worn_rig = calibration.results, station.rig, station.worn_rig
-    eyes_m = _draw_eyes(settings.seed)
+    eyes_m = _draw_eyes(settings)
     measured = results.measured_eye_distance
     # Relative to the rig's C0, which differs from the true one.
     truth_m = {
         eye: shift_m + rig.eyes[eye].t_C0_V_m - worn_rig.eyes[eye].t_C0_V_m
         for eye, shift_m in eyes_m.items()
     }
-    solved_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
     nothing_m = {eye: np.zeros(3) for eye in EYES}
+    solved_m = nothing_m | {eye: shift.shift_m for eye, shift in results.eyes.items()}
+    drawn_m = dict(calibration.applied_shift_m)
     return {
         "eyes": {
             eye: {
@@ -268,6 +370,7 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
                 "verdict": results.verdicts[eye].name,
                 "reason": results.verdicts[eye].reason,
                 "evidence": [one.name for one in calibration.evidence.contradictions],
+                "verified": _verified(calibration, eye),
             }
             for eye, shift in results.eyes.items()
         },
@@ -278,7 +381,23 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
         "reprojection_arcmin": {
             "before": reprojection_arcmin(rig, nothing_m, eyes_m, worn_rig),
             "after": reprojection_arcmin(rig, solved_m, eyes_m, worn_rig),
+            "drawn": reprojection_arcmin(rig, drawn_m, eyes_m, worn_rig),
         },
+    }
+
+
+def _verified(calibration: Calibration, eye: Eye) -> dict[str, Any] | None:
+    """Return the wearer's verification of an eye, None if there is none."""
+    found = calibration.verifications.get(eye)
+    if found is None or calibration.results is None:
+        return None
+    right_arcmin, down_arcmin = found.nudge_arcmin
+    before, after = calibration.results.measured_arcmin[eye]
+    return {
+        "nudge_arcmin": [right_arcmin, down_arcmin],
+        "nudge_size": found.nudge_size,
+        "before_arcmin": before,
+        "after_arcmin": after,
     }
 
 
@@ -298,6 +417,6 @@ def _timing(
     guard_ms = [seen.guard_ms for seen in observations if seen.guard_ms is not None]
     return {
         "segment": float(np.median(np.array(segment_ms, dtype=float))),
-        "guard": float(np.median(np.array(guard_ms, dtype=float))),
-        "solve_both_eyes": float(np.median(solve_ms)),
+        "guard": float(np.median(np.array(guard_ms, dtype=float))) if guard_ms else None,
+        "solve_both_eyes": float(np.median(solve_ms)) if solve_ms else None,
     }

@@ -18,6 +18,9 @@ _SEED = number(int, 0, 2**32 - 1)
 _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)")
+_HAND = arg(
+    "--hand", choices=("left", "right"), help="the raised hand (default: as the seed has it)"
+)
 _LINK = (
     arg("--loss", type=_SHARE, metavar="P", default=0.0, help="share of datagrams lost"),
     arg("--reorder", type=_SHARE, metavar="P", default=0.0, help="share of datagrams reordered"),
@@ -48,10 +51,35 @@ _LINK = (
     ),
     arg(
         "--eyes",
-        choices=("both", "each"),
+        choices=("both", "each", "left", "right"),
         default="both",
-        help="align both eyes at once, or each eye alone",
+        help="align both eyes at once, each eye alone, or the only usable eye",
     ),
+    arg(
+        "--plan",
+        choices=("paper", "recommended"),
+        default="paper",
+        help="the paper's alignments, or the recommended plan: cursors placed by the program, then "
+        "each eye verified",
+    ),
+    arg(
+        "--no-verify",
+        action="store_true",
+        help="end the recommended plan without verifying the eyes",
+    ),
+    arg(
+        "--from",
+        dest="former",
+        type=Path,
+        metavar="SESSION",
+        help="begin with a stored session of the same seed: verify it, go on from there if needed",
+    ),
+    arg(
+        "--slipped",
+        action="store_true",
+        help="with --from: the headset sits otherwise than in that session",
+    ),
+    _HAND,
     *_LINK,
     _RIG,
     arg(
@@ -83,6 +111,11 @@ def demo(arguments: argparse.Namespace) -> None:
         seed=arguments.seed,
         alignments=arguments.alignments,
         eyes=arguments.eyes,
+        plan=arguments.plan,
+        verify=not arguments.no_verify,
+        former=str(arguments.former or ""),
+        slipped=arguments.slipped,
+        side=arguments.hand,
         loss=arguments.loss,
         reorder=arguments.reorder,
         worn_rig=str(arguments.worn_rig or ""),
@@ -104,11 +137,19 @@ def demo(arguments: argparse.Namespace) -> None:
         console.print(f"{eye}: {found['verdict']}: {found['reason']}")
     if used := result["eye_distance"]["used"]:
         console.print(f"Eye distance measured: {EyeDistance(**used)} ({used['source']})")
+    for eye, found in result["eyes"].items():
+        if checked := found["verified"]:
+            console.print(
+                f"{eye}: verified: {checked['before_arcmin']:.1f}′ measured before, "
+                f"{checked['after_arcmin']:.1f}′ expected after"
+            )
     error, guard = result["reprojection_arcmin"], result["guard"]
+    accepted_deg = guard["accepted_deg"]
+    rotation = "" if accepted_deg is None else f"; largest rotation accepted: {accepted_deg:.1f}°"
     console.print(
-        f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after\n"
-        f"Confirmations refused because the hand was rotated: {guard['rejected']}; "
-        f"largest rotation accepted: {guard['accepted_deg']:.1f}°\n"
+        f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after; "
+        f"the wearer's time: {result['seconds']:.1f} s\n"
+        f"Confirmations refused because the hand was rotated: {guard['rejected']}{rotation}\n"
         f"Session: {result['session']}"
     )
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
@@ -180,6 +221,15 @@ def _say_contradictions(result: dict[str, Any]) -> None:
         help="the wearer's eye distance, as the headset reports it (default: not measured)",
     ),
     arg(
+        "--slip-mm",
+        type=number(float, -20.0, 20.0),
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        default=(0.0, 0.0, 0.0),
+        help="movement of the headset since the seed's eyes were drawn (default: none)",
+    ),
+    _HAND,
+    arg(
         "--as-device",
         action="store_true",
         help="no simulated wearer: print what is shown, confirm on Enter",
@@ -190,7 +240,9 @@ def headset(arguments: argparse.Namespace) -> None:
     from handcal.link.impair import Impairment
     from handcal.link.pairing import read_pairing_key
     from handcal.sim.headset import HeadsetSettings, run_headset, until_terminated
+    from handcal.sim.wearer import WearerSettings
 
+    x_mm, y_mm, z_mm = arguments.slip_mm
     settings = HeadsetSettings(
         rig_path=str(_rig_path(arguments.rig)),
         worn_rig_path=str(arguments.worn_rig or ""),
@@ -209,6 +261,8 @@ def headset(arguments: argparse.Namespace) -> None:
         duration_s=arguments.duration_s,
         is_stale=arguments.stale,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
+        side=arguments.hand,
+        wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),
         has_wearer=not arguments.as_device,
     )
     run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())

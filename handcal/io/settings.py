@@ -60,6 +60,9 @@ def _convert(kind: Any, value: object, where: str) -> Any:
     if origin in (Union, types.UnionType):
         if value is None and type(None) in choices:
             return None
+        texts = [text for one in choices if get_origin(one) is Literal for text in get_args(one)]
+        if isinstance(value, str) and value in texts:
+            return value
         return _convert(
             next(choice for choice in choices if choice is not type(None)), value, where
         )

@@ -11,12 +11,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from handcal.link import greetings, messages, wire
+from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
 from handcal.link.messages import Owner
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import device_number
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
@@ -54,6 +55,8 @@ class HeadsetState:
     """The user test's target; None if not shown."""
     shape: Shape | None = None
     """The shape fixed in the world; None if not shown."""
+    verify: VerifyRequest | None = None
+    """The eye whose drawing the wearer is to move; None if there is none."""
     cursor_message: pb.Cursor | None = None
     """The message by which the cursor came."""
 
@@ -199,8 +202,26 @@ class HeadsetClient(Endpoint):
         message = messages.confirm(t_headset_ns, state.cursor_id, digest)
         return self._send_reliably(Slot.CONFIRM, message)
 
+    def nudge(
+        self, t_headset_ns: int, state: HeadsetState, moved: NudgeSum, fits: bool = False
+    ) -> Outgoing:
+        """Tell reliably how far the wearer has moved the drawing since `state.verify` began.
+
+        Raises
+        ------
+        ValueError
+            If there is nothing to verify in the state drawn at that time.
+        LinkError
+            If the link is closed.
+        """
+        if state.verify is None:
+            raise ValueError("there is nothing to verify")
+        digest = drawn_digest(state.drawn, state.cursor_message)
+        message = nudges.nudge(state.verify, moved, fits, t_headset_ns, digest)
+        return self._send_reliably(Slot.NUDGE, message)
+
     def state(self) -> HeadsetState:
-        """Return the state that the PC wants shown.
+        """Return the state that the PC wants shown; without a connection, only projections.
 
         Raises
         ------
@@ -209,6 +230,9 @@ class HeadsetClient(Endpoint):
         """
         with self._changed:
             self._require_running()
+            if self._channel is None or self._is_silent(self._channel):
+                # Nothing that the PC cannot take away again.
+                return HeadsetState(projections=self._state.projections)
             return replace(self._state, live_W_m=self._live_hand())
 
     def _silence(self, timeout_s: float) -> str:
@@ -285,6 +309,9 @@ class HeadsetClient(Endpoint):
             case "shape":
                 shape = messages.read_shape(envelope.shape)
                 self._state = replace(self._state, shape=shape)
+            case "verify":
+                request = nudges.read_verify(envelope.verify)
+                self._state = replace(self._state, verify=request)
             case "target":
                 target = messages.read_target(envelope.target)
                 self._state = replace(self._state, target=target)

@@ -26,12 +26,13 @@ REFUSAL_BUSY: Refusal
 REFUSAL_KEY_TAKEN: Refusal
 
 class Envelope(_message.Message):
-    __slots__ = ("hello", "poses", "confirm", "pong", "device", "retry", "refused", "welcome", "ping", "cursor", "live_hand", "prompt", "projection", "target", "shape", "show", "ack", "bye")
+    __slots__ = ("hello", "poses", "confirm", "pong", "device", "nudge", "retry", "refused", "welcome", "ping", "cursor", "live_hand", "prompt", "projection", "target", "shape", "show", "verify", "ack", "bye")
     HELLO_FIELD_NUMBER: _ClassVar[int]
     POSES_FIELD_NUMBER: _ClassVar[int]
     CONFIRM_FIELD_NUMBER: _ClassVar[int]
     PONG_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    NUDGE_FIELD_NUMBER: _ClassVar[int]
     RETRY_FIELD_NUMBER: _ClassVar[int]
     REFUSED_FIELD_NUMBER: _ClassVar[int]
     WELCOME_FIELD_NUMBER: _ClassVar[int]
@@ -43,6 +44,7 @@ class Envelope(_message.Message):
     TARGET_FIELD_NUMBER: _ClassVar[int]
     SHAPE_FIELD_NUMBER: _ClassVar[int]
     SHOW_FIELD_NUMBER: _ClassVar[int]
+    VERIFY_FIELD_NUMBER: _ClassVar[int]
     ACK_FIELD_NUMBER: _ClassVar[int]
     BYE_FIELD_NUMBER: _ClassVar[int]
     hello: Hello
@@ -50,6 +52,7 @@ class Envelope(_message.Message):
     confirm: Confirm
     pong: Pong
     device: Device
+    nudge: Nudge
     retry: Retry
     refused: Refused
     welcome: Welcome
@@ -61,9 +64,10 @@ class Envelope(_message.Message):
     target: Target
     shape: Shape
     show: Show
+    verify: Verify
     ack: Ack
     bye: Bye
-    def __init__(self, hello: _Optional[_Union[Hello, _Mapping]] = ..., poses: _Optional[_Union[Poses, _Mapping]] = ..., confirm: _Optional[_Union[Confirm, _Mapping]] = ..., pong: _Optional[_Union[Pong, _Mapping]] = ..., device: _Optional[_Union[Device, _Mapping]] = ..., retry: _Optional[_Union[Retry, _Mapping]] = ..., refused: _Optional[_Union[Refused, _Mapping]] = ..., welcome: _Optional[_Union[Welcome, _Mapping]] = ..., ping: _Optional[_Union[Ping, _Mapping]] = ..., cursor: _Optional[_Union[Cursor, _Mapping]] = ..., live_hand: _Optional[_Union[LiveHand, _Mapping]] = ..., prompt: _Optional[_Union[Prompt, _Mapping]] = ..., projection: _Optional[_Union[Projection, _Mapping]] = ..., target: _Optional[_Union[Target, _Mapping]] = ..., shape: _Optional[_Union[Shape, _Mapping]] = ..., show: _Optional[_Union[Show, _Mapping]] = ..., ack: _Optional[_Union[Ack, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
+    def __init__(self, hello: _Optional[_Union[Hello, _Mapping]] = ..., poses: _Optional[_Union[Poses, _Mapping]] = ..., confirm: _Optional[_Union[Confirm, _Mapping]] = ..., pong: _Optional[_Union[Pong, _Mapping]] = ..., device: _Optional[_Union[Device, _Mapping]] = ..., nudge: _Optional[_Union[Nudge, _Mapping]] = ..., retry: _Optional[_Union[Retry, _Mapping]] = ..., refused: _Optional[_Union[Refused, _Mapping]] = ..., welcome: _Optional[_Union[Welcome, _Mapping]] = ..., ping: _Optional[_Union[Ping, _Mapping]] = ..., cursor: _Optional[_Union[Cursor, _Mapping]] = ..., live_hand: _Optional[_Union[LiveHand, _Mapping]] = ..., prompt: _Optional[_Union[Prompt, _Mapping]] = ..., projection: _Optional[_Union[Projection, _Mapping]] = ..., target: _Optional[_Union[Target, _Mapping]] = ..., shape: _Optional[_Union[Shape, _Mapping]] = ..., show: _Optional[_Union[Show, _Mapping]] = ..., verify: _Optional[_Union[Verify, _Mapping]] = ..., ack: _Optional[_Union[Ack, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ("nonce", "time_ns", "cookie", "name")
@@ -266,6 +270,36 @@ class Show(_message.Message):
     OFFLINE_FIELD_NUMBER: _ClassVar[int]
     offline: bool
     def __init__(self, offline: _Optional[bool] = ...) -> None: ...
+
+class Verify(_message.Message):
+    __slots__ = ("verify_id", "eye", "step_arcmin", "step_size")
+    VERIFY_ID_FIELD_NUMBER: _ClassVar[int]
+    EYE_FIELD_NUMBER: _ClassVar[int]
+    STEP_ARCMIN_FIELD_NUMBER: _ClassVar[int]
+    STEP_SIZE_FIELD_NUMBER: _ClassVar[int]
+    verify_id: int
+    eye: Eye
+    step_arcmin: float
+    step_size: float
+    def __init__(self, verify_id: _Optional[int] = ..., eye: _Optional[_Union[Eye, str]] = ..., step_arcmin: _Optional[float] = ..., step_size: _Optional[float] = ...) -> None: ...
+
+class Nudge(_message.Message):
+    __slots__ = ("verify_id", "right_arcmin", "down_arcmin", "size", "fits", "t_headset_ns", "drawn")
+    VERIFY_ID_FIELD_NUMBER: _ClassVar[int]
+    RIGHT_ARCMIN_FIELD_NUMBER: _ClassVar[int]
+    DOWN_ARCMIN_FIELD_NUMBER: _ClassVar[int]
+    SIZE_FIELD_NUMBER: _ClassVar[int]
+    FITS_FIELD_NUMBER: _ClassVar[int]
+    T_HEADSET_NS_FIELD_NUMBER: _ClassVar[int]
+    DRAWN_FIELD_NUMBER: _ClassVar[int]
+    verify_id: int
+    right_arcmin: float
+    down_arcmin: float
+    size: float
+    fits: bool
+    t_headset_ns: int
+    drawn: bytes
+    def __init__(self, verify_id: _Optional[int] = ..., right_arcmin: _Optional[float] = ..., down_arcmin: _Optional[float] = ..., size: _Optional[float] = ..., fits: _Optional[bool] = ..., t_headset_ns: _Optional[int] = ..., drawn: _Optional[bytes] = ...) -> None: ...
 
 class Ack(_message.Message):
     __slots__ = ("received",)

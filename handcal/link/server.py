@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.errors import FileError
-from handcal.link import greetings, messages, version1, wire
+from handcal.link import greetings, messages, nudges, version1, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.clock import ClockEstimator
 from handcal.link.drawn import drawn_digest, drawn_projections
@@ -22,6 +22,7 @@ from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.greetings import Refusal
 from handcal.link.handshake import Caller, Limiter, Reception
 from handcal.link.messages import Owner
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.poses import PoseBuffer
 from handcal.link.reliable import Outgoing
@@ -49,6 +50,22 @@ class Confirmation:
     cursor_id: int
     problem: str = ""
     """Difference between what the headset drew and what it was sent; empty if there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nudge:
+    """The wearer's movement of what an eye draws, in all since the verification began."""
+
+    verify_id: int
+    moved: NudgeSum
+    fits: bool
+    """True if the wearer says that the drawing covers the hand."""
+    t_host_ns: int
+    """Time of the last press of a key, on the host's monotonic clock."""
+    problem: str = ""
+    """As in `Confirmation`."""
+    session: int = 0
+    """The link's session, in which the sums began at zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +155,7 @@ class HeadsetServer(Endpoint):
         self._clock = ClockEstimator()
         self._poses = PoseBuffer()
         self._confirms: deque[tuple[pb.Confirm, str]] = deque(maxlen=_MAX_CONFIRMATIONS)
+        self._nudges: deque[tuple[pb.Nudge, NudgeSum, str]] = deque(maxlen=_MAX_CONFIRMATIONS)
         self._lost = 0
         self._live_frame = 0
         self._next_ping_s = 0.0
@@ -267,6 +285,16 @@ class HeadsetServer(Endpoint):
         """
         return self._send_reliably(Slot.SHAPE, messages.shape(shape))
 
+    def send_verify(self, request: VerifyRequest | None) -> Outgoing:
+        """Have the wearer move what an eye draws, reliably; None ends it.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.VERIFY, nudges.verify(request))
+
     def send_again(self) -> None:
         """Send the newest message of every slot again, as to a headset that has just connected.
 
@@ -302,6 +330,33 @@ class HeadsetServer(Endpoint):
             ]
             self._confirms.clear()
             return confirmations
+
+    def nudges(self) -> list[Nudge]:
+        """Return the wearer's nudges since the last call.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            self._require_running()
+            if self._clock.fit is None:
+                return []
+            session = 0 if self._channel is None else self._channel.session
+            found = [
+                Nudge(
+                    nudge.verify_id,
+                    moved,
+                    nudge.fits,
+                    self._clock.to_host_ns(nudge.t_headset_ns),
+                    problem,
+                    session,
+                )
+                for nudge, moved, problem in self._nudges
+            ]
+            self._nudges.clear()
+            return found
 
     def pose_at_host_ns(self, t_host_ns: int) -> Float64:
         """Return the headset's pose ``T_W_H`` at a time of the host's monotonic clock.
@@ -400,6 +455,7 @@ class HeadsetServer(Endpoint):
         self._clock = ClockEstimator()
         self._poses = PoseBuffer()
         self._confirms.clear()
+        self._nudges.clear()
         self._lost = 0
         self._next_ping_s = 0.0
         self._outbox.restart(time.monotonic())
@@ -428,7 +484,11 @@ class HeadsetServer(Endpoint):
                     self._poses.add(t_headset_ns, T_W_H)
             case "confirm":
                 confirm = messages.read_confirm(envelope.confirm)
-                self._confirms.append((confirm, self._difference(confirm)))
+                self._confirms.append((confirm, self._difference(confirm.drawn)))
+            case "nudge":
+                nudge = envelope.nudge
+                moved = nudges.read_nudge(nudge)
+                self._nudges.append((nudge, moved, self._difference(nudge.drawn)))
             case "device":
                 assert self._session is not None
                 device_id = self._session.caller.device_id
@@ -438,10 +498,10 @@ class HeadsetServer(Endpoint):
             case other:
                 raise messages.MalformedError(f"a headset sends no {other}")
 
-    def _difference(self, confirm: pb.Confirm) -> str:
+    def _difference(self, digest: bytes) -> str:
         """Return the difference of what a headset has drawn from what it was sent, or nothing."""
         drawn = drawn_projections(self._projections, self._is_offline)
-        if confirm.drawn == drawn_digest(drawn, self._cursor):
+        if digest == drawn_digest(drawn, self._cursor):
             return ""
         return "the headset draws other projections or another cursor than it was sent"
 

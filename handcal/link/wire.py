@@ -39,6 +39,8 @@ class Slot(IntEnum):
     DEVICE = 7
     SHAPE = 8
     SHOW = 9
+    VERIFY = 10
+    NUDGE = 11
 
 
 class Rejection(StrEnum):

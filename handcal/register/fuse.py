@@ -12,12 +12,16 @@ Wearers differ in how precisely they align, by more than can be neglected: an es
 a usual wearer is far too sure of a careless one. So the precision is unknown too, one of
 `FuseSettings.wearer_scales`, and the estimate is the mean over them, weighted by how well each
 explains the alignments. One alignment says little about it, several say much by their scatter.
+
+A verification, in which the wearer moves the drawing of the resting hand until it covers the hand
+(`handcal.register.nudge`), is one more observation of one eye's φ, more precise than an alignment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -37,12 +41,15 @@ from handcal.types import (
     EyeShift,
     Float64,
     Rig,
+    Verification,
 )
 
 # The cursor's outline is found in this many of its points.
 _OUTLINE_FROM_POINTS = 1500
 # Far less than that of one point; it keeps the weights defined for a cursor outside the display.
 _NORMAL_FLOOR = 1e-3
+# Place of the hand, in E, that a verification to come is expected to have.
+_VERIFIED_AT_M = 0.0, 0.0, 0.5
 # Of a single solved eye: the eye box is about 2 cm wide (paper).
 _WIDE_EYE_BOX_M = 0.010
 
@@ -57,6 +64,10 @@ class FuseSettings:
     depth_sigma: float = 0.004
     """Relative standard deviation of the depth, by matching the size. These are the errors with
     which the paper's method errs as in the paper's user test."""
+    verified_sigma_arcmin: float = 2.0
+    """Standard deviation of a verification by a usual wearer in each of two directions."""
+    verified_depth_sigma: float = 0.005
+    """Relative standard deviation of its size; people see a place better than a size."""
     wearer_scales: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0)
     """Errors of a wearer's overlay, in those of a usual wearer."""
     wearer_weights: tuple[float, ...] = (0.8, 0.14, 0.05, 0.01)
@@ -80,18 +91,33 @@ class Fused:
     """The displacement measured by each alignment."""
     wearer_scale: float
     """Expected error of the wearer's overlays, in those of a usual wearer."""
+    verified: Mapping[Eye, Observation] = field(default_factory=dict)
+    """The φ found by each eye's verification."""
+    unverified: Mapping[Eye, Observation] = field(default_factory=dict)
+    """The verification to expect of each solved eye that was not verified; its φ is zero."""
 
     def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
-        """Return the covariance (6, 6) to expect after more alignments with some eyes open.
+        """Return the covariance (6, 6) to expect after more alignments with some eyes open."""
+        return self.foreseen_m2([eyes] * count)
 
-        They are taken to be as precise as those so far on average.
+    def foreseen_m2(
+        self, upcoming: Sequence[Sequence[Eye]], then: Sequence[Observation] = ()
+    ) -> Float64:
+        """Return the covariance (6, 6) to expect after alignments and other observations.
+
+        The alignments, each with some eyes open, are taken to be as precise as those so far on
+        average; without any, as the verifications.
         """
-        H = np.zeros((3, 6))
-        for eye in eyes:
-            H[:, eye_slice(eye)] = np.eye(3) / len(eyes)
-        known = [one.at(self.wearer_scale) for one in self.observed]
-        noise_m2 = np.mean([covariance_m2 for _, _, covariance_m2 in known], axis=0)
-        return posterior(self.prior, [*known, *[(H, np.zeros(3), noise_m2)] * count])[1]
+        verified = [one.at(self.wearer_scale) for one in self.verified.values()]
+        aligned = [one.at(self.wearer_scale) for one in self.observed]
+        known = [*aligned, *verified]
+        noise_m2 = np.mean([covariance_m2 for _, _, covariance_m2 in aligned or verified], axis=0)
+        for eyes in upcoming:
+            H = np.zeros((3, 6))
+            for eye in eyes:
+                H[:, eye_slice(eye)] = np.eye(3) / len(eyes)
+            known.append((H, np.zeros(3), noise_m2))
+        return posterior(self.prior, [*known, *(one.at(self.wearer_scale) for one in then)])[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,6 +154,7 @@ def fuse_alignments(
     rig: Rig,
     settings: FuseSettings,
     eye_distance: EyeDistance | None = None,
+    verified: Mapping[Eye, Verification] = MappingProxyType({}),
 ) -> Fused:
     """Fuse solved alignments into one estimate for each eye that any of them has.
 
@@ -139,6 +166,8 @@ def fuse_alignments(
     settings : FuseSettings
     eye_distance : EyeDistance, optional
         The wearer's, if it was measured.
+    verified : mapping of eye to Verification
+        Each is one more observation of its eye, if it says where the hand was.
 
     Raises
     ------
@@ -147,12 +176,18 @@ def fuse_alignments(
     HandError
         If all points of a cursor lie at cut edges.
     """
-    if not solved:
+    checks = {
+        eye: verified_observation(rig, eye, one.after_m, one.hand_E_m, settings)
+        for eye, one in verified.items()
+        if one.hand_E_m is not None
+    }
+    if not solved and not checks:
         raise ValueError("at least one alignment is needed")
     observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
     prior = _with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
-    weights = _scale_weights(prior, observed, settings)
-    found = [posterior(prior, [o.at(scale) for o in observed]) for scale in settings.wearer_scales]
+    known = (*observed, *checks.values())
+    weights = _scale_weights(prior, known, settings)
+    found = [posterior(prior, [o.at(scale) for o in known]) for scale in settings.wearer_scales]
     estimate_m = sum(weight * mean_m for weight, (mean_m, _) in zip(weights, found, strict=True))
     joint_m2 = sum(
         weight * (covariance_m2 + np.outer(mean_m - estimate_m, mean_m - estimate_m))
@@ -161,7 +196,7 @@ def fuse_alignments(
     of_eye = {
         eye: found_shifts
         for eye in EYES
-        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts])
+        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts]) or eye in checks
     }
     return Fused(
         shifts={
@@ -173,6 +208,12 @@ def fuse_alignments(
         prior=prior,
         observed=observed,
         wearer_scale=float(np.sqrt(weights @ np.square(settings.wearer_scales))),
+        verified=checks,
+        unverified={
+            eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
+            for eye in of_eye
+            if eye not in checks
+        },
     )
 
 
@@ -229,30 +270,93 @@ def _observe(
 
     The wearer sees the part of the cursor's outline that lies within the display.
     """
-    # The left eye's E is as good as any common axes, and the same for every position of the head.
-    R_W_A = next(alignment.T_E_W[eye] for eye in EYES if eye in alignment.T_E_W)[:3, :3].T
     surface = describe_surface(alignment.cursor_m, alignment.cursor_is_cut, _OUTLINE_FROM_POINTS)
-    outline_m = surface.points_m[surface.outline]
-    normals: dict[Eye, Float64] = {}
-    registrations, wearers = [], []
+    H, wearer_m2 = seen_by(
+        alignment.cursor_m,
+        surface.points_m[surface.outline],
+        alignment.T_E_W,
+        alignment.drawn_shift_m,
+        tuple(shifts),
+        rig,
+        settings,
+    )
+    R_W_A = _common_axes(alignment.T_E_W)
+    seen_m = np.zeros(3)
+    registrations = []
     for eye, shift in shifts.items():
-        display, T_E_W = rig.eyes[eye], alignment.T_E_W[eye]
-        R_A_E = R_W_A.T @ T_E_W[:3, :3].T
-        cursor_E = transform(T_E_W, outline_m)
-        shown = _is_shown(cursor_E, display, alignment.drawn_shift_m[eye])
-        normals[eye] = R_A_E @ _pixel_normal(cursor_E[shown]) @ R_A_E.T
-        depth_m = float(transform(T_E_W, alignment.cursor_m)[:, 2].mean())
-        wearer = _wearer_covariance(depth_m, display.z_C0_S_m, settings)
+        R_A_E = R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
         registrations.append(R_A_E @ shift.covariance_m2 @ R_A_E.T)
+        seen_m += H[:, eye_slice(eye)] @ shift.shift_m
+    return Observation(H, seen_m, np.mean(registrations, axis=0), wearer_m2)
+
+
+def seen_by(
+    cursor_m: Float64,
+    outline_m: Float64,
+    T_E_W: Mapping[Eye, Float64],
+    drawn_shift_m: Mapping[Eye, Float64],
+    eyes: Sequence[Eye],
+    rig: Rig,
+    settings: FuseSettings,
+) -> tuple[Float64, Float64]:
+    """Return H (3, 6) and a usual wearer's covariance (3, 3) for a cursor and the open eyes.
+
+    Parameters
+    ----------
+    cursor_m, outline_m : (N, 3), (M, 3) float64
+        The cursor and the points of its outline, in W.
+    T_E_W : mapping of eye to (4, 4) float64
+    drawn_shift_m : mapping of eye to (3,) float64
+        φ that the cursor is drawn with.
+    eyes : sequence of eye
+    rig : Rig
+    settings : FuseSettings
+    """
+    R_W_A = _common_axes(T_E_W)
+    normals: dict[Eye, Float64] = {}
+    wearers = []
+    for eye in eyes:
+        display = rig.eyes[eye]
+        R_A_E = R_W_A.T @ T_E_W[eye][:3, :3].T
+        outline_E = transform(T_E_W[eye], outline_m)
+        shown = _is_shown(outline_E, display, drawn_shift_m[eye])
+        normals[eye] = R_A_E @ _pixel_normal(outline_E[shown]) @ R_A_E.T
+        depth_m = float(transform(T_E_W[eye], cursor_m)[:, 2].mean())
+        sigmas = settings.lateral_sigma_arcmin, settings.depth_sigma
+        wearer = _wearer_covariance(depth_m, display.z_C0_S_m, *sigmas)
         wearers.append(R_A_E @ wearer @ R_A_E.T)
     total = np.sum(list(normals.values()), axis=0)
     H = np.zeros((3, 6))
-    seen_m = np.zeros(3)
-    for eye, shift in shifts.items():
-        weight = np.linalg.solve(total, normals[eye]) @ R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
+    for eye in eyes:
+        weight = np.linalg.solve(total, normals[eye]) @ R_W_A.T @ T_E_W[eye][:3, :3].T
         H[:, eye_slice(eye)] = weight
-        seen_m += weight @ shift.shift_m
-    return Observation(H, seen_m, np.mean(registrations, axis=0), np.mean(wearers, axis=0))
+    return H, np.mean(wearers, axis=0)
+
+
+def verified_observation(
+    rig: Rig,
+    eye: Eye,
+    shift_m: Sequence[float],
+    hand_E_m: Sequence[float],
+    settings: FuseSettings,
+) -> Observation:
+    """Return the observation of one eye's φ by a verification, with the hand at a place of E."""
+    R_A_E = rig.eyes["left"].T_V_H[:3, :3] @ rig.eyes[eye].T_V_H[:3, :3].T
+    sigmas = settings.verified_sigma_arcmin, settings.verified_depth_sigma
+    wearer_m2 = _wearer_covariance(hand_E_m[2], rig.eyes[eye].z_C0_S_m, *sigmas)
+    H = np.zeros((3, 6))
+    H[:, eye_slice(eye)] = R_A_E
+    return Observation(
+        H, R_A_E @ np.asarray(shift_m), np.zeros((3, 3)), R_A_E @ wearer_m2 @ R_A_E.T
+    )
+
+
+def _common_axes(T_E_W: Mapping[Eye, Float64]) -> Float64:
+    """Return the rotation (3, 3) to W from the axes in which observations are expressed.
+
+    The left eye's E is as good as any, and the same for every position of the head.
+    """
+    return next(T_E_W[eye] for eye in EYES if eye in T_E_W)[:3, :3].T
 
 
 def _is_shown(points_E_m: Float64, display: EyeDisplay, drawn_shift_m: Float64) -> Bool:
@@ -272,24 +376,27 @@ def _pixel_normal(points_E_m: Float64) -> Float64:
     return np.asarray(rows.T @ rows + _NORMAL_FLOOR * np.eye(3))
 
 
-def _wearer_covariance(depth_m: float, distance_m: float, settings: FuseSettings) -> Float64:
-    """Return the covariance (3, 3) of φ from a wearer's alignment of a hand at a depth."""
-    lateral_m = depth_m * np.radians(settings.lateral_sigma_arcmin / 60.0)
-    along_m = depth_m * settings.depth_sigma
+def _wearer_covariance(
+    depth_m: float, distance_m: float, lateral_sigma_arcmin: float, depth_sigma: float
+) -> Float64:
+    """Return the covariance (3, 3) of φ from a wearer's overlay of a hand at a depth."""
+    lateral_m = depth_m * np.radians(lateral_sigma_arcmin / 60.0)
+    along_m = depth_m * depth_sigma
     gain = 1.0 / (1.0 - depth_m / distance_m)
     return np.diag(np.square([gain * lateral_m, gain * lateral_m, gain * along_m]))
 
 
 def _summarise(shifts: Sequence[EyeShift], shift_m: Float64, covariance_m2: Float64) -> EyeShift:
+    """Return an eye's estimate, with a summary of its alignments; there may be none."""
     return EyeShift(
         shift_m=shift_m,
         covariance_m2=covariance_m2,
-        rms_m=float(np.sqrt(np.mean([shift.rms_m**2 for shift in shifts]))),
-        residuals_m=np.concatenate([shift.residuals_m for shift in shifts]),
-        inlier_ratio=float(np.mean([shift.inlier_ratio for shift in shifts])),
+        rms_m=float(np.sqrt(np.mean([shift.rms_m**2 for shift in shifts]))) if shifts else 0.0,
+        residuals_m=np.concatenate([np.empty(0), *(shift.residuals_m for shift in shifts)]),
+        inlier_ratio=float(np.mean([shift.inlier_ratio for shift in shifts])) if shifts else 1.0,
         iterations=sum(shift.iterations for shift in shifts),
         converged=all(shift.converged for shift in shifts),
         stop_reason="; ".join(dict.fromkeys(shift.stop_reason for shift in shifts)),
-        history_m2=np.concatenate([shift.history_m2 for shift in shifts]),
+        history_m2=np.concatenate([np.empty(0), *(shift.history_m2 for shift in shifts)]),
         method="fused",
     )

@@ -87,6 +87,21 @@ def eye_prior(settings: PriorSettings = PriorSettings()) -> EyePrior:
     return EyePrior(np.zeros(6), np.asarray(np.linalg.inv(information)))
 
 
+def widened(mean_m: Float64, covariance_m2: Float64, slip_m: Sequence[float]) -> LearnedPrior:
+    """Return an earlier posterior as the prior of a wearer whose headset has moved since.
+
+    Parameters
+    ----------
+    mean_m, covariance_m2 : (6,), (6, 6) float64
+        Of [φ_left; φ_right].
+    slip_m : (3,) sequence of float
+        Standard deviation of the headset's movement, common to both eyes, E axes.
+    """
+    moved_m2 = np.kron(np.ones((2, 2)), np.diag(np.square(slip_m)))
+    wide_m2 = covariance_m2 + moved_m2
+    return LearnedPrior(tuple(mean_m.tolist()), tuple((0.5 * (wide_m2 + wide_m2.T)).ravel()), 1)
+
+
 def posterior(prior: EyePrior, observed: Sequence[Observed]) -> tuple[Float64, Float64]:
     """Return the mean (6,) and covariance (6, 6) of [φ_left; φ_right] after observations."""
     information, state = _information(observed)

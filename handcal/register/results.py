@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,28 +14,36 @@ from handcal.register.benefit import Benefit, expected_arcmin
 from handcal.register.fuse import Fused, FuseSettings, eye_slice, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
+    MOST_ALIGNMENTS,
     Advice,
     VerdictSettings,
     advise,
     eye_benefit,
     eye_distance_m,
     judge,
+    measured_arcmin,
+    planned_eyes,
 )
 from handcal.types import (
+    EYES,
     Alignment,
     Eye,
     EyeDistance,
     EyeShift,
     Float64,
     Method,
+    PlanName,
     Rig,
     Verdict,
+    VerdictName,
+    Verification,
     html_table,
     phi_text,
     shift_rows,
 )
 
 RESULTS_VERSION = 2
+_USED: tuple[VerdictName, ...] = ("accept", "repeat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +78,17 @@ class Results:
     """Expected error after one more alignment with all solved eyes open."""
     fused: Fused
     """The observations and the prior behind `eyes`."""
+    measured_arcmin: Mapping[Eye, tuple[float, float]] = field(default_factory=dict)
+    """Error of each verified eye before the check and after it, by the check and all else."""
 
     @property
     def rendered_shift_m(self) -> Mapping[Eye, Float64]:
-        """φ for the headset to render with, (3,): zero where the offline calibration is kept."""
+        """φ for the headset to render with, (3,): zero, the offline calibration, if not used.
+
+        A result to be repeated is used, as it is expected to be better than none.
+        """
         return {
-            eye: np.zeros(3) if self.verdicts[eye].name == "keep" else shift.shift_m
+            eye: shift.shift_m if self.verdicts[eye].name in _USED else np.zeros(3)
             for eye, shift in self.eyes.items()
         }
 
@@ -111,6 +125,9 @@ def solve_session(
     progress: Progress = Progress(),
     eye_distance: EyeDistance | None = None,
     contradictions: Sequence[str] = (),
+    verified: Mapping[Eye, Verification] = MappingProxyType({}),
+    plan: PlanName | None = None,
+    usable_eyes: tuple[Eye, ...] = EYES,
 ) -> Results:
     """Solve, fuse and judge alignments; equal input gives identical output, bit for bit.
 
@@ -126,11 +143,17 @@ def solve_session(
         The wearer's, if it was measured.
     contradictions : sequence of str
         Evidence from outside the solver against the result, a sentence each.
+    verified : mapping of eye to Verification
+        Checks by the wearer. With them, alignments may be missing.
+    plan : {"paper", "recommended"}, optional
+        The plan that the session follows; advice counts its next alignments.
+    usable_eyes : tuple of eye
+        One eye for a wearer who sees with one.
 
     Raises
     ------
     ValueError
-        If there are no alignments, or a cloud cannot be solved.
+        If there are neither alignments nor checks, or a cloud cannot be solved.
     CancelledError
         If it was cancelled.
     """
@@ -141,14 +164,56 @@ def solve_session(
     for done, (number, alignment) in enumerate(numbered.items()):
         progress.at(done / len(alignments), f"Solving alignment {done + 1} of {len(alignments)}")
         solved[number] = solve_alignment(alignment, rig, settings.method, progress.check)
-    pairs = [(numbered[number], shifts) for number, shifts in solved.items()]
-    fused = fuse_alignments(pairs, rig, settings.fuse, eye_distance)
-    advice = {eye: advise(rig, fused, eye, settings.verdict) for eye in fused.shifts}
-    verdicts = judge(rig, fused, advice, settings.verdict, contradictions)
+    return conclude(
+        [(numbered[number], shifts) for number, shifts in solved.items()],
+        rig,
+        settings,
+        eye_distance=eye_distance,
+        contradictions=contradictions,
+        verified=verified,
+        plan=plan,
+        usable_eyes=usable_eyes,
+        numbers=tuple(solved),
+    )
+
+
+def conclude(
+    pairs: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]],
+    rig: Rig,
+    settings: SolveSettings,
+    *,
+    eye_distance: EyeDistance | None = None,
+    contradictions: Sequence[str] = (),
+    verified: Mapping[Eye, Verification] = MappingProxyType({}),
+    plan: PlanName | None = None,
+    usable_eyes: tuple[Eye, ...] = EYES,
+    numbers: Sequence[int] = (),
+) -> Results:
+    """Fuse and judge alignments that are solved already; as `solve_session`.
+
+    Parameters
+    ----------
+    pairs : sequence of (Alignment, mapping of eye to EyeShift)
+        As `solve_alignment` returns them.
+    numbers : sequence of int
+        Numbers of the alignments in the session; from 1 if empty.
+    """
+    fused = fuse_alignments(pairs, rig, settings.fuse, eye_distance, verified)
+    aligned = [alignment.eyes for alignment, _ in pairs]
+    ahead = [] if plan is None else _upcoming(plan, aligned, usable_eyes)
+    advice = {eye: advise(rig, fused, eye, settings.verdict, ahead) for eye in fused.shifts}
+    measured = {
+        eye: measured_arcmin(rig, fused, eye, verified[eye])
+        for eye in EYES
+        if eye in fused.verified
+    }
+    verdicts = judge(rig, fused, advice, settings.verdict, contradictions, measured)
     another_m2 = fused.covariance_after_m2(tuple(fused.shifts), 1)
     return Results(
         method=settings.method,
-        alignments=solved,
+        alignments=dict(
+            zip(numbers or range(1, len(pairs) + 1), (one for _, one in pairs), strict=True)
+        ),
         eyes=fused.shifts,
         verdicts=verdicts,
         eye_distance_m=eye_distance_m(rig, fused.shifts),
@@ -162,7 +227,18 @@ def solve_session(
             for eye in fused.shifts
         },
         fused=fused,
+        measured_arcmin=measured,
     )
+
+
+def _upcoming(
+    plan: PlanName, done: Sequence[tuple[Eye, ...]], usable_eyes: tuple[Eye, ...]
+) -> list[tuple[Eye, ...]]:
+    """Return the eyes to keep open in each of a plan's next alignments."""
+    eyes = list(done)
+    for _ in range(MOST_ALIGNMENTS):
+        eyes.append(planned_eyes(plan, eyes, usable_eyes))
+    return eyes[len(done) :]
 
 
 def results_json(results: Results) -> dict[str, Any]:
@@ -176,6 +252,7 @@ def results_json(results: Results) -> dict[str, Any]:
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
             | {"benefit": asdict(results.benefits[eye])}
             | {"advice": _advice_json(results.advice.get(eye))}
+            | _measured_json(results.measured_arcmin.get(eye))
             for eye, shift in results.eyes.items()
         },
         "eye_distance_m": results.eye_distance_m,
@@ -188,7 +265,7 @@ def results_json(results: Results) -> dict[str, Any]:
                     strict=True,
                 )
             )
-            for one in results.fused.observed
+            for one in (*results.fused.observed, *results.fused.verified.values())
         ],
         "alignments": [
             {eye: _shift_json(shift) for eye, shift in shifts.items()}
@@ -199,6 +276,10 @@ def results_json(results: Results) -> dict[str, Any]:
 
 def _advice_json(advice: Advice | None) -> dict[str, Any] | None:
     return None if advice is None else asdict(advice) | {"eyes": list(advice.eyes)}
+
+
+def _measured_json(measured: tuple[float, float] | None) -> dict[str, Any]:
+    return {} if measured is None else {"measured_arcmin": list(measured)}
 
 
 def _shift_json(shift: EyeShift) -> dict[str, Any]:

@@ -8,17 +8,20 @@ contradict it, whatever the solver says.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
-from handcal.register.benefit import Benefit, benefit, foreseen_benefits
+from handcal.register.benefit import Benefit, benefit, expected_arcmin, foreseen_benefits
 from handcal.register.fuse import Fused, eye_position_m, eye_slice
-from handcal.types import EYES, Eye, EyeShift, Rig, Verdict
+from handcal.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
 
-_MOST_ALIGNMENTS = 10
+MOST_ALIGNMENTS = 10
 # More than this are not worth it where the offline calibration is within the target.
 _FEW_ALIGNMENTS = 2
+# Each eye in turn, then both, which a wearer sees best and which tells the eyes' common part.
+_IN_TURN: tuple[tuple[Eye, ...], ...] = ("left",), ("right",), EYES
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +46,7 @@ class Advice:
     """The alignments that would lead to *accept*, as far as can be foreseen."""
 
     eyes: tuple[Eye, ...]
-    """Eyes to keep open in each of them."""
+    """Eyes to keep open in each of them; empty if they follow a plan."""
     alignments: int
     after_arcmin: float
     """Error to expect then."""
@@ -53,6 +56,26 @@ class Advice:
     """True if that error is within the target."""
     is_accepted: bool
     """True if both are enough for *accept*."""
+    verify: bool = False
+    """True if each solved eye is to be verified after the alignments."""
+
+    @property
+    def is_accepted_once_verified(self) -> bool:
+        """True if a verification of each eye, without another alignment, is enough."""
+        return self.is_accepted and self.verify and self.alignments == 0
+
+
+def planned_eyes(
+    plan: PlanName, done: Sequence[tuple[Eye, ...]], usable: tuple[Eye, ...] = EYES
+) -> tuple[Eye, ...]:
+    """Return the eyes to keep open in a plan's next alignment.
+
+    ``paper``: both. ``recommended``: left, right and both in turn; what is missing, as after an
+    alignment was deleted, comes first. With one usable eye, always that one.
+    """
+    if len(usable) == 1 or plan == "paper":
+        return usable
+    return min(_IN_TURN, key=lambda eyes: sum(set(one) == set(eyes) for one in done))
 
 
 def eye_distance_m(rig: Rig, shifts: Mapping[Eye, EyeShift]) -> float | None:
@@ -75,24 +98,53 @@ def eye_benefit(rig: Rig, fused: Fused, eye: Eye) -> Benefit:
     )
 
 
-def advise(rig: Rig, fused: Fused, eye: Eye, settings: VerdictSettings) -> Advice:
+def measured_arcmin(
+    rig: Rig, fused: Fused, eye: Eye, verification: Verification
+) -> tuple[float, float]:
+    """Return an eye's error before its verification and now, from all that is known since."""
+    display, shift = rig.eyes[eye], fused.shifts[eye]
+    before_m = shift.shift_m - verification.before_m
+    errors_m = before_m, np.zeros(3)
+    before, now = (expected_arcmin(display, one_m, shift.covariance_m2) for one_m in errors_m)
+    return before, now
+
+
+def advise(
+    rig: Rig,
+    fused: Fused,
+    eye: Eye,
+    settings: VerdictSettings,
+    upcoming: Sequence[tuple[Eye, ...]] = (),
+) -> Advice:
     """Return the fewest further alignments after which an eye is expected to be accepted.
 
-    Alignments with this eye alone open are compared with alignments with all solved eyes open.
+    With a plan, those are its next alignments, `upcoming`, and a verification may follow. Without
+    one, alignments with this eye alone open are compared with alignments with all solved eyes open.
     """
-    shift = fused.shifts[eye]
+    shift, part = fused.shifts[eye], eye_slice(eye)
     plans: list[tuple[Eye, ...]] = [tuple(fused.shifts)]
     if len(plans[0]) > 1:
         plans.append((eye,))
-    ahead = [(eyes, count) for count in range(1, _MOST_ALIGNMENTS + 1) for eyes in plans]
-    part = eye_slice(eye)
-    later_m2 = [fused.covariance_after_m2(eyes, count)[part, part] for eyes, count in ahead]
+    ahead: list[tuple[tuple[Eye, ...], int, bool]]
+    if upcoming:
+        ahead = [((), count, False) for count in range(1, len(upcoming) + 1)]
+        if fused.unverified:
+            ahead += [((), count, True) for count in range(len(upcoming) + 1)]
+    else:
+        ahead = [(eyes, count, False) for count in range(1, MOST_ALIGNMENTS + 1) for eyes in plans]
+    later_m2 = [
+        fused.foreseen_m2(
+            [eyes] * count if eyes else upcoming[:count],
+            list(fused.unverified.values()) if verify else [],
+        )[part, part]
+        for eyes, count, verify in ahead
+    ]
     foreseen = foreseen_benefits(rig.eyes[eye], shift.shift_m, shift.covariance_m2, later_m2)
     best: Advice | None = None
-    for (eyes, count), (after_arcmin, probability) in zip(ahead, foreseen, strict=True):
+    for (eyes, count, verify), (after_arcmin, probability) in zip(ahead, foreseen, strict=True):
         is_accepted = _is_enough(after_arcmin, probability, settings)
         meets_target = after_arcmin <= settings.target_arcmin
-        found = Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted)
+        found = Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted, verify)
         if best is None or _is_better_advice(found, best):
             best = found
     assert best is not None
@@ -114,6 +166,7 @@ def judge(
     advice: Mapping[Eye, Advice],
     settings: VerdictSettings,
     contradictions: Sequence[str] = (),
+    measured: Mapping[Eye, tuple[float, float]] = MappingProxyType({}),
 ) -> dict[Eye, Verdict]:
     """Judge every solved eye; the first reason that applies is given.
 
@@ -126,6 +179,9 @@ def judge(
     settings : VerdictSettings
     contradictions : sequence of str
         Sentences of evidence from outside the solver against the result.
+    measured : mapping of eye to (before, after)
+        Errors in arcmin by the wearer's verification, as `measured_arcmin` gives them. They are
+        part of `fused`, and so of the verdict; here they are told.
     """
     apart_m = eye_distance_m(rig, fused.shifts)
     if contradictions:
@@ -133,11 +189,17 @@ def judge(
             eye: Verdict("contradicted", "; ".join(dict.fromkeys(contradictions)))
             for eye in fused.shifts
         }
-    return {
+    verdicts = {
         eye: _fault(shift, apart_m, settings)
         or _judge_benefit(eye_benefit(rig, fused, eye), advice[eye], eye, settings)
         for eye, shift in fused.shifts.items()
     }
+    for eye, (before, _) in measured.items():
+        found = verdicts[eye]
+        told = f"the check found an error of {before:.1f}′ and corrected it; {found.reason}"
+        if found.name in ("accept", "repeat", "keep"):
+            verdicts[eye] = replace(found, reason=told)
+    return verdicts
 
 
 def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict | None:
@@ -193,13 +255,21 @@ def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSet
             f"this result, expected at {gain.after_arcmin:.1f}′, is only {percent} sure to be "
             "better",
         )
-    which = "with both eyes open" if len(advice.eyes) > 1 else f"with the {eye} eye alone"
-    more = f"{advice.alignments} more alignment{'s' * (advice.alignments != 1)} {which}"
+    more = _further_text(advice, eye)
     now = f"expected error {gain.after_arcmin:.1f}′, {percent} sure to be better than none"
     then = f"{advice.after_arcmin:.1f}′ expected after {more}"
     if advice.meets_target:
         return Verdict("repeat", f"{now}; {then}")
     return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
+
+
+def _further_text(advice: Advice, eye: Eye) -> str:
+    """Return what advice asks for: ``2 more alignments, then verifying each eye``."""
+    count = advice.alignments
+    steps = [f"{count} more alignment{'s' * (count != 1)}"] if count else []
+    if advice.eyes:
+        steps[0] += " with both eyes open" if len(advice.eyes) > 1 else f" with the {eye} eye alone"
+    return ", then ".join([*steps, "verifying each eye"] if advice.verify else steps)
 
 
 def _is_enough(after_arcmin: float, probability_better: float, settings: VerdictSettings) -> bool:

@@ -11,7 +11,16 @@ import numpy as np
 
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
-from handcal.types import CameraIdentity, Eye, EyeDistance, EyePlan, HeadsetIdentity, Intrinsics
+from handcal.types import (
+    CameraIdentity,
+    Eye,
+    EyeDistance,
+    EyePlan,
+    HeadsetIdentity,
+    Intrinsics,
+    PlanName,
+    Verification,
+)
 
 Facts = TypeVar("Facts")
 
@@ -30,18 +39,6 @@ class CameraUsed:
         sizes = one.width, one.height, one.fx, one.fy, self.depth_scale_m
         if not all(0 < size < np.inf for size in sizes):
             raise ValueError("the camera's size, focal lengths and depth scale must be positive")
-
-
-@dataclass(frozen=True, slots=True)
-class Verification:
-    """One eye's check by the wearer, who moves the drawing until it covers the hand."""
-
-    before_m: tuple[float, float, float]
-    """φ with which the hand's outline was first drawn."""
-    nudge_arcmin: tuple[float, float]
-    """Movement of the drawing by the wearer, to the right and down."""
-    after_m: tuple[float, float, float]
-    """φ after the nudge was taken into account."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +66,10 @@ class SessionFacts:
 
     camera: CameraUsed | None = None
     headset: HeadsetIdentity | None = None
-    plan: EyePlan | None = None
-    """The order in which the eyes were aligned."""
+    plan: EyePlan | PlanName | None = None
+    """The plan that was followed, or only the order in which the eyes were aligned."""
+    former: str = ""
+    """Name of the session with whose φ this one began; empty if with none."""
     eye_distance: EyeDistance | None = None
     """Measured; the results were solved with it."""
     verified: Mapping[Eye, Verification] = field(default_factory=dict)

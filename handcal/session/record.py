@@ -53,7 +53,7 @@ class SessionRecord:
     """Trials of the user test, likewise."""
     results: dict[str, Any] | None
     """The newest results; None if none were saved since an alignment was deleted or restored, or
-    the eye distance was changed."""
+    the eye distance or a verification was changed."""
     is_solved: bool
     """True if the results are those of all `alignments`."""
     is_applied: bool

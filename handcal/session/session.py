@@ -281,7 +281,7 @@ class Session(Closable):
     def save_facts(self, **facts: Any) -> None:
         """Record facts by their names in `SessionFacts`; each replaces an earlier one.
 
-        Results go if the eye distance changes.
+        Results go if the eye distance or a verification changes.
 
         Raises
         ------

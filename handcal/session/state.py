@@ -202,7 +202,8 @@ class SessionState:
                 self.notes_sha256 = data["sha256"], data["before_sha256"]
             case SessionEvent.FACTS_SAVED:
                 before, self.facts = self.facts, with_facts(self.facts, data)
-                if self.facts.eye_distance != before.eye_distance:
+                is_known = self.facts.eye_distance == before.eye_distance
+                if not (is_known and dict(self.facts.verified) == dict(before.verified)):
                     self.is_solved = self.is_applied = False
                     self._set_results(None)
             case SessionEvent.ALIGNMENT_SAVED:

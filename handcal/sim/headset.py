@@ -26,7 +26,7 @@ from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.wire import VERSION, hkdf
 from handcal.rig.rig_file import read_rig
-from handcal.sim.hand import make_hand
+from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings
 from handcal.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
@@ -69,6 +69,8 @@ class HeadsetSettings:
     """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
     eye_distance_m: float | None = None
     """Eye distance that it reports; None: it measures none."""
+    side: Side | None = None
+    """The hand that is raised; None: as the seed has it."""
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
 
@@ -95,7 +97,7 @@ def run_headset(
     rig = read_rig(Path(settings.rig_path))
     worn_rig = read_rig(Path(settings.worn_rig_path or settings.rig_path))
     if settings.has_wearer:
-        hand = make_hand(settings.seed)
+        hand = make_hand(settings.seed, HandSettings(side=settings.side))
         act = _as_wearer(Wearer(settings.seed, worn_rig, hand, settings.wearer), rig)
     else:
         act = _at_keyboard()
@@ -125,6 +127,8 @@ def run_headset(
             client.send_pose(action.T_W_H @ _tracking_error(rng, settings), clock_ns(t_ns))
             if action.confirm:
                 client.confirm(clock_ns(t_ns), state)
+            if action.nudge is not None and state.verify is not None:
+                client.nudge(clock_ns(t_ns), state, action.nudge, action.fits)
             now_s = time.monotonic()
             if client.connected:
                 heard_s = now_s
@@ -179,6 +183,7 @@ def _told(state: HeadsetState) -> str:
         "" if state.live_W_m is None else f"live {'outline' if state.is_outline else 'hand'}",
         "" if state.target is None else f"target for the {state.target.eye} eye",
         "" if state.shape is None else f"shape of {len(state.shape.corners_W_m)} corners",
+        "" if state.verify is None else f"verify the {state.verify.eye} eye",
         f"open: {' and '.join(state.eyes)}",
         state.prompt,
     ]
@@ -230,6 +235,9 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
     """Return the displays' content; nothing is drawn before both projections have arrived."""
     drawn = state.drawn
     is_ready = len(drawn) == len(EYES)
+    is_outlined = (
+        state.is_outline and state.verify is not None and state.verify.eye in state.live_eyes
+    )
 
     def rendered(eye: Eye) -> Float64:
         return drawn[eye].P if is_ready else projection_matrix(rig.eyes[eye])
@@ -243,6 +251,8 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
         eyes=state.eyes,
         guard_red=state.is_over_limit,
         prompt=state.prompt,
+        verify=state.verify if is_ready else None,
+        outline_W_m=state.live_W_m if is_outlined else None,
     )
 
 

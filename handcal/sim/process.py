@@ -11,6 +11,7 @@ from pathlib import Path
 from handcal.errors import LinkError
 from handcal.io.closable import Closable
 from handcal.link.pairing import KEY_VARIABLE
+from handcal.sim.hand import Side
 
 _END_S = 5.0
 
@@ -39,6 +40,8 @@ class VirtualHeadset(Closable):
         Share of the datagrams lost, and reordered, in each direction.
     is_stale : bool
         Fault: it keeps drawing with the projections of the wearer before.
+    side : {"left", "right"}, optional
+    slip_m : (3,) tuple of float
     eye_distance_m : float or None
         Eye distance that it reports; None: it measures none.
     """
@@ -56,6 +59,8 @@ class VirtualHeadset(Closable):
         reorder: float = 0.0,
         is_stale: bool = False,
         eye_distance_m: float | None = None,
+        side: Side | None = None,
+        slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
         options = {
@@ -72,6 +77,9 @@ class VirtualHeadset(Closable):
         command += ["--stale"] if is_stale else []
         if eye_distance_m is not None:
             command += ["--eye-distance-mm", str(1e3 * eye_distance_m)]
+        command += ["--hand", side] if side else []
+        if any(slip_m):
+            command += ["--slip-mm", *(str(1e3 * one_m) for one_m in slip_m)]
         self._process = subprocess.Popen(  # noqa: S603 (our own program)
             command, env=os.environ | {KEY_VARIABLE: pairing_key}, stderr=self._errors
         )

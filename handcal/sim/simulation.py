@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from handcal.io.closable import Closable
-from handcal.sim.hand import make_hand
+from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.render import World
 from handcal.sim.room import make_room
@@ -25,14 +25,21 @@ class Simulation(Closable):
         Seed of wearer, hand and room.
     start_headset : callable
         Starts the process, given the port to which it sends the scene.
+    side : {"left", "right"}, optional
+        The hand that is raised; default: as the seed has it.
 
     Attributes
     ----------
     world : World
     """
 
-    def __init__(self, seed: int, start_headset: Callable[[int], VirtualHeadset]) -> None:
-        self.world = World(make_hand(seed), make_room(seed))
+    def __init__(
+        self,
+        seed: int,
+        start_headset: Callable[[int], VirtualHeadset],
+        side: Side | None = None,
+    ) -> None:
+        self.world = World(make_hand(seed, HandSettings(side=side)), make_room(seed))
         self._start_headset = start_headset
         self._recent: deque[SceneState] = deque(maxlen=_REMEMBERED)
         with ExitStack() as stack:

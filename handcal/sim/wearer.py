@@ -14,6 +14,7 @@ import numpy as np
 
 from handcal.display import view_of_eye
 from handcal.geometry import interpolate_pose, invert, rigid, transform
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import (
     CursorMatch,
@@ -23,13 +24,18 @@ from handcal.sim.placement import (
     overlay_hand,
     view_through,
 )
+from handcal.sim.verifying import Check, SeenDifference, see_difference
 from handcal.types import EYES, Eye, Float64, Rig
 
-_Phase: TypeAlias = Literal["raised", "reaching", "awaiting"]
+_Phase: TypeAlias = Literal["raised", "reaching", "awaiting", "verifying"]
 
 _CURSOR_POINTS = 150
 _LOWERED_M = 0.35
+_AT_ONCE_S = 1e-3
+_FAR_M = 0.05
 _ARCMIN = np.radians(1.0 / 60.0)
+_KEEP = "Keep your hand"
+"""In prompts that ask the wearer not to lower the hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +50,8 @@ class WearerSettings:
     """Each eye's own deviation along each axis."""
     largest_shift_m: float = 0.010
     """Eye box, to which longer shifts are shortened."""
+    slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Movement of both eyes before the headset since these were drawn, E axes: it has slipped."""
     raise_m: tuple[float, float, float] = (0.0, 0.048, 0.56)
     raise_spread_m: tuple[float, float, float] = (0.015, 0.006, 0.025)
     """Position of the raised palm relative to the midpoint of the viewpoints C0, in the head's
@@ -73,6 +81,13 @@ class WearerSettings:
     """Amplitudes of slow sway."""
     tremor_m: float = 0.0001
     """Amplitude of the hand's tremor, 8 to 12 Hz."""
+    nudge_sigma_arcmin: float = 2.0
+    nudge_size_sigma: float = 0.005
+    """Error with which an outline is seen to cover the hand, in each of two directions and
+    relative in size; one for each verification."""
+    look_s: float = 0.6
+    press_s: float = 0.12
+    """Times of a look at the outline, and of one press of a key."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +107,10 @@ class DisplayView:
     guard_red: bool
     """True if the live hand is drawn red."""
     prompt: str
+    verify: VerifyRequest | None = None
+    """The eye to verify; None if there is none."""
+    outline_W_m: Float64 | None = None
+    """(N, 3); the live hand's outline as drawn for that eye, W; None if it is not drawn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,6 +122,10 @@ class WearerAction:
     """(4, 4); poses of the headset and of the hand."""
     confirm: bool
     """True at the instants when the button is pressed."""
+    nudge: NudgeSum | None = None
+    """In a verification, all presses of its keys so far, at the instants of one more."""
+    fits: bool = False
+    """True at the instants when the wearer says that the outline covers the hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +195,7 @@ def draw_eyes(rng: np.random.Generator, settings: WearerSettings) -> dict[Eye, F
         shorten = settings.largest_shift_m / max(
             settings.largest_shift_m, float(np.linalg.norm(shift_m))
         )
-        shifts[eye] = shorten * shift_m
+        shifts[eye] = shorten * shift_m + settings.slip_m
     return shifts
 
 
@@ -216,6 +239,7 @@ class Wearer:
         self._error = self._draw_error(0.0)
         self._confirmed_s = 0.0
         self._P_confirmed: Mapping[Eye, Float64] = {}
+        self._check: Check | None = None
 
     def step(self, view: DisplayView) -> WearerAction:
         """Advance to `view.t_s`, reacting to the displays.
@@ -230,34 +254,92 @@ class Wearer:
         if self._move is None:
             self._move = _Move(self._T_W_hand, t_s, 2.0 * self._settings.movement_s)
         self._notice(view, self._move)
-        overlay = None if self._phase == "raised" else self._overlay(view, T_W_H)
+        overlay = self._overlay(view, T_W_H) if self._phase in ("reaching", "awaiting") else None
         confirm = overlay is not None and self._decide(view, self._move)
         goal = self._T_W_raised if overlay is None else overlay
         self._T_W_hand = self._move.pose(t_s, goal)
         T_W_hand = self._T_W_hand @ self._hand_sway.pose(t_s) @ self._tremor.pose(t_s)
-        return WearerAction(T_W_H, T_W_hand, confirm)
+        if self._check is None or t_s < self._move.end_s:
+            return WearerAction(T_W_H, T_W_hand, confirm)
+        nudge, fits = self._look(self._check, view, T_W_H, T_W_hand)
+        return WearerAction(T_W_H, T_W_hand, confirm, nudge, fits)
 
     def _notice(self, view: DisplayView, move: _Move) -> None:
         """Start aligning with a new cursor, and relax after the alignment."""
         task = None if view.cursor_W_m is None else (view.cursor_id, view.eyes)
-        if self._phase == "raised":
+        if view.verify is not None:
+            self._verify(view, view.verify)
+        elif self._phase == "verifying":
+            # The hand stays up: another eye may follow, or another cursor.
+            self._phase, self._check = "raised", None
+        elif self._phase == "raised":
             wait_s = self._settings.patience_s if task == self._task else 0.0
             if task is not None and view.t_s >= move.end_s + wait_s:
                 self._take_up(view, task)
         elif task is None or (self._phase == "awaiting" and self._was_answered(view)):
-            self._relax(view.t_s)
+            if view.prompt.startswith(_KEEP):
+                self._stay(view.t_s)
+            else:
+                self._relax(view.t_s)
         elif task != self._task:
             self._take_up(view, task)
+
+    def _verify(self, view: DisplayView, request: VerifyRequest) -> None:
+        """Hold the hand where it is, and look at the outline."""
+        if self._check is None or self._check.request != request:
+            settings = self._settings
+            right, down, size = self._rng.normal(size=3) * [
+                settings.nudge_sigma_arcmin,
+                settings.nudge_sigma_arcmin,
+                settings.nudge_size_sigma,
+            ]
+            error = SeenDifference(right, down, size)
+            self._check = Check(request, error, settings.look_s, settings.press_s)
+        if self._phase in ("reaching", "awaiting"):
+            self._stay(view.t_s)
+        self._phase = "verifying"
+
+    def _look(
+        self, check: Check, view: DisplayView, T_W_H: Float64, T_W_hand: Float64
+    ) -> tuple[NudgeSum | None, bool]:
+        """Return the presses made so far if one is made now, and whether the drawing fits."""
+        eye = check.request.eye
+        if view.outline_W_m is None or not check.is_due(view.t_s, view.P[eye]):
+            return None, False
+        if not check.looks:
+            return check.press(view.t_s), False
+        seen = see_difference(
+            self._rig.eyes[eye],
+            self.true_shift_m[eye],
+            view.P[eye] @ view.T_V_H[eye],
+            T_W_H,
+            self._hand,
+            T_W_hand,
+            view.outline_W_m,
+        )
+        return check.moved, check.look(view.t_s, seen)
+
+    def _stay(self, t_s: float) -> None:
+        """Keep the hand where it is."""
+        self._phase = "raised"
+        self._T_W_raised = self._T_W_hand
+        self._move = _Move(self._T_W_hand, t_s, _AT_ONCE_S)
 
     def _take_up(self, view: DisplayView, task: tuple[int, tuple[Eye, ...]]) -> None:
         assert view.cursor_W_m is not None
         if self._match is None or self._task is None or self._task[0] != task[0]:
             every = -(-len(view.cursor_W_m) // _CURSOR_POINTS)
             cursor_m = np.asarray(view.cursor_W_m[::every], dtype=np.float64)
-            self._match = match_cursor(self._hand, cursor_m, self._T_W_hand)
+            self._match = match_cursor(self._hand, cursor_m, self._recognised(cursor_m))
         self._task = task
         turned_rad = self._settings.novice_rotation_rad if self._is_naive else 0.0
         self._reach(view.t_s, self._draw_error(turned_rad))
+
+    def _recognised(self, cursor_m: Float64) -> Float64:
+        """Return roughly the pose of the hand that a cursor shows: of this hand, maybe moved."""
+        moved_m = cursor_m.mean(axis=0) - self._T_W_hand[:3, 3]
+        is_far = float(np.linalg.norm(moved_m)) > _FAR_M
+        return rigid(translation_m=moved_m) @ self._T_W_hand if is_far else self._T_W_hand
 
     def _reach(self, t_s: float, error: PlacementError) -> None:
         self._phase = "reaching"

@@ -62,7 +62,7 @@ def run_learn_prior(
     sessions: list[list[Observed]] = []
     left_out: dict[str, int] = {}
     wearers: set[str] = set()
-    numbers = _numbers(rig)
+    numbers = rig_numbers(rig)
     for number, journal in enumerate(journals):
         progress.at(number / len(journals), f"Reading session {number + 1} of {len(journals)}")
         try:
@@ -92,7 +92,7 @@ def _read_session(journal: Path, numbers: list[list[float]]) -> tuple[list[Obser
     """Return the observations of a session and its wearer."""
     try:
         events = read_journal(journal).events
-        is_same_rig = _numbers(read_rig(journal.with_name("rig.yaml"))) == numbers
+        is_same_rig = rig_numbers(read_rig(journal.with_name("rig.yaml"))) == numbers
     except FileError:
         raise _NotUsableError("not readable") from None
     if not is_same_rig:
@@ -110,7 +110,7 @@ def _read_session(journal: Path, numbers: list[list[float]]) -> tuple[list[Obser
     return _observations(results.get("observed")), wearer if isinstance(wearer, str) else ""
 
 
-def _numbers(rig: Rig) -> list[list[float]]:
+def rig_numbers(rig: Rig) -> list[list[float]]:
     """Return the numbers of a rig that an eye shift depends on."""
     arrays: list[Float64] = [rig.T_H_D]
     for eye in EYES:

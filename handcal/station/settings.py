@@ -9,7 +9,9 @@ from typing import Literal
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.io.resources import resource_path
+from handcal.sim.hand import Side
 from handcal.station.faults import Fault
+from handcal.station.plan import PlanSettings
 from handcal.station.procedure import CalibrationSettings
 
 Source = Literal["simulator", "recording", "realsense"]
@@ -46,6 +48,10 @@ class StationSettings:
     """Share of the virtual headset's datagrams lost, and reordered, in each direction."""
     fault: Fault = ""
     """Fault of the simulated camera or the virtual headset; empty: none."""
+    side: Side | None = None
+    """The hand that the simulated wearer raises; None: as the seed has it."""
+    slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Movement of the simulated wearer's headset since the seed's eyes were drawn, E axes."""
     eye_distance_m: float | None = None
     """Eye distance that the virtual headset reports; None: it measures none."""
     sessions: str = "sessions"
@@ -53,6 +59,7 @@ class StationSettings:
     learn_prior: bool = True
     """Learn where wearers' eyes are from the finished sessions in this folder with the same rig,
     once there are enough."""
+    plan: PlanSettings = field(default_factory=PlanSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
 
     @property

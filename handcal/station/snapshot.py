@@ -11,9 +11,11 @@ from handcal.link.server import LinkStatistics
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.station.hands import PlacedHand
+from handcal.station.plan import NextStep
 from handcal.station.procedure import Observation, State
+from handcal.station.verifying import VerifyingView
 from handcal.station.wearer_view import EyeView
-from handcal.types import Alignment, Eye, Float64, Frame
+from handcal.types import Alignment, Eye, Float64, Frame, PlanName, Verification
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +40,15 @@ class Procedure:
     """each (3,); φ that the headset renders with."""
     is_applied: bool
     """True if the headset has acknowledged it."""
+    plan: PlanName = "paper"
+    next_step: NextStep | None = None
+    """What the plan needs next; None before the first frame."""
+    verifying: VerifyingView | None = None
+    """The verification that goes on, in the state `verify`."""
+    verifications: Mapping[Eye, Verification] = field(default_factory=dict)
+    """The newest verification of each eye."""
+    former_shift_m: Mapping[Eye, Float64] = field(default_factory=dict)
+    """each (3,); φ to which `Calibration.go_back` returns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

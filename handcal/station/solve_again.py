@@ -103,7 +103,7 @@ def solve_again(
     progress: Progress = Progress(),
     eye_distance: EyeDistance | None = None,
 ) -> Results | None:
-    """Return the results of a session's alignments; None if there are none.
+    """Return the results of a session's alignments; None if there are none to solve.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def solve_again(
     CancelledError
         If it was cancelled.
     """
-    if not record.alignments:
+    if not record.alignments and not record.facts.verified:
         return None
     try:
         return solve_session(
@@ -131,6 +131,8 @@ def solve_again(
             progress,
             eye_distance=eye_distance or record.facts.eye_distance,
             contradictions=record.facts.contradictions,
+            verified=record.facts.verified,
+            plan="recommended" if record.facts.plan == "recommended" else None,
         )
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error

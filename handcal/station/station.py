@@ -33,8 +33,11 @@ from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
+from handcal.sim.wearer import WearerSettings
+from handcal.station.former import Former, read_former
 from handcal.station.hands import PlacedHand
 from handcal.station.lab_prior import run_learn_prior
+from handcal.station.plan import NextStep, Plan
 from handcal.station.procedure import Calibration, Observation, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
@@ -56,6 +59,9 @@ class Station(Closable):
         Name or code; stored in the session.
     resume : Path, optional
         A session to resume, instead of a new one.
+    former : Path, optional
+        A stored session of the same wearer and rig: the new one begins with its φ, to be verified
+        first, and with its posterior, widened, as prior.
     pairings : Pairings or str
         The network headsets that may connect, or a key alone; the virtual headset gets a new key.
 
@@ -63,6 +69,9 @@ class Station(Closable):
     ----------
     calibration : Calibration
     session : Session
+    plan : Plan
+    holds_plan : bool
+        True to hold an automatic plan before its next step.
 
     Raises
     ------
@@ -78,9 +87,18 @@ class Station(Closable):
         wearer: str = "",
         resume: Path | None = None,
         pairings: Pairings | str = "",
+        former: Path | None = None,
     ) -> None:
+        begun = Former()
+        if former is not None and resume is None:
+            begun = read_former(former, read_rig(settings.rig_path))
         # A session keeps the prior that it began with, so that it is solved alike when resumed.
-        prior = _lab_prior(settings) if resume is None else _stored_prior(resume)
+        if resume is not None:
+            prior = _stored_prior(resume)
+        elif begun.prior is not None:
+            prior = replace(settings.calibration.solve.fuse.prior, learned=begun.prior)
+        else:
+            prior = _lab_prior(settings)
         settings = _with_prior(settings, prior)
         self.settings = settings
         is_virtual = settings.headset == "virtual"
@@ -89,6 +107,8 @@ class Station(Closable):
             pairings = Pairings((Pairing(key),))
         self._pairings = pairings
         self.watch_views = False
+        self.holds_plan = False
+        self._next_step: NextStep | None = None
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
             self.session = stack.enter_context(_open_session(settings, wearer, resume))
@@ -99,11 +119,26 @@ class Station(Closable):
             self._link = stack.enter_context(HeadsetServer(pairings, bind))
             if is_virtual:
                 self._simulation = stack.enter_context(
-                    Simulation(settings.seed, self._start_headset)
+                    Simulation(settings.seed, self._start_headset, settings.side)
                 )
                 self.worn_rig = read_rig(self._worn_rig_path)
-                self._true_eyes = TrueEyes(self._simulation.world, self.worn_rig, settings.seed)
+                self._true_eyes = TrueEyes(
+                    self._simulation.world,
+                    self.worn_rig,
+                    settings.seed,
+                    WearerSettings(slip_m=settings.slip_m),
+                )
             self._feed = stack.enter_context(CameraFeed(self._open_camera))
+            facts = self._record.facts
+            plan = settings.plan
+            if resume is not None:
+                is_recommended = facts.plan == "recommended"
+                plan = replace(plan, name="recommended" if is_recommended else "paper")
+            elif plan.name != "paper":
+                self.session.save_facts(plan=plan.name)
+            if former is not None and resume is None:
+                self.session.save_facts(former=former.name)
+                self.session.save_fine_tuned(begun.shift_m)
             self.calibration = Calibration(
                 self.rig,
                 self._link,
@@ -111,7 +146,11 @@ class Station(Closable):
                 settings.calibration,
                 resume=self._record if resume else None,
                 wearer=self._record.wearer,
+                plan="recommended" if plan.name == "recommended" else None,
+                usable_eyes=plan.usable_eyes,
+                former_m=begun.shift_m,
             )
+            self.plan = Plan(self.calibration, plan, checks_first=bool(facts.former or former))
             self._stack = stack.pop_all()
         self._number = 0
         self._frame: Frame | None = None
@@ -149,6 +188,8 @@ class Station(Closable):
                 self._feed.expose_for(None if cloud is None else cloud.points_m)
             if self.calibration.state is State.APPLYING:
                 self.calibration.poll_applied()
+            if observation is not None:
+                self._next_step = self._follow_plan(observation)
         except LinkError as error:
             self._not_applied = str(error)
         except FileError:
@@ -176,6 +217,12 @@ class Station(Closable):
             record=self._record,
             views=dict(self._views),
         )
+
+    def _follow_plan(self, observation: Observation) -> NextStep:
+        """Do the plan's next step if it is automatic; return it."""
+        if self.plan.settings.is_automatic and not self.holds_plan:
+            return self.plan.advance(observation)
+        return self.plan.next_step(observation.is_steady)
 
     def finish(self) -> None:
         """Record the link statistics and finish the session; FileError if it cannot be written."""
@@ -298,6 +345,8 @@ class Station(Closable):
             reorder=self.settings.reorder,
             is_stale=self.settings.fault == "stale-headset",
             eye_distance_m=self.settings.eye_distance_m,
+            side=self.settings.side,
+            slip_m=self.settings.slip_m,
         )
 
     def _open_camera(self) -> Camera:
@@ -396,6 +445,11 @@ class Station(Closable):
             results=calibration.results,
             applied_shift_m=calibration.applied_shift_m,
             is_applied=calibration.is_applied,
+            plan=self.plan.settings.name,
+            next_step=self._next_step,
+            verifying=None if calibration.verifying is None else calibration.verifying.view(),
+            verifications=dict(calibration.verifications),
+            former_shift_m=calibration.former_shift_m,
         )
 
     def _store_waiting(self) -> None:

@@ -55,9 +55,13 @@ class Comparison(QObject):
 
         def work(progress: Progress) -> object:
             assert record is not None
-            measured = record.facts.eye_distance
             return solve_session(
-                record.alignments, record.rig, settings, progress, eye_distance=measured
+                record.alignments,
+                record.rig,
+                settings,
+                progress,
+                eye_distance=record.facts.eye_distance,
+                verified=record.facts.verified,
             )
 
         self._job = Job(work)

@@ -28,6 +28,8 @@ SLOTS = {
     "device": (7,),
     "shape": (8,),
     "show": (9,),
+    "verify": (10,),
+    "nudge": (11,),
 }
 
 

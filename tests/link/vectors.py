@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from handcal.geometry import rigid
-from handcal.link import greetings, messages, wire
+from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.greetings import Refusal
 from handcal.link.messages import Owner
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.reliable import Receipt
 from handcal.link.wire import Keys, Packet, Slot, Welcome
 from handcal.types import Eye, HeadsetIdentity, HeadsetView, Projection, Shape, Target
@@ -48,6 +49,8 @@ def build() -> dict[str, Any]:
     drawn = drawn_digest(drawn_projections(projections, is_offline=False), cursor.cursor)
     target = Target("right", np.arange(12.0).reshape(4, 3) / 10)
     shape = Shape(np.arange(24.0).reshape(8, 3) / 10, ("left",))
+    request = VerifyRequest(3, "right", 1.0, 0.002)
+    moved = NudgeSum(-4.0, 2.0, 0.004)
     to_headset = [
         (Slot.UNRELIABLE, pb.Envelope(ping=pb.Ping(t_sent_host_ns=T_NS))),
         (Slot.CURSOR, cursor),
@@ -58,6 +61,7 @@ def build() -> dict[str, Any]:
         (Slot.TARGET, messages.target(target)),
         (Slot.SHAPE, messages.shape(shape)),
         (Slot.SHOW, pb.Envelope(show=pb.Show(offline=True))),
+        (Slot.VERIFY, nudges.verify(request)),
     ]
     pong = pb.Pong(
         t_sent_host_ns=T_NS,
@@ -71,6 +75,7 @@ def build() -> dict[str, Any]:
         (Slot.UNRELIABLE, messages.poses([(T_NS, T_V_H)])),
         (Slot.UNRELIABLE, pb.Envelope(pong=pong)),
         (Slot.CONFIRM, messages.confirm(T_NS, 7, drawn)),
+        (Slot.NUDGE, nudges.nudge(request, moved, True, T_NS, drawn)),
         (Slot.UNRELIABLE, messages.ack([Receipt(Slot.CURSOR, 2, 1)])),
         (Slot.UNRELIABLE, pb.Envelope(bye=pb.Bye())),
     ]

@@ -14,7 +14,6 @@ from handcal.session.facts import (
     AlignmentFacts,
     CameraUsed,
     SessionFacts,
-    Verification,
     facts_json,
 )
 from handcal.session.session import Session
@@ -25,6 +24,7 @@ from handcal.types import (
     HeadsetIdentity,
     HeadsetView,
     Intrinsics,
+    Verification,
 )
 
 CAMERA = CameraUsed(

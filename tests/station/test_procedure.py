@@ -7,34 +7,25 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from handcal.display import projection_matrix, update_matrix, view_of_eye
-from handcal.errors import FileError, HandError, LinkError, PoseError
+from handcal.errors import FileError, HandError, LinkError
 from handcal.geometry import invert, rigid, transform
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import LinkSettings
 from handcal.register.guard import RotationGuard
 from handcal.register.results import SolveSettings, results_json, solve_session
-from handcal.rig.example import example_rig
-from handcal.session.session import Session, SessionRecord
-from handcal.sim.hand import HandSettings, make_hand
-from handcal.sim.render import World, render
-from handcal.sim.room import make_room
-from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.session.session import Session
 from handcal.station.evidence import FROZEN_FRAMES
 from handcal.station.procedure import (
     Calibration,
     CalibrationSettings,
-    Observation,
     ProcedureError,
     State,
 )
@@ -46,29 +37,28 @@ from handcal.types import (
     EyeDistance,
     Float64,
     Frame,
-    HeadsetIdentity,
-    Intrinsics,
     Projection,
-    UInt16,
     Verdict,
 )
 from tests.helpers import eventually
-
-KEY = b"a pairing key of the tests"
-IDENTITY = HeadsetIdentity("00000000000000aa", "Headset of the tests")
-CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
-RIG = replace(example_rig(), depth_intrinsics=CAMERA)
-SENSOR = SensorSettings()
-LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
-SETTINGS = CalibrationSettings(camera_latency_s=0.0)
-PERIOD_NS = 80_000_000
-HEADSET_AHEAD_NS = 5_000_000_000
-CAMERA_AHEAD_NS = 7_000_000_000
-
-T_W_H = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])
-T_D_HAND = rigid([-0.2, 0.0, 0.0], [0.0, 0.0, 0.5])
-T_D_NEAR = rigid([-0.2, 0.0, 0.0], [0.006, -0.004, 0.5])
-T_D_TURNED = rigid([-0.2, 0.0, 0.0], [0.006, -0.004, 0.5]) @ rigid([0.0, 0.0, np.radians(15.0)])
+from tests.station.stage import (
+    CAMERA,
+    CAMERA_AHEAD_NS,
+    IDENTITY,
+    PERIOD_NS,
+    RIG,
+    SENSOR,
+    SETTINGS,
+    T_D_HAND,
+    T_D_NEAR,
+    T_D_TURNED,
+    T_W_H,
+    Stage,
+    connect,
+    depth_of,
+    events,
+    world,
+)
 
 # Opens a session with the alignment of another, and dies with it open.
 KILLED = """
@@ -80,161 +70,6 @@ session = Session.create(Path(sys.argv[2]), record.rig, record.settings, name="k
 session.save_alignment(record.alignments[1])
 os._exit(9)
 """
-
-
-@cache
-def world() -> World:
-    return World(make_hand(1), make_room(1))
-
-
-@cache
-def depth_of(pose: bytes | None, thumb_out_rad: float = 0.0) -> UInt16:
-    T_D_hand = None if pose is None else np.frombuffer(pose).reshape(4, 4)
-    shaped = world()
-    if thumb_out_rad:
-        shaped = replace(shaped, hand=make_hand(1, HandSettings(thumb_out_rad=thumb_out_rad)))
-    depth_m, _ = render(shaped, np.eye(4), T_D_hand, CAMERA)
-    # The focal length of the full-resolution image, whose noise the smaller one inherits.
-    return sense_depth(depth_m, 2 * CAMERA.fx, np.random.default_rng(0), SENSOR)
-
-
-class Stage:
-    """A calibration with its wearer and headset, on a timeline of its own that needs no waiting."""
-
-    def __init__(
-        self,
-        server: HeadsetServer,
-        client: HeadsetClient,
-        session: Session | None,
-        resume: SessionRecord | None = None,
-    ):
-        self.server, self.client = server, client
-        self.calibration = Calibration(RIG, server, session, SETTINGS, resume)
-        self.t_ns = time.monotonic_ns()
-        self._frames = 0
-
-    def send_poses(self, T: Float64 = T_W_H, t_ns: int | None = None) -> None:
-        """Tell the pose around a time, and wait until it is known."""
-        t_ns = t_ns or self.t_ns
-        for part_ns in (-20_000_000, 20_000_000):
-            self.client.send_pose(T, t_ns + part_ns + HEADSET_AHEAD_NS)
-        eventually(lambda: self._knows_pose(t_ns))
-
-    def see(
-        self,
-        T_D_hand: Float64 | None = T_D_HAND,
-        T: Float64 = T_W_H,
-        *,
-        pose: bool = True,
-        thumb_out_rad: float = 0.0,
-    ) -> Observation:
-        """Step with the next frame, of a hand or none."""
-        self.t_ns += PERIOD_NS
-        self._frames += 1
-        if pose:
-            self.send_poses(T)
-        t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
-        depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad).copy()
-        depth[0, 0] = self._frames % 1000  # a live picture always changes
-        return self.calibration.step(
-            Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
-        )
-
-    def hold(self, T_D_hand: Float64 = T_D_HAND, frames: int = 7) -> Observation:
-        """Hold the hand still for a while."""
-        return [self.see(T_D_hand) for _ in range(frames)][-1]
-
-    def press(
-        self,
-        t_ns: int | None = None,
-        cursor_id: int | None = None,
-        shown: HeadsetState | None = None,
-    ) -> None:
-        """Press the headset's button, at a time and for a cursor, as of now by default."""
-        shown = shown or self.shown()
-        shown = shown if cursor_id is None else replace(shown, cursor_id=cursor_id)
-        t_headset_ns = (t_ns or self.t_ns) + HEADSET_AHEAD_NS
-        self.client.wait_acked(self.client.confirm(t_headset_ns, shown), 5.0)
-
-    def make_cursor(self, T_D_hand: Float64 = T_D_HAND, eyes: Sequence[Eye] = EYES) -> None:
-        """Hold the hand, make the cursor of it, and wait until the headset shows it."""
-        before = self.shown().cursor_id
-        self.hold(T_D_hand)
-        eventually(lambda: self.calibration.is_applied)
-        self.calibration.make_cursor(eyes)
-        eventually(lambda: self.shown().cursor_id > before and self.shown().prompt)
-
-    def align(
-        self,
-        T_D_cursor: Float64 = T_D_HAND,
-        T_D_hand: Float64 = T_D_NEAR,
-        eyes: Sequence[Eye] = EYES,
-    ) -> None:
-        """Make a cursor and align the hand with it."""
-        self.make_cursor(T_D_cursor, eyes)
-        self.see(T_D_hand)
-        self.press()
-        self.see(T_D_hand)
-
-    def calibrate(
-        self,
-        T_D_cursor: Float64 = T_D_HAND,
-        T_D_hand: Float64 = T_D_NEAR,
-        eyes: Sequence[Eye] = EYES,
-    ) -> None:
-        """Go round once."""
-        self.align(T_D_cursor, T_D_hand, eyes)
-        self.calibration.solve()
-        self.calibration.apply()
-        self.calibration.wait_applied()
-
-    def state(self) -> State:
-        return self.calibration.state
-
-    def shown(self) -> HeadsetState:
-        return self.client.state()
-
-    def _knows_pose(self, t_ns: int) -> bool:
-        try:
-            self.server.pose_at_host_ns(t_ns)
-        except PoseError:
-            return False
-        return True
-
-
-@pytest.fixture
-def server() -> Iterator[HeadsetServer]:
-    with HeadsetServer(KEY, settings=LINK) as server:
-        yield server
-
-
-def connect(server: HeadsetServer) -> HeadsetClient:
-    client = HeadsetClient(
-        server.address, KEY, IDENTITY, lambda: time.monotonic_ns() + HEADSET_AHEAD_NS, LINK
-    )
-    client.wait_connected(5.0)
-    return client
-
-
-@pytest.fixture
-def client(server: HeadsetServer) -> Iterator[HeadsetClient]:
-    with connect(server) as client:
-        yield client
-
-
-@pytest.fixture
-def session(tmp_path: Path) -> Iterator[Session]:
-    with Session.create(tmp_path, RIG, {}, name="session") as session:
-        yield session
-
-
-@pytest.fixture
-def stage(server: HeadsetServer, client: HeadsetClient, session: Session) -> Stage:
-    return Stage(server, client, session)
-
-
-def events(session: Session) -> list[tuple[str, dict[str, Any]]]:
-    return [(event.name, event.data) for event in Session.open(session.path).events]
 
 
 def cursor_for(
@@ -538,7 +373,7 @@ def test_the_pc_confirms_nothing_that_the_headset_has_not_received(
     stage.see(T_D_NEAR)
     eventually(lambda: stage.calibration.is_applied)
     client.close()
-    stage.calibration._send_projections(stage.calibration.applied_shift_m)
+    stage.calibration._drawing.send(stage.calibration.applied_shift_m)
     with pytest.raises(ProcedureError, match="has not received the cursor and projections"):
         stage.calibration.confirm()
 
@@ -559,7 +394,7 @@ def test_a_moving_or_absent_hand_is_not_steady(stage: Stage) -> None:
 def test_a_hand_held_before_a_slow_camera_is_steady(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(f"{__name__}.PERIOD_NS", 350_000_000)
+    monkeypatch.setattr("tests.station.stage.PERIOD_NS", 350_000_000)
     assert not stage.hold(frames=1).is_steady
     assert stage.hold(frames=3).is_steady
     assert not stage.see(rigid([-0.2, 0.0, 0.0], [0.02, 0.0, 0.5])).is_steady
@@ -1118,7 +953,7 @@ def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
 def test_a_full_session_says_so_before_the_wearer_aligns(
     server: HeadsetServer, client: HeadsetClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("handcal.station.procedure.MAX_ALIGNMENTS", 1)
+    monkeypatch.setattr("handcal.station.alignments.MAX_ALIGNMENTS", 1)
     stage = Stage(server, client, None)
     stage.align()
     stage.calibration.redo()

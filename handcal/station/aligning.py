@@ -1,0 +1,199 @@
+"""One alignment while it is made: the live hand against the cursor, and the judging of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from handcal.display import view_of_eye
+from handcal.errors import HandError, PoseError, PosePendingError
+from handcal.link.server import Confirmation, HeadsetServer
+from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
+from handcal.register.shape import ShapeChange, change_text
+from handcal.session.facts import AlignmentFacts
+from handcal.station.hands import PlacedHand, RecentHands
+from handcal.station.hold import merge_hold
+from handcal.station.states import CalibrationSettings, Observation
+from handcal.types import EYES, Alignment, Eye, Float64, Rig
+
+KEEP_PROMPT = "Keep your hand up."
+"""Shown while the next cursor or verification follows at once."""
+_SHAPE_EVERY_NS = 250_000_000
+"""A measurement of the shape takes half of a frame's time, and nobody reads faster."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Accepted:
+    """A confirmed alignment."""
+
+    alignment: Alignment
+    facts: AlignmentFacts
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A confirmation that makes no alignment."""
+
+    prompt: str
+    """The reason, and what the wearer is to do."""
+    reason: str
+    """In the journal's words."""
+    angle_deg: float | None = None
+    is_by_guard: bool = False
+    """True if the hand was turned or had changed its shape."""
+
+
+class Aligning:
+    """The cursor shown now, and the hand that follows it.
+
+    Parameters
+    ----------
+    cursor : PlacedHand
+        The frozen hand.
+    cursor_id : int
+    eyes : tuple of eye
+        The eyes to keep open.
+    rig : Rig
+    settings : CalibrationSettings
+
+    Attributes
+    ----------
+    confirmation : Confirmation or None
+        One that waits for the frame of its time.
+    refusal : str
+        Reason why the last confirmation was refused; empty if none was.
+
+    Raises
+    ------
+    HandError
+        If almost all points lie at cut edges.
+    """
+
+    def __init__(
+        self,
+        cursor: PlacedHand,
+        cursor_id: int,
+        eyes: tuple[Eye, ...],
+        rig: Rig,
+        settings: CalibrationSettings,
+    ) -> None:
+        self.cursor = cursor
+        self.cursor_id = cursor_id
+        self.eyes = eyes
+        self.confirmation: Confirmation | None = None
+        self.refusal = ""
+        self._rig = rig
+        self._settings = settings
+        self._limits: GuardSettings = settings.guard
+        self._guard = RotationGuard(cursor.points_W_m, cursor.cloud.is_cut)
+        self._shape: ShapeChange | None = None
+        self._shape_ns = 0
+
+    def follow(self, observation: Observation, hand: PlacedHand) -> Observation:
+        """Return the observation with rotation and change of shape of the live hand."""
+        started_s = time.perf_counter()
+        try:
+            rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
+            if hand.t_host_ns - self._shape_ns > _SHAPE_EVERY_NS:
+                self._shape = self._guard.shape_change(
+                    hand.points_W_m, hand.cloud.is_cut, is_live=True
+                )
+                self._shape_ns = hand.t_host_ns
+        except HandError as error:
+            return replace(observation, hand=None, problem=str(error))
+        shape = self._shape
+        R_D_W = hand.T_W_D[:3, :3].T
+        return replace(
+            observation,
+            rotation_rad=R_D_W @ rotation_W,
+            shape_change_m=None if shape is None else shape.rms_m,
+            shape_text="" if shape is None else change_text(shape, R_D_W),
+            has_changed=self._has_changed(shape),
+            is_over_limit=self._is_over_limit(rotation_W) or self._has_changed(shape),
+            guard_ms=1e3 * (time.perf_counter() - started_s),
+        )
+
+    def judge(
+        self,
+        confirmation: Confirmation,
+        hands: RecentHands,
+        link: HeadsetServer,
+        drawn_shift_m: Mapping[Eye, Float64],
+    ) -> Accepted | Refused | None:
+        """Accept or refuse a confirmation; None while the pose of its time is not yet known."""
+        if confirmation.problem:
+            return Refused(
+                "The headset does not show what it should. Confirm again; if this is repeated, "
+                "restart the headset's app.",
+                "drawn otherwise",
+            )
+        try:
+            hand = hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
+            hand = merge_hold(hands.held_at(hand), hand)
+            rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
+            T_W_H = link.pose_at_host_ns(confirmation.t_host_ns)
+            shape = self._guard.shape_change(hand.points_W_m, hand.cloud.is_cut)
+        except PosePendingError:
+            return None
+        except (HandError, PoseError) as error:
+            return Refused(f"{error}. Align and confirm again.", "no hand")
+        if refused := self._refuse(hand, rotation_W, shape):
+            return refused
+        alignment = Alignment(
+            cursor_m=self.cursor.points_W_m,
+            hand_m=hand.points_W_m,
+            cursor_is_cut=self.cursor.cloud.is_cut,
+            hand_is_cut=hand.cloud.is_cut,
+            T_E_W={eye: view_of_eye(self._rig.eyes[eye], T_W_H) for eye in EYES},
+            eyes=self.eyes,
+            rotation_rad=hand.T_W_D[:3, :3].T @ rotation_W,
+            t_a_ns=self.cursor.cloud.t_camera_ns,
+            t_b_ns=hand.cloud.t_camera_ns,
+            drawn_shift_m=dict(drawn_shift_m),
+        )
+        facts = AlignmentFacts(
+            match_age_s=1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns),
+            cursor_moved_m=self.cursor.movement_m,
+            hand_moved_m=hand.movement_m,
+            shape_change_m=shape.rms_m,
+        )
+        return Accepted(alignment, facts)
+
+    def _refuse(self, hand: PlacedHand, rotation_W: Float64, shape: ShapeChange) -> Refused | None:
+        R_D_W = hand.T_W_D[:3, :3].T
+        if self._is_over_limit(rotation_W):
+            angle_deg = float(np.degrees(np.linalg.norm(rotation_W)))
+            limit_deg = np.degrees(self._limits.limit_rad)
+            return Refused(
+                f"Your hand is turned by {angle_deg:.1f}°, more than {limit_deg:g}°. "
+                f"{turn_advice(R_D_W @ rotation_W).text} and confirm again.",
+                "turned",
+                angle_deg,
+                is_by_guard=True,
+            )
+        if self._has_changed(shape):
+            return Refused(
+                "Your hand has changed its shape since the cursor was made: "
+                f"{change_text(shape, R_D_W)}. "
+                "Hold it as it was and confirm again, or make the cursor again.",
+                "shape changed",
+                is_by_guard=True,
+            )
+        return None
+
+    def _has_changed(self, shape: ShapeChange | None) -> bool:
+        return shape is not None and shape.rms_m > self._limits.shape_limit_m
+
+    def _is_over_limit(self, rotation: Float64) -> bool:
+        return float(np.linalg.norm(rotation)) > self._limits.limit_rad
+
+
+def align_prompt(eyes: Sequence[Eye]) -> str:
+    """Return what the wearer is asked to do with a cursor."""
+    if len(eyes) == 1:
+        other = "right" if eyes[0] == "left" else "left"
+        return f"Close your {other} eye. Move your hand under the cursor, then confirm."
+    return "Keep both eyes open. Move your hand under the cursor, then confirm."

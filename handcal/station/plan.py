@@ -1,0 +1,224 @@
+"""The plan of a session: which step is next, and doing it when the hand is still.
+
+The paper's plan is one alignment with both eyes open. The recommended plan raises the hand once:
+its cursors are that hand, placed where an alignment tells most (`handcal.register.placement`), the
+left eye, the right eye and both in turn; then each eye is verified. Both end when every eye has
+its verdict, or when nothing more is to be gained.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from handcal.errors import HandError
+from handcal.register.placement import PlacementSettings, Planned, next_alignment
+from handcal.register.verdict import planned_eyes
+from handcal.station.procedure import Calibration
+from handcal.station.states import Observation, ProcedureError, State
+from handcal.types import EYES, Eye, PlanName
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSettings:
+    """The plan that a session follows."""
+
+    name: PlanName = "paper"
+    usable_eyes: tuple[Eye, ...] = EYES
+    """One eye for a wearer who sees with one."""
+    is_automatic: bool = False
+    """True if each step is done by itself once the hand is still."""
+    verify: bool = True
+    """True if each eye is verified after the alignments."""
+    placement: PlacementSettings = field(default_factory=PlacementSettings)
+
+
+class StepName(StrEnum):
+    """What a plan needs next."""
+
+    RAISE = "raise"
+    """The hand must be raised and held still."""
+    CURSOR = "cursor"
+    ALIGN = "align"
+    """The wearer aligns the hand with the cursor."""
+    SOLVE = "solve"
+    APPLY = "apply"
+    WAIT = "wait"
+    """The headset has not acknowledged its projections yet."""
+    VERIFY = "verify"
+    NUDGE = "nudge"
+    """The wearer moves the drawing."""
+    DONE = "done"
+
+
+_BY_STATE = {
+    State.ALIGN: StepName.ALIGN,
+    State.ALIGNED: StepName.SOLVE,
+    State.SOLVED: StepName.APPLY,
+    State.APPLYING: StepName.WAIT,
+    State.VERIFY: StepName.NUDGE,
+}
+_JUDGED = ("accept", "keep")
+_FAULTY = ("contradicted", "implausible")
+
+
+@dataclass(frozen=True, slots=True)
+class NextStep:
+    """The next step of a plan."""
+
+    name: StepName
+    eyes: tuple[Eye, ...]
+    """The eyes that it is for."""
+    text: str
+    """One line for the technician."""
+    planned: Planned | None = None
+    """The alignment, for `cursor`."""
+
+
+class Plan:
+    """Follows a plan with one calibration.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    settings : PlanSettings
+    checks_first : bool
+        True if the headset draws with a stored φ, which is verified before anything else.
+    """
+
+    def __init__(
+        self, calibration: Calibration, settings: PlanSettings, checks_first: bool = False
+    ) -> None:
+        self.settings = settings
+        self._calibration = calibration
+        self._checks_first = checks_first
+        self._decided: tuple[object, Planned | None] | None = None
+        self._is_over = False
+
+    def next_step(self, is_steady: bool) -> NextStep:
+        """Return the next step; nothing changes. `is_steady`: the hand is in view and still."""
+        calibration = self._calibration
+        if (name := _BY_STATE.get(calibration.state)) is not None:
+            return NextStep(name, calibration.eyes, _TEXTS[name])
+        unverified = self._unverified()
+        if self._checks_first and not calibration.alignments and unverified:
+            return self._with_hand(StepName.VERIFY, unverified[:1], is_steady)
+        if (why := self._reason_to_end(unverified)) is not None:
+            return NextStep(StepName.DONE, (), why)
+        if not (is_steady or calibration.raised) or not calibration.is_applied:
+            done = [one.eyes for one in calibration.alignments.values()]
+            eyes = planned_eyes(self.settings.name, done, self.settings.usable_eyes)
+            name = StepName.WAIT if calibration.raised or is_steady else StepName.RAISE
+            return NextStep(name, eyes, _TEXTS[name])
+        planned = self._planned()
+        if planned is not None:
+            return NextStep(StepName.CURSOR, planned.eyes, planned.reason, planned)
+        if unverified and self.settings.verify:
+            return self._with_hand(StepName.VERIFY, unverified[:1], is_steady)
+        return NextStep(StepName.DONE, (), self._takes())
+
+    def advance(self, observation: Observation) -> NextStep:
+        """Do the next step if it needs nobody; return it. The next frame may have another.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        FileError
+            If the session cannot be written; the step is done anyway.
+        """
+        calibration = self._calibration
+        step = self.next_step(observation.is_steady)
+        try:
+            match step.name:
+                case StepName.CURSOR:
+                    assert step.planned is not None
+                    self._make_cursor(step.planned)
+                case StepName.SOLVE:
+                    calibration.solve()
+                case StepName.APPLY:
+                    calibration.apply(keeps_hand=self.settings.name == "recommended")
+                case StepName.VERIFY:
+                    calibration.verify(step.eyes[0])
+                case StepName.DONE if not self._is_over:
+                    calibration.release_hand()
+        except (ProcedureError, HandError) as error:
+            return NextStep(StepName.WAIT, step.eyes, str(error))
+        self._is_over = step.name is StepName.DONE
+        return step
+
+    def _make_cursor(self, planned: Planned) -> None:
+        is_moved = self.settings.name == "recommended"
+        self._calibration.make_cursor(planned.eyes, planned.displacement_W_m if is_moved else None)
+
+    def _planned(self) -> Planned | None:
+        """Return the next alignment, decided once for each result and hand."""
+        calibration = self._calibration
+        hand = calibration.raised or calibration.steady_hand
+        newest = calibration.newest_hand or hand
+        assert hand is not None
+        assert newest is not None
+        key = (calibration.results, tuple(calibration.alignments), calibration.raised, hand)
+        if self._decided is None or not all(
+            one is other or one == other
+            for one, other in zip(self._decided[0], key, strict=True)  # type: ignore[call-overload]
+        ):
+            self._decided = (
+                key,
+                next_alignment(
+                    hand.points_W_m,
+                    hand.cloud.is_cut,
+                    calibration.T_W_H(newest),
+                    calibration.rig,
+                    calibration.results,
+                    [one.eyes for one in calibration.alignments.values()],
+                    calibration.applied_shift_m,
+                    plan=self.settings.name,
+                    usable_eyes=self.settings.usable_eyes,
+                    settings=self.settings.placement,
+                    solve=calibration.solve_settings,
+                ),
+            )
+        return self._decided[1]
+
+    def _unverified(self) -> tuple[Eye, ...]:
+        done = self._calibration.verifications
+        return tuple(eye for eye in self.settings.usable_eyes if eye not in done)
+
+    def _reason_to_end(self, unverified: tuple[Eye, ...]) -> str | None:
+        """Return why the plan ends now, or None."""
+        results = self._calibration.results
+        if results is None:
+            return None
+        found = {eye: one.name for eye, one in results.verdicts.items()}
+        if faulty := [eye for eye in found if found[eye] in _FAULTY]:
+            return results.verdicts[faulty[0]].reason
+        is_judged = all(found.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
+        if is_judged and not (unverified and self.settings.verify):
+            return "every eye has its verdict"
+        return None
+
+    def _takes(self) -> str:
+        """Return what it would take to be accepted."""
+        results = self._calibration.results
+        reasons = [] if results is None else [one.reason for one in results.verdicts.values()]
+        return "; ".join(dict.fromkeys(reasons)) or "nothing more is planned"
+
+    def _with_hand(self, name: StepName, eyes: tuple[Eye, ...], is_steady: bool) -> NextStep:
+        """Return a step that needs a still hand and acknowledged projections."""
+        if not is_steady:
+            name = StepName.RAISE
+        elif not self._calibration.is_applied:
+            name = StepName.WAIT
+        return NextStep(name, eyes, _TEXTS[name])
+
+
+_TEXTS = {
+    StepName.RAISE: "the wearer raises the hand and holds it still",
+    StepName.ALIGN: "the wearer aligns the hand with the cursor and confirms",
+    StepName.SOLVE: "the alignments are solved",
+    StepName.APPLY: "the projections are sent",
+    StepName.WAIT: "the headset has not acknowledged its projections yet",
+    StepName.VERIFY: "the wearer verifies an eye",
+    StepName.NUDGE: "the wearer moves the outline until it covers the hand, and confirms",
+}

@@ -1,0 +1,107 @@
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.display import eye_projection, view_of_eye
+from handcal.geometry import invert, project, rigid, transform
+from handcal.lab.study.trials import study_hand
+from handcal.register.placement import PlacementSettings, Planned, next_alignment
+from handcal.register.results import Results, SolveSettings, solve_session
+from handcal.register.verdict import planned_eyes
+from handcal.rig.example import example_rig
+from handcal.sim.overlay import overlay_by_eye
+from handcal.sim.raster import visible_points
+from handcal.types import EYES, Alignment, Eye, Float64, PlanName
+
+RIG = example_rig()
+SOLVE = SolveSettings()
+USUAL = PlacementSettings()
+DRAWN = {eye: np.zeros(3) for eye in EYES}
+T_W_H = rigid([0.2, -0.4, 0.1], [0.3, 1.2, -0.5])
+TRUE_M = {"left": np.array([0.003, -0.002, 0.004]), "right": np.array([0.004, -0.002, 0.003])}
+
+
+def _raised(depth_m: float = 0.51) -> tuple[Float64, np.ndarray]:
+    """Return a hand before the displays, in W, and which of its points are cut."""
+    T_H_hand = rigid([0.05, 0.1, -0.03], [0.0, 0.088, depth_m])
+    points_D_m, is_cut = visible_points(
+        study_hand(3), invert(RIG.T_H_D) @ T_H_hand, 800, np.random.default_rng(1), forearm_m=0.04
+    )
+    return transform(T_W_H @ RIG.T_H_D, points_D_m), is_cut
+
+
+def _next(
+    done: Sequence[tuple[Eye, ...]] = (),
+    results: Results | None = None,
+    settings: PlacementSettings = USUAL,
+    plan: PlanName = "recommended",
+    depth_m: float = 0.51,
+    usable_eyes: tuple[Eye, ...] = EYES,
+) -> Planned | None:
+    points_m, is_cut = _raised(depth_m)
+    return next_alignment(
+        points_m, is_cut, T_W_H, RIG, results, done, DRAWN,
+        plan=plan, usable_eyes=usable_eyes, settings=settings, solve=SOLVE,
+    )  # fmt: skip
+
+
+def _solved(alignments: Sequence[Alignment]) -> Results:
+    return solve_session(alignments, RIG, SOLVE, plan="recommended")
+
+
+def test_each_eye_in_turn_then_both_and_what_is_missing_first() -> None:
+    assert planned_eyes("recommended", []) == ("left",)
+    assert planned_eyes("recommended", [("left",)]) == ("right",)
+    assert planned_eyes("recommended", [("left",), ("right",)]) == EYES
+    assert planned_eyes("recommended", [("left",), ("right",), EYES]) == ("left",)
+    assert planned_eyes("recommended", [("left",), EYES]) == ("right",)
+    assert planned_eyes("recommended", [], ("right",)) == ("right",)
+    assert planned_eyes("paper", [EYES]) == EYES
+
+
+@pytest.mark.parametrize("nearest_m", [0.38, 0.45, 0.50])
+@pytest.mark.parametrize("raised_m", [0.47, 0.55])
+def test_the_cursor_is_as_near_as_the_camera_measures(nearest_m: float, raised_m: float) -> None:
+    planned = _next(settings=PlacementSettings(nearest_m=nearest_m), depth_m=raised_m)
+    assert planned is not None
+    points_m, _ = _raised(raised_m)
+    cursor_D_m = transform(invert(T_W_H @ RIG.T_H_D), points_m + planned.displacement_W_m)
+    assert cursor_D_m[:, 2].min() == pytest.approx(nearest_m, abs=2e-3)
+
+
+def test_the_cursor_is_on_the_display() -> None:
+    planned = _next()
+    assert planned is not None
+    display = RIG.eyes["left"]
+    points_m, _ = _raised()
+    drawn = eye_projection(display) @ view_of_eye(display, T_W_H)
+    pixels = project(drawn, points_m + planned.displacement_W_m)
+    inside = (pixels >= 0.0) & (pixels <= [display.width_px, display.height_px])
+    assert inside.all(axis=1).mean() > 0.6
+
+
+def test_the_papers_cursor_is_where_the_hand_is() -> None:
+    planned = _next(plan="paper")
+    assert planned is not None
+    assert planned.eyes == EYES
+    assert not planned.displacement_W_m.any()
+
+
+def test_the_plan_ends_when_nothing_more_is_needed_or_the_most_were_made() -> None:
+    rng = np.random.default_rng(4)
+    eyes: list[tuple[Eye, ...]] = [("left",), ("right",), EYES] * 2
+    alignments = [
+        overlay_by_eye(rng, study_hand(3), RIG, {eye: TRUE_M[eye] for eye in one}, 800)
+        for one in eyes
+    ]
+    few, many = _solved(alignments[:1]), _solved(alignments)
+    assert _next(eyes[:1], few) is not None
+    assert all(one.name == "accept" for one in many.verdicts.values())
+    assert _next(eyes, many) is None
+    # As many are wanted before the eyes are verified, however good the result is.
+    assert _next(eyes, many, PlacementSettings(fewest=7)) is not None
+    refused = {eye: replace(one, name="repeat") for eye, one in many.verdicts.items()}
+    assert _next(eyes, replace(many, verdicts=refused)) is not None
+    assert _next(eyes, replace(many, verdicts=refused), PlacementSettings(most=6)) is None
