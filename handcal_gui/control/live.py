@@ -147,18 +147,38 @@ class CalibrationController(QObject):
             Action.SOLVE: Calibration.solve,
             Action.APPLY: Calibration.apply,
             Action.REDO: Calibration.redo,
+            Action.VERIFIED: Calibration.verified,
+            Action.UNDO_NUDGE: Calibration.undo_nudge,
         }
+        unverified = self._wizard_panel.wizard.unverified(snapshot)
+        if unverified:
+            commands[Action.VERIFY] = lambda calibration: calibration.verify(unverified[0])
+        if snapshot.procedure.state is State.VERIFY:
+            commands[Action.SKIP] = _skip
+        if action is Action.SKIP:
+            self._wizard_panel.wizard.move(action, snapshot)
         if action in commands:
             self._doing = self._calibrate(action.value, commands[action])
         elif action is Action.FINISH:
             self._doing = self._submit(action.value, Station.finish)
         else:
-            self._wizard_panel.wizard.move(action, snapshot)
+            if action is not Action.SKIP:
+                self._wizard_panel.wizard.move(action, snapshot)
             self._wizard_panel.show_snapshot(snapshot)
+
+    def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
+        """Move the drawing of the eye that is verified."""
+        verifying = self._snapshot.procedure.verifying if self._snapshot is not None else None
+        if verifying is not None:
+            eye = verifying.eye
+            self._calibrate(
+                "move the outline", lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)
+            )
 
     def _connect(self) -> None:
         panels = self._window.panels
         self._wizard_panel.asked.connect(self.do)
+        self._wizard_panel.nudged.connect(self._nudge)
         self._wizard_panel.step_changed.connect(
             lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
         )
@@ -312,3 +332,9 @@ def _confirm(calibration: Calibration) -> None:
     """Confirm for the wearer, who may have done so already."""
     if calibration.state is State.ALIGN:
         calibration.confirm()
+
+
+def _skip(calibration: Calibration) -> None:
+    """Skip the verification, which the wearer may have ended already."""
+    if calibration.state is State.VERIFY:
+        calibration.skip_verification()

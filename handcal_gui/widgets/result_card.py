@@ -53,11 +53,13 @@ def eye_results(results: Results) -> list[EyeResult]:
         if eye not in results.eyes:
             continue
         benefit, verdict = results.benefits[eye], results.verdicts[eye]
-        bars = (
-            Bar("Before, expected", benefit.without_arcmin),
-            Bar("After, expected", benefit.after_arcmin),
-            Bar("After, measured", None),
-        )
+        before = Bar("Before, expected", benefit.without_arcmin)
+        if eye in results.measured_arcmin:
+            checked, left = results.measured_arcmin[eye]
+            bars = before, Bar("Check found", checked), Bar("After the check", left)
+        else:
+            after = Bar("After, expected", benefit.after_arcmin)
+            bars = before, after, Bar("After, measured", None)
         another = f"One more alignment: {results.expected_after_another_arcmin[eye]:.1f}′ expected"
         found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another))
     return found
@@ -210,7 +212,8 @@ class _Bars(QWidget):
         x = name_px + room * self._target / self._scale
         painter.setPen(QPen(text, 1.5, Qt.PenStyle.DashLine))
         count = len(self._result.bars)
-        painter.drawLine(round(x), 0, round(x), count * line)
+        known = sum(bar.arcmin is not None for bar in self._result.bars)
+        painter.drawLine(round(x), 0, round(x), known * line)
         painter.setPen(text)
         label = f"target {self._target:g}′"
         width = metrics.horizontalAdvance(label)

@@ -14,6 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
+    QComboBox,
     QDoubleSpinBox,
     QLabel,
     QPlainTextEdit,
@@ -93,8 +94,13 @@ def file(tmp_path: Path) -> PreferencesFile:
 
 
 @pytest.fixture
-def open_program(qtbot: QtBot, file: PreferencesFile) -> Iterator[Callable[[], Technician]]:
+def open_program(
+    qtbot: QtBot, file: PreferencesFile, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[[], Technician]]:
     opened: list[Program] = []
+
+    # The tests' camera is slow on a busy computer.
+    monkeypatch.setattr("handcal_gui.control.conditions._SLOW_HZ", 0.0)
 
     def open_program() -> Technician:
         program = Program(file)
@@ -180,6 +186,9 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     align(live, studio, Action.ANOTHER)
     assert studio.headset.shown.eyes == ("right",)
     solve_and_apply(live)
+    for _ in ("left", "right"):
+        live.wait(lambda: live.can(Action.VERIFY))
+        live.child(QPushButton, "wizardOther0").click()  # skip
     live.wait(lambda: live.can(Action.ANOTHER))  # not accepted, so it does not fit
     live.child(QPushButton, "wizardOther0").click()
     live.press_space_for(Action.FINISH)
@@ -215,6 +224,37 @@ def test_steps_run_by_themselves_after_one_press(live: Technician, studio: Any) 
         live.wait_for_state(State.APPLIED)
     assert [one.eyes for one in live.record.alignments.values()] == [("left",), ("right",)]
     assert live.banner == ""
+
+
+def test_an_eye_is_verified_by_keys_and_the_error_found_is_shown(
+    technician: Technician, studio: Any
+) -> None:
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
+    technician.wait(lambda: technician.snapshot.link.connected)
+    plan = technician.child(QComboBox, "wizardPlan")
+    plan.setCurrentText("Left eye only")
+    align(technician, studio)
+    solve_and_apply(technician)
+    technician.press_space_for(Action.VERIFY)
+    technician.wait_for_state(State.VERIFY)
+    technician.wait(lambda: technician.can(Action.VERIFIED))
+    before_m = technician.snapshot.procedure.applied_shift_m["left"]
+    for _ in range(3):
+        QTest.keyClick(technician.program.window, Qt.Key.Key_Right)
+    technician.wait(lambda: "3.0′ right" in technician.child(QLabel, "wizardFact").text())
+    technician.child(QPushButton, "wizardOther0").click()  # undo
+    technician.wait(lambda: "2.0′ right" in technician.child(QLabel, "wizardFact").text())
+    assert technician.snapshot.procedure.applied_shift_m["left"][0] != before_m[0]
+    technician.press_space_for(Action.VERIFIED)
+    technician.wait(lambda: "left" in technician.snapshot.procedure.verifications)
+    technician.wait_for_state(State.APPLIED)
+    results = technician.snapshot.procedure.results
+    assert results is not None
+    found, _ = results.measured_arcmin["left"]
+    live_text = technician.program.wizard_panel.picture.result
+    technician.wait(lambda: f"Check found: {found:.1f}′" in live_text.text())
+    assert technician.record.facts.verified["left"].nudge_arcmin == (2.0, 0.0)
 
 
 def test_back_and_a_key_hold_the_steps_that_run_by_themselves(

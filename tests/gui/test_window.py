@@ -25,9 +25,11 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.verifying import VerifyingView
 from handcal_gui.keys import keys_by_group, keys_html
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, WizardView
@@ -537,3 +539,34 @@ def test_keys_belong_to_other_pages_and_dialogs_as_usual(
     press(window, Qt.Key.Key_Space)
     press(window, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     assert asked == []
+
+
+def test_keys_move_the_outline_the_way_they_point_and_only_while_it_is_verified(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.show_page("live")
+    window.activateWindow()
+    qtbot.waitActive(window)
+    moved: list[tuple[float, float, float]] = []
+    guide.nudged.connect(lambda *nudge: moved.append(nudge))
+    keys = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
+    guide.show_snapshot(snapshot(State.ALIGN))
+    for key in keys:
+        press(window, key)
+    assert moved == []
+    zero = (0.0, 0.0, 0.0)
+    still = VerifyingView("left", NudgeSum(), zero, zero, can_undo=False, can_redo=False)
+    guide.show_snapshot(snapshot(State.VERIFY, procedure={"verifying": still}))
+    for key in (*keys, Qt.Key.Key_Plus, Qt.Key.Key_Minus):
+        press(window, key)
+    press(window, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+    assert moved == [
+        (-1.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+        (0.0, -1.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 0.002),
+        (0.0, 0.0, -0.002),
+        (0.0, -5.0, 0.0),
+    ]

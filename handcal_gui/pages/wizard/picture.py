@@ -79,9 +79,11 @@ class GuidePicture(QWidget):
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the picture of a snapshot that fits the step."""
-        is_result = self.step in OF_THE_RESULT
-        # Of a cursor, only the eyes that it is for.
-        open_eyes = snapshot.procedure.eyes if self.step is Step.ALIGN else EYES
+        verifying = snapshot.procedure.verifying
+        is_result = self.step in OF_THE_RESULT and verifying is None
+        # Of a cursor or a verification, only the eyes that it is for.
+        is_of_some = self.step is Step.ALIGN or verifying is not None
+        open_eyes = snapshot.procedure.eyes if is_of_some else EYES
         has_views = bool(snapshot.views) or not self._has_camera or is_result
         if self.wants_views and has_views:
             self._show_eyes(snapshot, open_eyes, is_result=is_result)

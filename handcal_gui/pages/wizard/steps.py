@@ -11,6 +11,7 @@ import numpy as np
 from handcal.register.verdict import Advice
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
@@ -59,6 +60,10 @@ class Action(StrEnum):
     REPEAT_RIGHT = "repeat right eye"
     REDO = "redo"
     BACK = "back"
+    VERIFY = "verify the eye"
+    VERIFIED = "confirm the verification"
+    UNDO_NUDGE = "undo the last nudge"
+    SKIP = "skip the verification"
     FINISH = "finish"
     NEXT_WEARER = "next wearer"
     EXPORT = "export"
@@ -99,6 +104,8 @@ class WizardView:
     others: tuple[ButtonSpec, ...] = ()
     note: str = ""
     """The last event or current activity, such as a refusal; empty if none."""
+    fact: str = ""
+    """What has been found so far; empty if nothing."""
     runs_after_s: float | None = None
     """Time for which the main button is enabled before it presses itself; None if it never does."""
     unearned: frozenset[Step] = frozenset()
@@ -132,6 +139,7 @@ class Wizard:
     def __init__(self, plan: EyePlan = "each") -> None:
         self.plan = plan
         self._repeat: tuple[Eye, ...] | None = None
+        self._skipped: set[Eye] = set()
         self._free = Step.CONNECT
 
     def step(self, snapshot: Snapshot) -> Step:
@@ -140,6 +148,11 @@ class Wizard:
             case State.ALIGN:
                 self._free = Step.VERIFY
                 return Step.ALIGN
+            case State.VERIFY:
+                self._free = Step.VERIFY
+                return Step.VERIFY
+            case State.APPLYING if snapshot.procedure.verifications:
+                return Step.VERIFY
             case State.ALIGNED | State.SOLVED | State.APPLYING:
                 self._free = Step.VERIFY
                 return Step.SOLVE
@@ -166,6 +179,8 @@ class Wizard:
                 advice = _advice(snapshot) if self._is_complete(snapshot) else None
                 self._repeat = _REPEATS.get(action, advice.eyes if advice else None)
                 self._free = Step.SHOW_HAND
+            case Action.SKIP:
+                self._skipped |= set(self.unverified(snapshot)[:1])
             case _:
                 raise ValueError(f"{action} is an action of the engine")
 
@@ -178,6 +193,13 @@ class Wizard:
         if self._repeat is not None:
             return self._repeat
         return next_eyes(self.plan, snapshot.procedure.alignments.values())
+
+    def unverified(self, snapshot: Snapshot) -> tuple[Eye, ...]:
+        """Return the solved eyes that are still to be verified, in order."""
+        procedure = snapshot.procedure
+        solved = () if procedure.results is None else procedure.results.eyes
+        done = {*procedure.verifications, *self._skipped}
+        return tuple(eye for eye in EYES if eye in solved and eye not in done)
 
     def _is_complete(self, snapshot: Snapshot) -> bool:
         return is_complete(self.plan, snapshot.procedure.alignments.values())
@@ -221,13 +243,11 @@ class Wizard:
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
-        seen = snapshot.observation
-        is_steady = seen is not None and seen.is_steady
         return WizardView(
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
-            (_hand_check(snapshot), Precondition("Hand held still", is_steady)),
-            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady),
+            (_hand_check(snapshot), _still_check(snapshot)),
+            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", _is_steady(snapshot)),
             (ButtonSpec(Action.BACK, "&Back"),),
             runs_after_s=_STILL_S,
         )
@@ -302,6 +322,12 @@ class Wizard:
 
     def _verify(self, snapshot: Snapshot) -> WizardView:
         checks = _verdict_checks(snapshot)
+        if snapshot.procedure.state is State.APPLYING:
+            wait = "Waiting for the headset to acknowledge its projections."
+            sending = ButtonSpec(Action.APPLY, "Sending…", False)
+            return WizardView(Step.VERIFY, wait, checks, sending)
+        if snapshot.procedure.verifying is not None:
+            return _nudge(snapshot, snapshot.procedure.verifying)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return WizardView(
                 Step.VERIFY,
@@ -324,6 +350,17 @@ class Wizard:
             ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
             ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
         )
+        is_usable = not any(check.verdict in _UNUSABLE for check in checks)
+        if is_usable and (unverified := self.unverified(snapshot)):
+            eye = unverified[0]
+            return WizardView(
+                Step.VERIFY,
+                f"Raise the hand and hold it still, to measure the error of the {eye} eye.",
+                (_hand_check(snapshot), _still_check(snapshot), *checks),
+                ButtonSpec(Action.VERIFY, f"Verify the {eye} eye", _is_steady(snapshot)),
+                (ButtonSpec(Action.SKIP, "&Skip"), *each),
+                runs_after_s=_STILL_S,
+            )
         if advice := _advice(snapshot):
             eyes = _names(advice.eyes)
             few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
@@ -335,13 +372,21 @@ class Wizard:
                 (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
                 runs_after_s=_ADVICE_S if few else None,
             )
-        if any(check.verdict not in (None, "accept", "keep") for check in checks):
+        if not is_usable:
             return WizardView(
                 Step.VERIFY,
                 "Do not use this result. Follow the advice below, then add alignments.",
                 checks,
                 ButtonSpec(Action.ANOTHER, "Add alignment"),
                 (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
+            )
+        if not self._skipped:
+            return WizardView(
+                Step.VERIFY,
+                "The wearer has verified the result. Finish, or add an alignment.",
+                checks,
+                ButtonSpec(Action.NEXT, "Finish"),
+                (ButtonSpec(Action.ANOTHER, "&Add alignment"), *each),
             )
         return WizardView(
             Step.VERIFY,
@@ -358,7 +403,8 @@ class Wizard:
             *_verdict_checks(snapshot),
         )
         others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
-        is_verified = len(checks) > 1 and all(check.holds for check in checks[1:])
+        is_accepted = len(checks) > 1 and all(check.holds for check in checks[1:])
+        is_verified = is_accepted and len(snapshot.procedure.verifications) == len(checks) - 1
         unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
         if snapshot.record.is_finished:
             return WizardView(
@@ -406,6 +452,37 @@ def _advice(snapshot: Snapshot) -> Advice | None:
     repeated = [eye for eye in results.advice if results.verdicts[eye].name == "repeat"]
     worst = max(repeated, key=lambda eye: results.benefits[eye].after_arcmin, default=None)
     return None if worst is None else results.advice[worst]
+
+
+def _nudge(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
+    """Return the view while an eye's outline is moved until it covers the hand."""
+    eye, moved = verifying.eye, verifying.moved
+    other = "right" if eye == "left" else "left"
+    across, along = ("right", "left")[moved.right_arcmin < 0], ("down", "up")[moved.down_arcmin < 0]
+    total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
+    return WizardView(
+        Step.VERIFY,
+        f"Close the {other} eye. Arrow keys move the outline, + and − change its size, until it "
+        "covers the hand.",
+        (_hand_check(snapshot), _still_check(snapshot)),
+        ButtonSpec(Action.VERIFIED, "It covers the hand", _is_steady(snapshot)),
+        (
+            ButtonSpec(Action.UNDO_NUDGE, "&Undo", verifying.can_undo),
+            ButtonSpec(Action.SKIP, "&Skip"),
+        ),
+        snapshot.procedure.refusal,
+        fact=f"{eye.capitalize()} eye moved by {total_arcmin:.1f}′: "
+        f"{abs(moved.right_arcmin):.1f}′ {across}, {abs(moved.down_arcmin):.1f}′ {along}, "
+        f"size {100 * moved.size:+.1f} %",
+    )
+
+
+def _is_steady(snapshot: Snapshot) -> bool:
+    return snapshot.observation is not None and snapshot.observation.is_steady
+
+
+def _still_check(snapshot: Snapshot) -> Precondition:
+    return Precondition("Hand held still", _is_steady(snapshot))
 
 
 def _is_placed(snapshot: Snapshot) -> bool:

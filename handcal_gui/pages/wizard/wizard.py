@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
@@ -40,6 +41,20 @@ _MOST_CHECKS = 3
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
 _SENTENCE_SCALE, _CHECK_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
+_ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
+_NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
+    ("Move the outline left", "Left"): (-_ARCMIN, 0.0, 0.0),
+    ("Move the outline right", "Right"): (_ARCMIN, 0.0, 0.0),
+    ("Move the outline up", "Up"): (0.0, -_ARCMIN, 0.0),
+    ("Move the outline down", "Down"): (0.0, _ARCMIN, 0.0),
+    ("Move the outline far left", "Shift+Left"): (-_FAR_ARCMIN, 0.0, 0.0),
+    ("Move the outline far right", "Shift+Right"): (_FAR_ARCMIN, 0.0, 0.0),
+    ("Move the outline far up", "Shift+Up"): (0.0, -_FAR_ARCMIN, 0.0),
+    ("Move the outline far down", "Shift+Down"): (0.0, _FAR_ARCMIN, 0.0),
+    ("Make the outline larger", "+ ="): (0.0, 0.0, _GROWTH),
+    ("Make the outline smaller", "-"): (0.0, 0.0, -_GROWTH),
+}
+"""Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
 
 
 class WizardPanel(QWidget):
@@ -58,6 +73,9 @@ class WizardPanel(QWidget):
     plan_changed : Signal(str)
     hold_changed : Signal(bool)
         A person has chosen whether every step waits for a person.
+    nudged : Signal(float, float, float)
+        The outline of a verification is to move to the right and down, in arcminutes, and to grow
+        by a share.
     step_changed : Signal(Step)
         Another step is shown.
     """
@@ -66,6 +84,7 @@ class WizardPanel(QWidget):
     step_changed = Signal(object)
     plan_changed = Signal(str)
     hold_changed = Signal(bool)
+    nudged = Signal(float, float, float)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -76,10 +95,13 @@ class WizardPanel(QWidget):
         self._automatic = Automatic()
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
+        self._nudges = self._nudge_actions()
         self._rail = _Rail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True)
         self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
+        self._fact = QLabel(wordWrap=True)
+        self._fact.setObjectName("wizardFact")
         self._note = QLabel(wordWrap=True)
         self._note.setObjectName("wizardNote")
         self.bar = ActionBar()
@@ -118,7 +140,7 @@ class WizardPanel(QWidget):
         """Use the room of a window without panels, or less."""
         for texts, scale in (
             ([self._sentence], _SENTENCE_SCALE[is_alone]),
-            ([*self._checks, self._note], _CHECK_SCALE[is_alone]),
+            ([*self._checks, self._fact, self._note], _CHECK_SCALE[is_alone]),
         ):
             font = self.font()
             font.setPointSizeF(scale * font.pointSizeF())
@@ -140,6 +162,16 @@ class WizardPanel(QWidget):
         hold.setCheckable(True)
         hold.triggered.connect(self._choose_hold)
         return hold
+
+    def _nudge_actions(self) -> list[QAction]:
+        """Return the actions that move the outline of a verification the way that keys point."""
+        actions = []
+        for (name, keys), nudge in _NUDGES.items():
+            action = add_action(self, name, keys, partial(self.nudged.emit, *nudge))
+            action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+            action.setEnabled(False)
+            actions.append(action)
+        return actions
 
     def _choose_hold(self, is_held: bool) -> None:
         self.hold(is_held)
@@ -183,7 +215,9 @@ class WizardPanel(QWidget):
         layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
         self._ring.setToolTip("Alignments made; the ring fills until a step runs by itself")
-        texts = vbox(self._sentence, *self._checks, self._note, 0, spacing=SPACING_PX // 2)
+        texts = vbox(
+            self._sentence, *self._checks, self._fact, self._note, 0, spacing=SPACING_PX // 2
+        )
         ring = vbox(self._ring, 0)
         layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
         layout.addWidget(self.picture, 1)
@@ -196,14 +230,19 @@ class WizardPanel(QWidget):
         self._title.setText(view.step.value)
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
-        has_card = view.step in OF_THE_RESULT
-        self._choice.setVisible(not has_card)
+        has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
+        self._choice.setVisible(view.step not in OF_THE_RESULT)
         self.picture.result.buttons.setVisible(has_card)
         checks = [check for check in view.checks if not (has_card and check.verdict)]
         for i, row in enumerate(self._checks):
             row.show_check(checks[i] if i < len(checks) else None)
         self._note.setText(view.note)
         self._note.setStyleSheet(f"color: {colors().red}")
+        self._fact.setText(view.fact)
+        self._fact.setVisible(bool(view.fact))
+        self._note.setVisible(bool(view.note))
+        for action in self._nudges:
+            action.setEnabled(view.main.action is Action.VERIFIED)
         self.bar.show_view(view)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:

@@ -7,11 +7,13 @@ from typing import Any, get_args
 import pytest
 
 from handcal.errors import FileError
+from handcal.link.nudges import NudgeSum
 from handcal.register.verdict import Advice
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName
+from handcal.station.verifying import VerifyingView
+from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
@@ -23,6 +25,7 @@ from handcal_gui.pages.wizard.steps import (
 )
 
 Maker = Callable[..., Snapshot]
+VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
 
 
 def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
@@ -88,7 +91,7 @@ def test_the_whole_way_of_one_eye_after_the_other(
     two = aligned(record, alignments[0], ("left",), ("right",))
     wizard.view(snapshot(State.ALIGN, record=two))
     applied = judged(snapshot, "accept", "accept", State.APPLIED, record=two)
-    assert wizard.view(applied).main.label == "It fits"
+    assert wizard.view(applied).main.label == "Finish"
     wizard.move(Action.NEXT, applied)
     way.append(wizard.view(applied).main.action)
     finished = snapshot(State.APPLIED, record=replace(two, is_finished=True))
@@ -179,8 +182,8 @@ def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> No
 def judged(
     snapshot: Maker, left: VerdictName, right: VerdictName, state: State, **changes: Any
 ) -> Snapshot:
-    """Return a snapshot with these verdicts."""
-    seen = snapshot(state, **changes)
+    """Return a snapshot with these verdicts, of eyes that were verified."""
+    seen = snapshot(state, procedure={"verifications": dict.fromkeys(EYES, VERIFIED)}, **changes)
     assert seen.procedure.results is not None
     verdicts: dict[Eye, Verdict] = {
         "left": Verdict(left, "as told"),
@@ -313,6 +316,57 @@ def test_only_what_a_person_need_not_decide_runs_by_itself(
     assert wizard.view(replace(accepted, problem="the disk is full")).runs_after_s is None
 
 
+def test_each_solved_eye_is_verified_before_anything_is_said_to_fit(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    labels = []
+    for eyes in ((), ("left",), EYES):
+        verifications = dict.fromkeys(eyes, VERIFIED)
+        procedure = replace(accepted.procedure, verifications=verifications)
+        view = wizard.view(replace(accepted, procedure=procedure))
+        labels.append(view.main.label)
+        assert (view.runs_after_s is not None) == (eyes != EYES)
+    assert labels == ["Verify the left eye", "Verify the right eye", "Finish"]
+    unverified = replace(accepted, procedure=replace(accepted.procedure, verifications={}))
+    for _ in EYES:
+        assert Action.SKIP in actions(wizard.view(unverified))
+        wizard.move(Action.SKIP, unverified)
+    assert wizard.view(unverified).main.label == "It fits"
+    wizard.move(Action.NEXT, unverified)
+    assert wizard.view(unverified).unearned == {Step.VERIFY}
+
+
+def test_a_restless_hand_is_not_verified(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    assert wizard.view(snapshot(State.APPLIED)).main.is_enabled
+    restless = snapshot(State.APPLIED, observation={"is_steady": False})
+    assert not wizard.view(restless).main.is_enabled
+
+
+def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> None:
+    triple = (0.0, 0.0, 0.0)
+    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, 0.006), triple, triple, True, False)
+    seen = snapshot(
+        State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
+    )
+    view = Wizard().view(seen)
+    assert view.step is Step.VERIFY
+    assert view.sentence.startswith("Close the right eye.")
+    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size +0.6 %"
+    assert view.note == "Hold your hand still."
+    assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
+    assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]
+
+
+def test_what_a_verification_leads_to_is_sent_at_the_same_step(snapshot: Maker) -> None:
+    verified = {"verifications": {"left": VERIFIED}}
+    view = Wizard().view(snapshot(State.APPLYING, procedure=verified))
+    assert view.step is Step.VERIFY
+    assert not view.main.is_enabled
+
+
 def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
     wizard = Wizard("both")
     wizard.view(snapshot(State.SOLVED))
@@ -408,7 +462,7 @@ def test_a_plan_of_one_eye_is_complete_with_it(
     wizard.view(snapshot(State.SOLVED))
     one = aligned(record, alignments[0], ("left",))
     applied = judged(snapshot, "accept", "accept", State.APPLIED, record=one)
-    assert wizard.view(applied).main.label == "It fits"
+    assert wizard.view(applied).main.label == "Finish"
 
 
 def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
