@@ -45,7 +45,7 @@ class Automatic:
             self._enabled_s = now_s
         elif now_s - self._enabled_s > _LAPSE_S:
             self._since_s = now_s
-        wait_s = view.runs_after_s * 2**self._tries
+        wait_s = view.runs_after_s * 2.0**self._tries
         share = min((now_s - self._since_s) / wait_s, 1.0)
         return share if view.main.is_enabled else min(share, 0.99)
 

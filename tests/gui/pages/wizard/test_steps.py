@@ -244,7 +244,8 @@ def advised(
     snapshot: Maker, advice: Mapping[Eye, tuple[tuple[Eye, ...], int]], **changes: Any
 ) -> Snapshot:
     """Return a snapshot in which eyes are to repeat, with the eyes and the number of alignments."""
-    left, right = ("repeat" if eye in advice else "accept" for eye in EYES)
+    names: list[VerdictName] = ["repeat" if eye in advice else "accept" for eye in EYES]
+    left, right = names
     seen = judged(snapshot, left, right, State.APPLIED, **changes)
     assert seen.procedure.results is not None
     given = {
@@ -294,7 +295,7 @@ def test_only_what_a_person_need_not_decide_runs_by_itself(
     snapshot: Maker, start: Snapshot, record: SessionRecord, alignments: tuple[Alignment, ...]
 ) -> None:
     wizard = Wizard("each")
-    runs = {}
+    runs: dict[Step | State, float | None] = {}
     for step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR):
         reach(wizard, start, step)
         runs[step] = wizard.view(start).runs_after_s
