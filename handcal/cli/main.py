@@ -58,6 +58,7 @@ _STUDY: Mapping[str, Entry] = {
         "Repeat the paper's simulation, and add disturbances that it left out.", "study"
     ),
     "methods": Entry("Compare calibration methods on the same simulated wearers.", "study"),
+    "procedures": Entry("Compare calibration procedures on the same simulated wearers.", "study"),
     "recorded": Entry(
         "Run SPAAM and INDICA on the public recordings of Itoh and Klinker.", "study"
     ),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.terminal import Option, arg, command, fail, number
@@ -16,6 +16,31 @@ from handcal.errors import CancelledError
 if TYPE_CHECKING:
     from handcal.lab.study.studies import StudyResult
     from handcal.progress import Progress
+
+Result = TypeVar("Result")
+
+
+_STUDY_OPTIONS: dict[str, Option] = {
+    "--workers": arg(
+        "--workers",
+        type=number(int, 1, 1024),
+        metavar="N",
+        help="number of processes (default: one per core)",
+    ),
+    "--scheduler": arg(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask cluster to run on, such as tcp://HOST:PORT (default: this computer)",
+    ),
+    "--seed": arg(
+        "--seed",
+        type=number(int, 0, 2**32 - 1),
+        metavar="N",
+        default=1,
+        help="random seed of the whole study",
+    ),
+    "--quick": arg("--quick", action="store_true", help="few trials: do not report the figures"),
+}
 
 
 def _study_options(name: str) -> tuple[Option, ...]:
@@ -27,25 +52,7 @@ def _study_options(name: str) -> tuple[Option, ...]:
             default=Path(f"results/study-{name}"),
             help="folder for this study only; an unfinished study is resumed",
         ),
-        arg(
-            "--workers",
-            type=number(int, 1, 1024),
-            metavar="N",
-            help="number of processes (default: one per core)",
-        ),
-        arg(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Dask cluster to run on, such as tcp://HOST:PORT (default: this computer)",
-        ),
-        arg(
-            "--seed",
-            type=number(int, 0, 2**32 - 1),
-            metavar="N",
-            default=1,
-            help="random seed of the whole study",
-        ),
-        arg("--quick", action="store_true", help="few trials: do not report the figures"),
+        *_STUDY_OPTIONS.values(),
     )
 
 
@@ -105,12 +112,102 @@ def methods(arguments: argparse.Namespace) -> None:
         size="quick" if arguments.quick else "full",
         noise_wearers=arguments.fit_noise or 0,
     )
-    noise = _run(arguments, partial(run_method_comparison, settings)).noise
-    if noise is not None:
-        console.print(
-            f"Noise {noise.scale:.2f}: the paper's method errs by "
-            f"{noise.mean_arcmin:.1f} ± {noise.sd_arcmin:.1f}′ (± SD)"
+    result = _run(arguments, partial(run_method_comparison, settings))
+    for name, noise in (("method", result.noise), ("best iterate", result.best_noise)):
+        if noise is not None:
+            console.print(
+                f"Noise {noise.scale:.2f}: the paper's {name} errs by "
+                f"{noise.mean_arcmin:.1f} ± {noise.sd_arcmin:.1f}′ (± SD)"
+            )
+
+
+@command(
+    arg(
+        "--wearers",
+        type=number(int, 2, 10_000),
+        metavar="N",
+        default=100,
+        help="simulated wearers for each plan, variant and scale",
+    ),
+    arg(
+        "--plan",
+        nargs="+",
+        metavar="NAME",
+        default=("paper", "recommended"),
+        help="paper, recommended, recommended-unverified, or spaam-N with N alignments of each eye",
+    ),
+    arg(
+        "--variant",
+        nargs="+",
+        metavar="NAME",
+        default=("plain",),
+        help="people: plain, fingers-only, palm-only, by-distance, heavy-tails, drift, "
+        "late-presses",
+    ),
+    arg(
+        "--scale",
+        nargs="+",
+        type=number(float, 0.0, 10.0),
+        metavar="F",
+        default=(1.33,),
+        help="errors of the wearers, as multiples of the simulator's usual wearer",
+    ),
+    arg(
+        "--eye-distance",
+        choices=("none", "ruler", "headset"),
+        default="none",
+        help="source of the wearers' eye distance, ± 1 mm",
+    ),
+    arg(
+        "--prior",
+        choices=("none", "learned"),
+        default="none",
+        help="learned: from simulated earlier sessions",
+    ),
+    *(option for name, option in _STUDY_OPTIONS.items() if name != "--quick"),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for this study only; an unfinished study is resumed (default: none is kept)",
+    ),
+    json=True,
+)
+def procedures(arguments: argparse.Namespace) -> None:
+    """Compare calibration procedures on the same simulated wearers."""
+    from handcal.lab.settings import ProcedureStudySettings
+    from handcal.lab.study.studies import run_procedure_study
+
+    settings = ProcedureStudySettings(
+        wearers=arguments.wearers,
+        seed=arguments.seed,
+        plans=tuple(arguments.plan),
+        variants=tuple(arguments.variant),
+        scales=tuple(arguments.scale),
+        eye_distance=arguments.eye_distance,
+        prior=arguments.prior,
+        processes=arguments.workers or 0,
+        scheduler=arguments.scheduler or "",
+        output=str(arguments.output or ""),
+    )
+    rows = _unless_interrupted(partial(run_procedure_study, settings))
+    save(arguments.json, {"rows": [asdict(row) for row in rows]})
+    shown = table(
+        *("plan", "variant", "errors ×", "before", "after", "95 %", "time"),
+        *("worse", "accepted", "accepted and worse"),
+    )
+    for row in rows:
+        shown.add_row(
+            *(row.plan, row.variant, f"{row.scale:g}"),
+            *(f"{row.before_arcmin:.1f}′", f"{row.after_arcmin:.2f}′"),
+            *(f"{row.after_p95_arcmin:.1f}′", f"{row.seconds:.1f} s"),
+            *map(_percent, (row.worse_share, row.accepted_share, row.accepted_worse_share)),
         )
+    console.print(shown)
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100.0 * share:.1f} %"
 
 
 @command(
@@ -138,14 +235,19 @@ def recorded(arguments: argparse.Namespace) -> None:
 
 def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]) -> StudyResult:
     """Run a study until it is complete or Ctrl+C is pressed; print and save its results."""
-    try:
-        with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
-            result = order(progress)
-    except CancelledError as error:
-        fail(str(error), 130)
+    result = _unless_interrupted(order)
     figures = {figure.name: list(figure.rows) for figure in result.report.figures}
     save(arguments.json, {"figures": figures})
     console.print(result.report.lead)
     for file in result.files:
         console.print(str(file), markup=False)
     return result
+
+
+def _unless_interrupted(order: Callable[[Progress], Result]) -> Result:
+    """Run a study; exit with code 130 after Ctrl+C."""
+    try:
+        with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
+            return order(progress)
+    except CancelledError as error:
+        fail(str(error), 130)

@@ -50,6 +50,29 @@ class MethodComparisonSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class ProcedureStudySettings:
+    """Settings of a study of procedures; `seed` to `scheduler` as in `NoiseStudySettings`."""
+
+    wearers: int = 100
+    """Simulated wearers for each plan, variant and scale; the same ones for all."""
+    seed: int = 1
+    plans: tuple[str, ...] = ("paper", "recommended")
+    """``paper``, ``recommended``, ``recommended-unverified``, or ``spaam-N``."""
+    variants: tuple[str, ...] = ("plain",)
+    """Of people, as in `handcal.sim.people`."""
+    scales: tuple[float, ...] = (1.33,)
+    """Errors of the wearers, in those of the simulator's usual wearer."""
+    eye_distance: Literal["none", "ruler", "headset"] = "none"
+    """Source of the wearer's eye distance."""
+    prior: Literal["none", "learned"] = "none"
+    """``learned``: from simulated earlier sessions."""
+    processes: int = 0
+    scheduler: str = ""
+    output: str = ""
+    """Folder for this study only; an unfinished study in it is resumed. Empty: nothing is kept."""
+
+
+@dataclass(frozen=True, slots=True)
 class CubeTestSettings:
     """Settings of a cube test, on captures in a folder or on rendered ones."""
 

@@ -99,7 +99,9 @@ def widened(mean_m: Float64, covariance_m2: Float64, slip_m: Sequence[float]) ->
     """
     moved_m2 = np.kron(np.ones((2, 2)), np.diag(np.square(slip_m)))
     wide_m2 = covariance_m2 + moved_m2
-    return LearnedPrior(tuple(mean_m.tolist()), tuple((0.5 * (wide_m2 + wide_m2.T)).ravel()), 1)
+    return LearnedPrior(
+        tuple(mean_m.tolist()), tuple((0.5 * (wide_m2 + wide_m2.T)).ravel().tolist()), 1
+    )
 
 
 def posterior(prior: EyePrior, observed: Sequence[Observed]) -> tuple[Float64, Float64]:

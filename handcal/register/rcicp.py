@@ -40,12 +40,17 @@ class Iterated:
     history_m2: Float64
     converged: bool
     stop_reason: str
+    best_shift_m: Float64
+    """φ of the iteration with the smallest mean squared distance of the pairs."""
 
 
 def solve_paper(
     cursor_m: Float64, hand_m: Float64, distance_m: float, checkpoint: Checkpoint = lambda: None
 ) -> Iterated:
     """Solve as in Hu et al. 2021: rows contracted with λ, SVD, stop at 1 > e_k/e_(k-1) > 0.9999.
+
+    With a rotated hand it can swing between two states to the last iteration, and then ends in
+    whichever comes at that number; `Iterated.best_shift_m` does not depend on the number.
 
     Parameters
     ----------
@@ -61,16 +66,19 @@ def solve_paper(
     shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
     moved = hand_m - shift_m
     history: list[float] = []
+    best_m = shift_m
     while True:
         checkpoint()
         partner, error_m2 = _pair(tree, cursor_m, moved)
+        if not history or error_m2 < min(history):
+            best_m = shift_m
         history.append(error_m2)
         if error_m2 < _EXACT_M2:
-            return _ended(shift_m, moved, partner, history, "pairs coincide")
+            return _ended(shift_m, moved, partner, history, "pairs coincide", best_m)
         if len(history) > 1 and 1.0 > history[-1] / history[-2] > PAPER_RATIO:
-            return _ended(shift_m, moved, partner, history, "error ratio above 0.9999")
+            return _ended(shift_m, moved, partner, history, "error ratio above 0.9999", best_m)
         if len(history) == MAX_ITERATIONS:
-            return _ended(shift_m, moved, partner, history, None)
+            return _ended(shift_m, moved, partner, history, None, best_m)
         lam = moved - partner
         pull = 1.0 - phi_4 * hand_m[:, 2]
         A = -np.column_stack(
@@ -194,7 +202,12 @@ def _pair(tree: cKDTree, cursor_m: Float64, moved_m: Float64) -> tuple[Float64, 
 
 
 def _ended(
-    shift_m: Float64, moved: Float64, partner: Float64, history: list[float], reason: str | None
+    shift_m: Float64,
+    moved: Float64,
+    partner: Float64,
+    history: list[float],
+    reason: str | None,
+    best_m: Float64 | None = None,
 ) -> Iterated:
     return Iterated(
         shift_m,
@@ -203,4 +216,5 @@ def _ended(
         np.array(history),
         reason is not None,
         reason or f"limit of {MAX_ITERATIONS} iterations",
+        shift_m if best_m is None else best_m,
     )

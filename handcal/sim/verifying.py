@@ -7,7 +7,9 @@ growth that would make them coincide.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -27,6 +29,11 @@ _ACROSS = 0.5
 _CONTENT_STEPS = 0.75
 # The longest that a wearer waits for the effect of a key.
 _EFFECT_S = 3.0
+# The drawing trembles with the delay of camera and link; a person sees its middle.
+_SAMPLE_S = 0.08
+_FEWEST_SAMPLES = 4
+# After these a person is content.
+_MOST_LOOKS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +75,7 @@ def see_difference(
         None if almost nothing of the outline is on the display.
     """
     points = transform(invert(T_W_hand), outline_W_m[:: max(1, len(outline_W_m) // _POINTS)])
-    _, nearest = KDTree(hand.vertices_m).query(points)
+    _, nearest = _tree(hand).query(points)
     normals = hand.normals[nearest].astype(np.float64)
     away_m = np.einsum("ij,ij->i", points - hand.vertices_m[nearest], normals)
     silhouette = points - away_m[:, None] * normals
@@ -95,6 +102,11 @@ def see_difference(
     return SeenDifference(right, down, float(size))
 
 
+@lru_cache(maxsize=2)
+def _tree(hand: HandModel) -> KDTree:
+    return KDTree(hand.vertices_m)
+
+
 class Check:
     """One verification by the wearer, in time.
 
@@ -114,50 +126,65 @@ class Check:
         self._error = error
         self._look_s = look_s
         self._press_s = press_s
-        self._next_s: float | None = None
-        self._waits_until_s = 0.0
+        self._next_s = 0.0
+        self._sample_s = 0.0
+        self._looks = 0
+        self._samples: list[SeenDifference] = []
         self._drawn = np.empty(0)
         self._presses: list[tuple[float, float, float]] = []
-        self.moved = NudgeSum()
+        self._moved = NudgeSum()
 
-    def is_due(self, t_s: float, drawn: Float64) -> bool:
-        """Return whether the wearer looks or presses now.
+    def step(
+        self, t_s: float, drawn: Float64, see: Callable[[], SeenDifference | None]
+    ) -> tuple[NudgeSum | None, bool]:
+        """Return all presses so far, if a key is pressed now, and whether the drawing fits.
 
-        A look takes its time, and begins once the drawing has followed the keys and stands still.
+        Parameters
+        ----------
+        t_s : float
+        drawn : (3, 4) float64
+            Projection used by the headset now: by it a person sees that the drawing has moved.
+        see : callable
+            Looks at the drawing.
         """
-        if self._next_s is None:
+        if self._presses:
+            if t_s < self._next_s:
+                return None, False
+            self._moved = self._moved.plus(*self._presses.pop())
+            # After the last key the drawing is awaited.
+            self._next_s = t_s + (self._press_s if self._presses else _EFFECT_S)
+            return self._moved, False
+        if not np.array_equal(drawn, self._drawn):
+            self._drawn = drawn
             self._next_s = t_s + self._look_s
-        if self.looks and not np.array_equal(drawn, self._drawn):
-            self._next_s, self._waits_until_s = t_s + self._look_s, 0.0
-        self._drawn = drawn
-        return t_s >= max(self._next_s, self._waits_until_s)
-
-    @property
-    def looks(self) -> bool:
-        """True if the wearer looks next, False if there are keys to press."""
-        return not self._presses
-
-    def press(self, t_s: float) -> NudgeSum:
-        """Press the next key; return all presses so far."""
-        self.moved = self.moved.plus(*self._presses.pop())
-        self._next_s = t_s + (self._press_s if self._presses else self._look_s)
-        self._waits_until_s = 0.0 if self._presses else t_s + _EFFECT_S
-        return self.moved
-
-    def look(self, t_s: float, seen: SeenDifference | None) -> bool:
-        """Look at the outline; return whether it covers the hand, else decide what to press."""
+            self._samples.clear()
+        if t_s >= self._sample_s:
+            self._sample_s = t_s + _SAMPLE_S
+            seen = see()
+            self._samples += [] if seen is None else [seen]
+        if t_s < self._next_s or len(self._samples) < _FEWEST_SAMPLES:
+            return None, False
+        self._decide()
         self._next_s = t_s + self._look_s
-        if seen is None:
-            return False
-        size_step, step = self.request.step_size, self.request.step_arcmin
-        axes = (
-            ((step, 0.0, 0.0), (seen.right_arcmin + self._error.right_arcmin) / step),
-            ((0.0, step, 0.0), (seen.down_arcmin + self._error.down_arcmin) / step),
-            ((0.0, 0.0, size_step), (seen.size + self._error.size) / size_step),
+        self._samples.clear()
+        return (None, False) if self._presses else (self._moved, True)
+
+    def _decide(self) -> None:
+        """Decide which keys to press after a look; none if the drawing fits well enough."""
+        self._looks += 1
+        if self._looks > _MOST_LOOKS:
+            return
+        right_arcmin, down_arcmin, size = np.mean(
+            [[one.right_arcmin, one.down_arcmin, one.size] for one in self._samples], axis=0
         )
-        for one, count in axes:
-            sign = float(np.sign(count))
-            right_arcmin, down_arcmin, size = one
-            press = sign * right_arcmin, sign * down_arcmin, sign * size
-            self._presses += [press] * (round(abs(count)) if abs(count) > _CONTENT_STEPS else 0)
-        return not self._presses
+        step, size_step = self.request.step_arcmin, self.request.step_size
+        counts = (
+            (right_arcmin + self._error.right_arcmin) / step,
+            (down_arcmin + self._error.down_arcmin) / step,
+            (size + self._error.size) / size_step,
+        )
+        for axis, count in enumerate(counts):
+            if abs(count) > _CONTENT_STEPS:
+                press = np.zeros(3)
+                press[axis] = np.sign(count) * (size_step if axis == 2 else step)
+                self._presses += [(press[0], press[1], press[2])] * round(abs(count))

@@ -303,21 +303,16 @@ class Wearer:
         self, check: Check, view: DisplayView, T_W_H: Float64, T_W_hand: Float64
     ) -> tuple[NudgeSum | None, bool]:
         """Return the presses made so far if one is made now, and whether the drawing fits."""
-        eye = check.request.eye
-        if view.outline_W_m is None or not check.is_due(view.t_s, view.P[eye]):
+        eye, outline_W_m = check.request.eye, view.outline_W_m
+        if outline_W_m is None:
             return None, False
-        if not check.looks:
-            return check.press(view.t_s), False
-        seen = see_difference(
-            self._rig.eyes[eye],
-            self.true_shift_m[eye],
-            view.P[eye] @ view.T_V_H[eye],
-            T_W_H,
-            self._hand,
-            T_W_hand,
-            view.outline_W_m,
-        )
-        return check.moved, check.look(view.t_s, seen)
+        drawn = view.P[eye] @ view.T_V_H[eye]
+
+        def see() -> SeenDifference | None:
+            display, shift_m = self._rig.eyes[eye], self.true_shift_m[eye]
+            return see_difference(display, shift_m, drawn, T_W_H, self._hand, T_W_hand, outline_W_m)
+
+        return check.step(view.t_s, drawn, see)
 
     def _stay(self, t_s: float) -> None:
         """Keep the hand where it is."""

@@ -25,7 +25,6 @@ from tests.station.stage import (
     events,
 )
 
-
 STILL = NudgeSum()
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
-from handcal.lab.study.trials import floor_error_m, solve_trial, study_hand
+from handcal.lab.study.trials import floor_error_m, solve_by_paper, solve_trial, study_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
@@ -62,6 +62,8 @@ class NoiseSettings:
     """Rotations of the paper's two figures."""
     kept_deg: tuple[float, ...] = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 20.0)
     """Rotations of a hand of constant size; that of the paper's simulation changes a little."""
+    wrist_deg: tuple[float, ...] = (3.0, 6.0, 9.0, 12.0)
+    """Rotations of a hand that is cut at the wrist."""
     shift_max_m: tuple[float, ...] = (0.005, 0.010, 0.015, 0.020, 0.030)
     """Limits of φ: each component is uniform within ± the value."""
     depth_sigmas_m: tuple[float, ...] = (0.0, 0.0005, 0.001, 0.002, 0.004)
@@ -85,6 +87,7 @@ QUICK_NOISE = NoiseSettings(
     coarse_deg=(0.0, 5.0, 30.0),
     fine_deg=(0.0, 5.0, 9.0),
     kept_deg=(0.0, 9.0),
+    wrist_deg=(9.0,),
     shift_max_m=(0.005, 0.020),
     depth_sigmas_m=(0.0, 0.002),
     forearms_m=(0.02, 0.04),
@@ -134,6 +137,17 @@ SECTIONS: Mapping[str, NoiseSection] = {
             "rotation, size kept",
             lambda settings: settings.kept_deg,
             lambda settings, angle: (AlignmentSettings(settings.points), angle),
+            "rotation, °",
+        ),
+        NoiseSection(
+            "rotation, to the wrist",
+            lambda settings: settings.wrist_deg,
+            lambda settings, angle: (
+                AlignmentSettings(
+                    settings.points, exact=False, cursor_forearm_m=0.0, hand_forearm_m=0.0
+                ),
+                angle,
+            ),
             "rotation, °",
         ),
         NoiseSection(
@@ -193,8 +207,8 @@ def noise_trial(settings: NoiseSettings, case: Case) -> list[StudyRow]:
     Returns
     -------
     list of dict
-        For each method: the case, ``hand``, ``method``, the ``iterations`` that it took, and the
-        error of φ in mm, ``error_1_mm`` to ``error_3_mm``.
+        For each method, and for the best iterate of ``paper``: the case, ``hand``, ``method``, the
+        ``iterations`` that it took, and the error of φ in mm, ``error_1_mm`` to ``error_3_mm``.
     """
     trial, section = int(case["trial"]), SECTIONS[str(case["section"])]
     hand = int(case["value"]) if section.name == HANDS else trial % settings.hands
@@ -230,6 +244,12 @@ def _solve(
     made = simulate_alignment(rng, study_hand(hand), np.radians(angle_deg), scenario, _CAMERA)
     yield FLOOR, 0, floor_error_m(made, exact=scenario.exact)
     for method in methods:
+        if method == "paper":
+            clouds = made.cursor_m, made.hand_m, made.T_E_W, made.display_distance_m
+            iterations, shifts_m = solve_by_paper(*clouds)
+            for name, shift_m in shifts_m.items():
+                yield name, iterations, shift_m - made.shift_m
+            continue
         found = solve_trial(made, method)
         yield method, found.iterations, found.shift_m - made.shift_m
 
@@ -260,5 +280,11 @@ def _solve_wearer(
         ),
     )
     for method in methods:
+        if method == "paper":
+            clouds = alignment.cursor_m, alignment.hand_m, alignment.T_E_W[eye]
+            iterations, shifts_m = solve_by_paper(*clouds, rig.eyes[eye].z_C0_S_m)
+            for name, shift_m in shifts_m.items():
+                yield name, iterations, shift_m - true_m
+            continue
         found = solve_alignment(alignment, rig, method)[eye]
         yield method, found.iterations, found.shift_m - true_m

@@ -37,21 +37,15 @@ from handcal.types import (
     EyeDistance,
     EyeShift,
     Float64,
-    Intrinsics,
     PlanName,
     Verification,
 )
 
 EyeDistanceSource: TypeAlias = Literal["none", "ruler", "headset"]
 
-# A D415's smaller images, which are drawn three times as fast, show enough points.
-_CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
 _OUTLINE_FROM_POINTS = 1500
 _FOREARM_M = 0.04
 _EYE_DISTANCE_SIGMA_M = 0.001
-# As `MethodSettings.pointing_sigma_arcmin`, for errors of 1.33 times the usual.
-_POINTING_ARCMIN, _POINTING_SCALE = 5.9, 1.33
-_TARGET_DEPTHS_M = 0.4, 0.5, 0.6
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings, output_folder
+from handcal.lab.settings import (
+    MethodComparisonSettings,
+    NoiseStudySettings,
+    ProcedureStudySettings,
+    output_folder,
+)
 from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
 from handcal.lab.study.methods_report import methods_report
 from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
 from handcal.lab.study.noise_report import noise_report
+from handcal.lab.study.procedures import ProcedureRow, procedure_cases, procedure_rows
 from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
+from handcal.lab.study.trials import BEST_ITERATE
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
 from handcal.progress import Progress
 from handcal.report.document import Report
@@ -32,6 +40,8 @@ class StudyResult:
     """The report as PDF and as HTML."""
     noise: NoiseFit | None = None
     """Result of the search for the noise; None without a search."""
+    best_noise: NoiseFit | None = None
+    """The same, by the best iterate of the paper's method."""
 
 
 def run_noise_study(settings: NoiseStudySettings, progress: Progress) -> StudyResult:
@@ -50,9 +60,31 @@ def run_method_comparison(settings: MethodComparisonSettings, progress: Progress
     study = method_cases(settings)
     if not settings.noise_wearers:
         return run_and_report(study, methods_report, settings, progress)
-    noise = fit_noise(study.settings, settings.noise_wearers, progress.part(0.0, 0.0))
+    searching = study.settings, settings.noise_wearers, progress.part(0.0, 0.0)
+    noise, best = fit_noise(*searching), fit_noise(*searching, BEST_ITERATE)
     study = methods_study(replace(study.settings, noise_scale=noise.scale))
-    return replace(run_and_report(study, methods_report, settings, progress), noise=noise)
+    result = run_and_report(study, methods_report, settings, progress)
+    return replace(result, noise=noise, best_noise=best)
+
+
+def run_procedure_study(settings: ProcedureStudySettings, progress: Progress) -> list[ProcedureRow]:
+    """Run or resume a study of procedures.
+
+    Raises
+    ------
+    HandcalError
+        If a plan, variant or scale is unknown; otherwise as `run_study`.
+    """
+    study = procedure_cases(settings, progress)
+    with TemporaryDirectory() as scratch:
+        rows = run_study(
+            study,
+            output_folder(settings.output or scratch),
+            workers=settings.processes or None,
+            scheduler=settings.scheduler or None,
+            progress=progress,
+        )
+    return procedure_rows(rows)
 
 
 def noise_cases(settings: NoiseStudySettings) -> Study:
@@ -102,6 +134,8 @@ def run_and_report(
         progress=progress.part(0.0, STUDY_SHARE),
     )
     report = report_of(study.settings, rows)
+    if settings.size == "quick":
+        report = replace(report, lead="A quick look: too few trials for figures to report.")
     writing = progress.part(STUDY_SHARE, 1.0, "Writing the report")
     with resumable():
         files = write_report(folder, report, writing)

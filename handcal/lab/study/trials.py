@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Final
 
+from handcal.geometry import transform
 from handcal.register.model import fit_shift
+from handcal.register.rcicp import solve_paper
 from handcal.register.solve import solve_eye_shift
 from handcal.sim.alignments import SimulatedAlignment
 from handcal.sim.hand import HandModel, make_hand
 from handcal.types import EyeShift, Float64, Method
+
+BEST_ITERATE: Final = "paper, best iterate"
+"""The published iteration, ended at the smallest distance of the pairs instead of the last."""
 
 
 @lru_cache(maxsize=64)
@@ -28,6 +34,14 @@ def solve_trial(made: SimulatedAlignment, method: Method) -> EyeShift:
         cursor_cut=made.cursor_cut,
         hand_cut=made.hand_cut,
     )
+
+
+def solve_by_paper(
+    cursor_m: Float64, hand_m: Float64, T_E_W: Float64, distance_m: float
+) -> tuple[int, dict[str, Float64]]:
+    """Return the paper's number of iterations, and φ as published and of its best iterate."""
+    found = solve_paper(transform(T_E_W, cursor_m), transform(T_E_W, hand_m), distance_m)
+    return len(found.history_m2), {"paper": found.shift_m, BEST_ITERATE: found.best_shift_m}
 
 
 def floor_error_m(made: SimulatedAlignment, *, exact: bool) -> Float64:

@@ -153,8 +153,9 @@ def test_a_cube_covers_its_counterpart() -> None:
 
 
 def test_the_noise_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    def grows(settings: MethodSettings, wearer: int) -> np.ndarray:
-        return np.array([5.0 + 4.0 * settings.noise_scale + wearer])
+    def grows(settings: MethodSettings, wearer: int) -> dict[str, np.ndarray]:
+        published = np.array([5.0 + 4.0 * settings.noise_scale + wearer])
+        return {"paper": published, "paper, best iterate": published - 4.0}
 
     monkeypatch.setattr(wearer_noise, "_errors_arcmin", grows)
     told: list[str] = []
@@ -162,12 +163,16 @@ def test_the_noise_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.scale == pytest.approx((PAPER_MEAN_ARCMIN - 6.0) / 4.0, abs=0.02)
     assert found.mean_arcmin == pytest.approx(PAPER_MEAN_ARCMIN, abs=0.1)
     assert found.sd_arcmin == pytest.approx(1.0)
-    shown = [f"Noise {scale:.2f}: {mean:.1f}′" for scale, mean in found.mean_by_scale.items()]
+    shown = [
+        f"Noise {scale:.2f} by paper: {mean:.1f}′" for scale, mean in found.mean_by_scale.items()
+    ]
     assert sorted(told) == sorted(shown)
+    best = fit_noise(MethodSettings(), 3, method="paper, best iterate")
+    assert best.scale == pytest.approx(found.scale + 1.0, abs=0.04)
 
 
 def test_noise_that_cannot_explain_the_paper_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wearer_noise, "_errors_arcmin", lambda *_: np.array([20.0]))
+    monkeypatch.setattr(wearer_noise, "_errors_arcmin", lambda *_: {"paper": np.array([20.0])})
     with pytest.raises(HandcalError, match=r"no noise gives the paper's 10.79′ \(20.0′ at 0"):
         fit_noise(MethodSettings(), 2)
 

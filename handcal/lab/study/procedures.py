@@ -1,0 +1,270 @@
+"""The study of procedures: what a wearer reaches by a plan, in what time, and what it is told.
+
+Every plan leads the same simulated wearers, with errors of the same distribution. Those of one plan
+do not depend on the other plans.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
+from handcal.errors import HandcalError
+from handcal.geometry import invert, project, transform
+from handcal.lab.methods.spaam import solve_spaam
+from handcal.lab.settings import ProcedureStudySettings
+from handcal.lab.study.procedure_trial import Calibrated, ProcedureModel, lead_through
+from handcal.lab.study.run import Case, Study
+from handcal.lab.study.store import StudyRow
+from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
+from handcal.progress import Progress
+from handcal.register.placement import PlacementSettings
+from handcal.register.prior import LearnedPrior, learn_prior
+from handcal.sim.people import VARIANTS, Variant, begin_sitting
+from handcal.sim.wearer import WearerSettings
+from handcal.types import EYES, Eye, Float64, Intrinsics
+
+EARLIER_SESSIONS = 20
+"""Number of simulated sessions that a learned prior is from."""
+
+# A D415's smaller images, which are drawn three times as fast, show enough points.
+_CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
+_PLAIN = "paper", "recommended", "recommended-unverified"
+# `MethodSettings.pointing_sigma_arcmin` for people whose errors are 1.33 times the usual.
+_POINTING_ARCMIN = 5.9 / 1.33
+# The paper's plan is one alignment.
+_PAPER = PlacementSettings(most=1)
+
+
+@dataclass(frozen=True, slots=True)
+class ProcedureSettings:
+    """Settings of the study's cases."""
+
+    seed: int
+    model: ProcedureModel
+
+
+@dataclass(frozen=True, slots=True)
+class ProcedureRow:
+    """The figures of one plan, for one kind of people; the mean is over both eyes of all.
+
+    What has no meaning is None: SPAAM has no verdict.
+    """
+
+    plan: str
+    variant: str
+    scale: float
+    """Errors of the people, in those of the simulator's usual wearer."""
+    before_arcmin: float
+    after_arcmin: float
+    after_p95_arcmin: float
+    """Error without the calibration, with it, and its 95th percentile."""
+    seconds: float
+    """The wearer's time."""
+    worse_share: float
+    """Share of the eyes that are worse than before."""
+    accepted_share: float | None
+    accepted_worse_share: float | None
+    """Share of all eyes that are accepted, and that are accepted and worse than before."""
+    expected_actual_correlation: float | None
+    """Correlation, over the eyes, of the expected and the actual error."""
+    expected_over_actual: float | None
+    """Ratio of their means."""
+
+
+def procedure_cases(settings: ProcedureStudySettings, progress: Progress = Progress()) -> Study:
+    """Return the study that the settings describe.
+
+    Raises
+    ------
+    HandcalError
+        If a plan or variant is unknown.
+    """
+    for plan in settings.plans:
+        if plan not in _PLAIN and not 6 <= _spaam_count(plan) <= 1000:
+            raise HandcalError(
+                f"unknown plan {plan!r}: choose from {', '.join(_PLAIN)}, spaam-N (6 to 1000)"
+            )
+    for variant in settings.variants:
+        if variant not in VARIANTS:
+            raise HandcalError(f"unknown variant {variant!r}: choose from {', '.join(VARIANTS)}")
+    model = ProcedureModel(eye_distance=settings.eye_distance)
+    if settings.prior == "learned":
+        model = replace(model, prior=_learn(settings.seed, progress))
+    cases: list[Case] = [
+        {"wearer": wearer, "plan": plan, "variant": variant, "scale": scale}
+        for wearer in range(settings.wearers)
+        for plan in settings.plans
+        for variant in settings.variants
+        for scale in settings.scales
+    ]
+    return Study("procedures", ProcedureSettings(settings.seed, model), cases, procedure_trial)
+
+
+def procedure_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
+    """Calibrate one wearer by one plan; a row for each eye."""
+    number, plan, scale = int(case["wearer"]), str(case["plan"]), float(case["scale"])
+    wearer = _wearer(settings, number)
+    rng = np.random.default_rng([settings.seed, number, 1])
+    offline = {eye: _rendered(wearer, eye, np.zeros(3)) for eye in EYES}
+    if plan.startswith("spaam"):
+        count = _spaam_count(plan)
+        found = _by_spaam(rng, wearer, count, scale)
+        usual = WearerSettings()
+        seconds = 2 * count * (usual.reaction_s + usual.movement_s + usual.dwell_s)
+        return [
+            case
+            | _errors(wearer, eye, offline[eye], found.get(eye, offline[eye]))
+            | {"eye": eye, "seconds": seconds, "verdict": None, "expected_arcmin": None}
+            for eye in EYES
+        ]
+    calibrated = _calibrate(rng, settings, wearer, plan, cast("Variant", case["variant"]), scale)
+    return [
+        case
+        | _errors(wearer, eye, offline[eye], _rendered(wearer, eye, calibrated.shift_m[eye]))
+        | {"eye": eye, "seconds": calibrated.seconds}
+        | _told(calibrated, eye)
+        for eye in EYES
+    ]
+
+
+def procedure_rows(rows: Sequence[StudyRow]) -> list[ProcedureRow]:
+    """Return the figures of each plan, variant and scale, in their order."""
+    groups: dict[tuple[str, str, float], list[StudyRow]] = {}
+    for row in rows:
+        key = str(row["plan"]), str(row["variant"]), float(cast("float", row["scale"]))
+        groups.setdefault(key, []).append(row)
+    return [_summarise(*key, group) for key, group in groups.items()]
+
+
+def _summarise(plan: str, variant: str, scale: float, rows: Sequence[StudyRow]) -> ProcedureRow:
+    def column(name: str) -> Float64:
+        return np.array([row[name] for row in rows], dtype=np.float64)
+
+    before, after = column("before_arcmin"), column("after_arcmin")
+    is_worse = after > before
+    accepted = worse_too = correlation = ratio = None
+    if rows[0]["verdict"] is not None:
+        is_accepted = np.array([row["verdict"] == "accept" for row in rows])
+        expected = column("expected_arcmin")
+        accepted, worse_too = float(is_accepted.mean()), float((is_accepted & is_worse).mean())
+        correlation = float(np.corrcoef(expected, after)[0, 1])
+        ratio = float(expected.mean() / after.mean())
+    return ProcedureRow(
+        plan=plan,
+        variant=variant,
+        scale=scale,
+        before_arcmin=float(before.mean()),
+        after_arcmin=float(after.mean()),
+        after_p95_arcmin=float(np.quantile(after, 0.95)),
+        seconds=float(column("seconds").mean()),
+        worse_share=float(is_worse.mean()),
+        accepted_share=accepted,
+        accepted_worse_share=worse_too,
+        expected_actual_correlation=correlation,
+        expected_over_actual=ratio,
+    )
+
+
+def _calibrate(
+    rng: np.random.Generator,
+    settings: ProcedureSettings,
+    wearer: StudyWearer,
+    plan: str,
+    variant: Variant,
+    scale: float,
+) -> Calibrated:
+    sitting = begin_sitting(rng, WearerSettings(), variant, scale)
+    if plan == "paper":
+        return lead_through(
+            rng, wearer, sitting, settings.model, "paper", verify=False, placement=_PAPER
+        )
+    return lead_through(
+        rng,
+        wearer,
+        sitting,
+        settings.model,
+        "recommended",
+        verify=plan == "recommended",
+        placement=PlacementSettings(),
+    )
+
+
+def _told(calibrated: Calibrated, eye: Eye) -> dict[str, Any]:
+    """Return the verdict on an eye, its expected error, and the alignments that it takes."""
+    results = calibrated.results
+    name, gain = results.verdicts[eye].name, results.benefits[eye]
+    advice = results.advice.get(eye)
+    return {
+        "verdict": name,
+        "expected_arcmin": gain.without_arcmin if name == "keep" else gain.after_arcmin,
+        "alignments": len(results.alignments),
+        "more_alignments": None if advice is None else advice.alignments,
+    }
+
+
+def _wearer(settings: ProcedureSettings, number: int) -> StudyWearer:
+    rng = np.random.default_rng([settings.seed, number, 0])
+    wearer = draw_wearer(rng, number % settings.model.hands, WearerSettings())
+    return replace(wearer, rig=replace(wearer.rig, depth_intrinsics=_CAMERA))
+
+
+def _rendered(wearer: StudyWearer, eye: Eye, shift_m: Float64) -> Float64:
+    """Return the projection (3, 4) from H with a φ."""
+    return eye_projection(wearer.rig.eyes[eye], shift_m) @ wearer.T_E_H(eye)
+
+
+def _errors(
+    wearer: StudyWearer, eye: Eye, before: Float64, after: Float64
+) -> dict[str, float | int | str | bool | None]:
+    """Return an eye's errors of two projections from H, as `reprojection_arcmin` has them."""
+    corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
+    corners_m = transform(invert(wearer.T_E_H(eye)), corners_E_m)
+    needed_px = project(wearer.true_projection(eye), corners_m)
+    display = wearer.rig.eyes[eye]
+
+    def error_arcmin(P: Float64) -> float:
+        apart_px = np.linalg.norm(project(P, corners_m) - needed_px, axis=1)
+        return float(arcmin_from_px(display, apart_px).mean())
+
+    return {"before_arcmin": error_arcmin(before), "after_arcmin": error_arcmin(after)}
+
+
+def _by_spaam(
+    rng: np.random.Generator, wearer: StudyWearer, count: int, scale: float
+) -> Mapping[Eye, Float64]:
+    """Return SPAAM's projections from H; an eye whose alignments it refuses is left out."""
+    found: dict[Eye, Float64] = {}
+    for eye in EYES:
+        points_m, pixels = align_points(wearer, rng, count, [eye], scale * _POINTING_ARCMIN, 0.0)
+        try:
+            found[eye] = solve_spaam(points_m, pixels[eye])
+        except ValueError:
+            continue
+    return found
+
+
+def _spaam_count(plan: str) -> int:
+    """Return N of ``spaam-N``; 0 for another plan."""
+    match = re.fullmatch(r"spaam-(\d{1,4})", plan)
+    return int(match[1]) if match else 0
+
+
+def _learn(seed: int, progress: Progress) -> LearnedPrior | None:
+    """Learn the prior from verified sessions of other simulated wearers."""
+    settings = ProcedureSettings(seed, ProcedureModel())
+    sessions = []
+    for number in range(EARLIER_SESSIONS):
+        progress.at(0.0, f"Earlier session {number + 1} of {EARLIER_SESSIONS}")
+        rng = np.random.default_rng([seed, number, 2])
+        earlier = _wearer(replace(settings, seed=seed + 1_000_003), number)
+        found = _calibrate(rng, settings, earlier, "recommended", "plain", 1.33)
+        fused = found.results.fused
+        known = (*fused.observed, *fused.verified.values())
+        sessions.append([one.at(fused.wearer_scale) for one in known])
+    return learn_prior(sessions)
