@@ -51,7 +51,7 @@ def complaints(source: str, kind: str) -> list[str]:
     """Return what is not plain in a text of a kind: ``package``, ``tests`` or ``text``."""
     documented = [] if kind == "text" else list(docstrings(source))
     searched = documented if kind == "tests" else [(1, source)]
-    if kind == "package":
+    if kind != "text":
         searched = [*searched, *names(source)]
     found = [
         (line, f"begins with {match[1]}")

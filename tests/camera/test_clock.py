@@ -48,7 +48,7 @@ def test_drift_is_followed() -> None:
         assert abs(clock.exposure_ns(arrived) - exposed_ns) < 600_000
 
 
-def test_a_camera_that_starts_anew_is_followed_at_once() -> None:
+def test_a_restarted_camera_is_followed_at_once() -> None:
     clock = FrameClock(0.0)
     clock.exposure_ns(frame(50_000_000_000, 51_000_000_000))
     assert clock.exposure_ns(frame(1_000, 52_000_000_000)) == 52_000_000_000

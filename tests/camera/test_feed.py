@@ -132,7 +132,7 @@ def test_a_recording_without_a_frame_is_named_and_not_opened_all_the_time() -> N
     assert len(opened) == 1
 
 
-def test_a_camera_that_can_expose_for_the_hand_is_told_of_it() -> None:
+def test_a_camera_that_can_expose_for_the_hand_receives_its_region() -> None:
     told: list[object] = []
 
     class Exposing(Scripted):

@@ -56,7 +56,7 @@ def test_stills_are_all_used(held_twice: Path) -> None:
     assert check(held_twice, every_other).views == COUNT
 
 
-def test_the_reason_why_frames_were_not_used_is_told(held_twice: Path, tmp_path: Path) -> None:
+def test_the_reason_why_frames_were_not_used_is_given(held_twice: Path, tmp_path: Path) -> None:
     with pytest.raises(ViewsError, match=r"0 views .*; 12 frames were not used: the board is not"):
         check(held_twice, STILLS, board=replace(BOARD, dictionary="DICT_4X4_100"))
 

@@ -140,7 +140,7 @@ class LateCamera(Closable):
         pass
 
 
-def test_a_camera_that_falls_silent_is_told(tmp_path: Path) -> None:
+def test_a_camera_that_falls_silent_is_reported(tmp_path: Path) -> None:
     camera = LateCamera(2)
     with pytest.raises(CameraTimeoutError, match="no frame for 1 s"):
         capture_views((camera,), (tmp_path / "a",), BOARD, TakeSettings())  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from handcal.camera.usb import explain_absence
         ("046d", "0b64", "Webcam", "no RealSense camera is connected; plug"),
     ],
 )
-def test_the_reason_is_told(
+def test_the_reason_is_given(
     tmp_path: Path, vendor: str, product_id: str, product: str, told: str
 ) -> None:
     (tmp_path / "usb1").mkdir()  # without any description
@@ -32,5 +32,5 @@ def test_the_reason_is_told(
     assert told in explain_absence(tmp_path)
 
 
-def test_where_nothing_is_told_of_the_usb_nothing_is_connected(tmp_path: Path) -> None:
+def test_without_usb_information_no_camera_is_listed(tmp_path: Path) -> None:
     assert "no RealSense camera is connected" in explain_absence(tmp_path / "absent")

@@ -66,7 +66,7 @@ def look_at(hand: HandModel, T_D_hand: Float64, index: int) -> Frame:
     return Frame(index, index * 33_000_000, 0, depth, 1e-4, CAMERA)
 
 
-def test_motion_of_the_hand_is_told_across_frames_without_one(hand: HandModel) -> None:
+def test_motion_of_the_hand_is_reported_across_frames_without_one(hand: HandModel) -> None:
     first = look_at(hand, T_0, 1)
     empty = replace(first, index=2, depth=np.zeros_like(first.depth))
     turned = T_0.copy()

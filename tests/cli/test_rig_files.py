@@ -85,7 +85,7 @@ def test_a_display_is_calibrated_from_photographs(
     assert all(one["value"] < 1e-6 for one in differences)
 
 
-def test_the_rendering_camera_is_told_by_a_file(folder: Path, tmp_path: Path) -> None:
+def test_a_file_gives_the_rendering_camera(folder: Path, tmp_path: Path) -> None:
     T_V_H = rigid(translation_m=[0.001, 0.0, 0.0]) @ RIG.eyes["left"].T_V_H
     np.savetxt(tmp_path / "view.txt", T_V_H)
     calibrate(folder, tmp_path / "a.yaml", "--distance-m", 2)
@@ -117,7 +117,7 @@ def test_a_rig_in_doubt_fails_the_check(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize(("version", "missing"), [(1, 6), (2, 3), (3, 6)])
-def test_a_rig_file_is_migrated_and_what_is_missing_is_told(
+def test_migrating_a_rig_file_reports_missing_parts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], version: int, missing: int
 ) -> None:
     old = DATA / f"rig-v{version}.yaml"

@@ -220,7 +220,7 @@ def test_one_look_that_misses_does_not_drop_the_hand() -> None:
     assert all(roi.find(frame(index + more, (NEAR, 0.5))) for more in range(10))
 
 
-def test_a_recording_that_begins_again_is_looked_at_anew() -> None:
+def test_a_repeated_recording_is_searched_again() -> None:
     roi = finder(Eyes())
     for index in range(100, 104):
         roi.find(frame(index, (NEAR, 0.5)))

@@ -157,7 +157,7 @@ def test_arm_that_leaves_through_the_gate_is_cut() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_arm_that_ends_in_view_is_told_from_the_fingers(seed: int) -> None:
+def test_an_arm_that_ends_in_view_is_distinguished_from_fingers(seed: int) -> None:
     shot = shoot(seed, forearm_m=0.12, at_m=(0.0, -0.01, 0.55))
     cloud = segment_hand(shot.frame, SETTINGS)
     assert 0.0 < cut_beyond_wrist_m(shot, cloud) < 0.035

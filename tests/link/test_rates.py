@@ -48,7 +48,7 @@ def test_where_nothing_passed_no_share_was_lost() -> None:
     assert link_rates(START, START, 1.0) == LinkRates(None, None, 0.0, 0.0)
 
 
-def test_a_headset_that_connects_anew_counts_from_zero() -> None:
+def test_a_reconnected_headset_counts_from_zero() -> None:
     anew = replace(START, sent=1100, received=600, lost=0, lost_inbound=0)
     rates = link_rates(START, anew, 1.0)
     assert (rates.lost, rates.lost_inbound) == (0.0, 0.0)

@@ -262,7 +262,7 @@ def test_poses_are_told_at_the_hosts_time(server: HeadsetServer, new_headset: Ne
     assert server.statistics().lost_inbound == 11
 
 
-def test_giving_up_is_told(pairing_key: bytes, caplog: pytest.LogCaptureFixture) -> None:
+def test_giving_up_is_reported(pairing_key: bytes, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
     with HeadsetServer(pairing_key, settings=LinkSettings(give_up_s=0.1)) as server:
         message = server.send_prompt("Raise your hand")
@@ -303,7 +303,7 @@ def test_a_closed_link_refuses_and_leaves_no_thread(pairing_key: bytes) -> None:
             use()
 
 
-def test_a_hello_amid_the_good_bye_is_not_welcomed(
+def test_a_hello_during_the_good_bye_is_not_welcomed(
     server: HeadsetServer, new_headset: NewHeadset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     headset = new_headset()
@@ -328,7 +328,7 @@ def test_a_hello_amid_the_good_bye_is_not_welcomed(
     assert "welcome" not in heard
 
 
-def test_who_waits_is_told_when_the_link_is_closed(server: HeadsetServer) -> None:
+def test_closing_the_link_ends_every_wait(server: HeadsetServer) -> None:
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(server.wait_connected, 60.0)
         time.sleep(0.05)

@@ -142,7 +142,7 @@ def test_the_advice_is_about_the_axis_turned_about_most() -> None:
     )
 
 
-def test_following_a_turning_hand_gives_what_registering_it_anew_does() -> None:
+def test_following_a_turning_hand_equals_registering_each_frame() -> None:
     made = trial_alignment(1, 0.0, SENSED)
     guard = RotationGuard(made.cursor_m, made.cursor_cut)
     middle_m = made.cursor_m.mean(axis=0)

@@ -57,7 +57,7 @@ def test_a_hand_that_keeps_its_shape_has_not_changed(seed: int) -> None:
         ({"curl_more_rad": 0.15}, ".*fingers.* nearer to you"),
     ],
 )
-def test_a_changed_shape_is_told(seed: int, changes: dict[str, float], words: str) -> None:
+def test_a_changed_shape_is_reported(seed: int, changes: dict[str, float], words: str) -> None:
     change = measured(seed, **changes)
     assert change.rms_m > 0.6 * LIMIT_M
     assert re.fullmatch(f"{words} than in the cursor", change_text(change, np.eye(3)))

@@ -41,7 +41,7 @@ def test_corners_of_a_tilted_board_are_found_to_a_tenth_of_a_pixel(board: Board)
     assert np.sqrt(np.mean(np.sum((found.pixels - true) ** 2, axis=1))) < 0.1
 
 
-def test_a_blurred_image_is_told_by_its_edges() -> None:
+def test_a_blurred_image_is_recognised_by_its_edges() -> None:
     sharp = draw_board(CHECKERBOARD, SQUARE_PX)
     blurred = np.asarray(cv2.GaussianBlur(sharp, (0, 0), 2.0), np.uint8)
     assert find_board(blurred, CHECKERBOARD).blur_px > 3 * find_board(sharp, CHECKERBOARD).blur_px

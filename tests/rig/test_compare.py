@@ -33,7 +33,7 @@ def test_a_moved_depth_camera_moves_what_it_tracks() -> None:
     assert found == {}
 
 
-def test_a_turned_depth_camera_is_told_in_degrees() -> None:
+def test_a_turned_depth_camera_is_reported_in_degrees() -> None:
     T_H_D = RIG.T_H_D @ rigid([0.0, np.radians(0.3), 0.0])
     assert differences(replace(RIG, T_H_D=T_H_D))["T_H_D: turned"] == pytest.approx(0.3)
 
@@ -51,7 +51,7 @@ def test_a_display_differs_by_pixels_place_and_distance() -> None:
     assert all(name.startswith("left") for name in found)
 
 
-def test_another_depth_lens_is_told_in_pixels() -> None:
+def test_another_depth_lens_is_reported_in_pixels() -> None:
     longer = replace(RIG.depth_intrinsics, fx=1.01 * RIG.depth_intrinsics.fx)
     found = differences(replace(RIG, depth_intrinsics=longer))
     assert found == {"depth camera: largest move of a pixel": pytest.approx(6.395, rel=1e-3)}
@@ -80,11 +80,11 @@ def test_the_rig_s_own_camera_does_not_differ() -> None:
         ({"width": 848, "height": 480}, "images of 848x480 pixels, not 1280x720"),
     ],
 )
-def test_another_lens_is_told_with_numbers(changes: dict[str, float], words: str) -> None:
+def test_another_lens_is_reported_with_numbers(changes: dict[str, float], words: str) -> None:
     assert compare_camera(KNOWN, D415, replace(LENS, **changes)) == (words,)  # type: ignore[arg-type]
 
 
-def test_another_distortion_is_told_in_pixels() -> None:
+def test_another_distortion_is_reported_in_pixels() -> None:
     (words,) = compare_camera(KNOWN, D415, replace(LENS, distortion=(-0.1, 0.0, 0.0, 0.0)))
     # In the corner: x = 639.5 / 1005, y = 359.5 / 1005, moved by 0.1 r^3.
     corner = np.hypot(639.5, 359.5) / 1005.0
@@ -101,7 +101,7 @@ def test_another_device_is_named_and_so_is_its_lens() -> None:
     )
 
 
-def test_a_real_recording_is_told_from_the_example_rig(shared_data: Path) -> None:
+def test_a_real_recording_differs_from_the_example_rig(shared_data: Path) -> None:
     pytest.importorskip("pyrealsense2")
     with open_recording(shared_data / "recordings" / "0925_012.bag") as camera:
         words = compare_camera(KNOWN, camera.identity, camera.depth_intrinsics)

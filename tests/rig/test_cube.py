@@ -70,7 +70,7 @@ def test_a_pose_is_found_from_exact_corners(turn: tuple[float, ...], markers: tu
     np.testing.assert_allclose(found, pose, atol=1e-5)
 
 
-def test_what_is_not_the_cube_is_told() -> None:
+def test_another_object_than_the_cube_is_reported() -> None:
     with pytest.raises(CubeError, match="too dark"):
         find_cube(np.zeros((360, 640), np.uint8), CUBE)
     with pytest.raises(CubeError, match="which is not on this cube"):

@@ -106,7 +106,7 @@ def test_of_100_cameras_none_raises_a_false_alarm_and_each_bias_of_10_mm_is_foun
     assert np.abs(off_m).max() < 0.0015
 
 
-def test_a_wrong_side_of_the_squares_is_told_from_an_offset() -> None:
+def test_a_wrong_square_size_is_distinguished_from_an_offset() -> None:
     check = check_of(3, square=1.04)
     assert check.scale == pytest.approx(1.0 / 1.04, abs=0.005)
     assert "at every distance: measure the squares" in explain_depth(check)

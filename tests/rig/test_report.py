@@ -26,7 +26,7 @@ def test_exchanged_eyes_are_told() -> None:
     assert doubtful(exchanged) == {"Viewpoints": "left and right are exchanged"}
 
 
-def test_a_depth_camera_that_looks_away_is_told() -> None:
+def test_a_depth_camera_that_looks_away_is_reported() -> None:
     turned = replace(RIG, T_H_D=RIG.T_H_D @ rigid([np.radians(30.0), 0.0, 0.0]))
     assert set(doubtful(turned)) == {
         f"{eye}: seen by the depth camera at 0.4 to 0.6 m" for eye in ("left", "right")
@@ -39,7 +39,7 @@ def test_a_display_too_near_and_a_viewpoint_too_far_are_told() -> None:
     assert {"left: z(C0→S)", "left: C0 from V"} <= set(found)
 
 
-def test_a_part_that_was_not_good_is_told_with_its_reason() -> None:
+def test_a_part_that_was_not_good_is_reported_with_its_reason() -> None:
     origin = Origin("grid", "today", 3, 0.2, "bad", "the camera moved", ("x_m",), np.eye(1))
     found = doubtful(replace(RIG, origins={"left": origin}))
     assert found == {"Calibration of left": "bad: the camera moved (grid, today)"}

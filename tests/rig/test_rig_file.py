@@ -374,7 +374,7 @@ def test_an_implausible_depth_check_is_not_written(
         write_rig(path, dataclasses.replace(example_rig(), depth_check=check))
 
 
-def test_the_bias_of_depth_is_told_with_its_uncertainty() -> None:
+def test_the_bias_of_depth_is_reported_with_its_uncertainty() -> None:
     bias_m, sigma_m = CHECK.bias_m(0.5)
     assert bias_m == pytest.approx(0.002 * 0.5 - 0.001)
     assert sigma_m == pytest.approx(np.sqrt(0.25 * 1e-6 - 2 * 0.5 * 4e-7 + 2e-7))

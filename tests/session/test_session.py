@@ -527,7 +527,7 @@ def test_trials_come_back_can_be_deleted_and_are_limited(session: Session, trial
         session.save_trial(trial)
 
 
-def test_it_is_told_whether_it_is_solved_and_applied(
+def test_a_session_reports_if_it_is_solved_and_applied(
     session: Session, alignment: Alignment
 ) -> None:
     def now() -> tuple[bool, bool]:

@@ -35,7 +35,9 @@ def test_only_those_not_finished_are_listed_the_newest_first(
         pass
 
 
-def test_what_cannot_be_gone_on_with_says_why(tmp_path: Path, alignment: Alignment) -> None:
+def test_a_session_that_cannot_be_resumed_gives_the_reason(
+    tmp_path: Path, alignment: Alignment
+) -> None:
     for name in ("damaged", "foreign", "empty"):
         with make(tmp_path, name) as session:
             session.save_alignment(alignment)

@@ -123,7 +123,7 @@ def test_the_camera(
     assert of("Camera").health is health
 
 
-def test_another_camera_than_the_rig_s_is_told(
+def test_another_camera_than_the_rig_s_is_reported(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     d415, path = Device("D415", "123", "5.16", "3.2"), tmp_path / "rig.yaml"

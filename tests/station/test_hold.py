@@ -55,7 +55,7 @@ def test_what_few_frames_have_seen_is_left_out(hands: list[PlacedHand]) -> None:
     assert len(merge_hold([*hands[:-1], last], last).points_W_m) == SIDE**2
 
 
-def test_movement_is_told(hands: list[PlacedHand]) -> None:
+def test_movement_is_reported(hands: list[PlacedHand]) -> None:
     moved = replace(hands[0], middle_W_m=np.add(hands[0].middle_W_m, [0.003, 0, 0]))
     merged = merge_hold([moved, *hands[1:]], hands[-1])
     assert merged.movement_m == pytest.approx(0.003, abs=5e-4)

@@ -139,7 +139,7 @@ def test_a_recorded_folder_needs_no_sdk(
     assert find("camera", once).found == "Recording hand, played once"
 
 
-def test_another_camera_than_the_rig_s_is_told(
+def test_another_camera_than_the_rig_s_is_reported(
     settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig = replace(example_rig(), depth_camera=D415.identity)

@@ -646,7 +646,7 @@ def test_it_runs_without_a_session(server: HeadsetServer, client: HeadsetClient)
     assert stage.state() is State.APPLIED
 
 
-def test_polling_never_waits_and_comes_to_the_same(stage: Stage, session: Session) -> None:
+def test_polling_never_waits_and_has_the_same_result(stage: Stage, session: Session) -> None:
     calibration = stage.calibration
     stage.align()
     results = calibration.solve()
@@ -941,7 +941,7 @@ def test_a_calibration_goes_on_with_what_is_left_of_a_damaged_session(
     session.close()
 
 
-def test_a_session_that_cannot_be_solved_any_more_is_not_gone_on_with(
+def test_a_session_that_can_no_longer_be_solved_is_not_resumed(
     server: HeadsetServer, session: Session, alignment: Alignment
 ) -> None:
     session.save_alignment(alignment)  # of a few points

@@ -142,7 +142,7 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
     assert Session.open(path).wearer == "Ada"
 
 
-def test_a_headset_that_falls_silent_is_told_and_applying_can_be_repeated(
+def test_a_silent_headset_is_reported_and_applying_can_be_repeated(
     settings: StationSettings, begun: Path, headset_of: Callable[[int], int]
 ) -> None:
     with Station(settings, resume=begun) as station:
@@ -172,7 +172,7 @@ def test_a_headset_that_falls_silent_is_told_and_applying_can_be_repeated(
     assert not Path(f"/proc/{process}").exists()
 
 
-def test_what_a_full_disk_did_not_take_is_told_and_stored_later(
+def test_data_refused_by_a_full_disk_are_reported_and_stored_later(
     settings: StationSettings, begun: Path
 ) -> None:
     with Station(settings, resume=begun) as station:
@@ -260,7 +260,7 @@ def test_a_resumed_session_keeps_the_prior_it_began_with(
     ("fault", "advice"),
     [("other-camera", "choose the rig file"), ("frozen-camera", "unplug the camera")],
 )
-def test_evidence_is_told_before_anything_is_solved(
+def test_evidence_is_reported_before_anything_is_solved(
     settings: StationSettings, fault: Fault, advice: str
 ) -> None:
     with Station(replace(settings, fault=fault)) as station:

@@ -16,7 +16,7 @@ def run(patch: pytest.MonkeyPatch, *words: str | Path) -> int | str | None:
     return ended.value.code
 
 
-def test_missing_data_is_told_in_one_line_before_anything_is_written(
+def test_missing_data_is_reported_in_one_line_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, folder = tmp_path / "nothing", tmp_path / "work"

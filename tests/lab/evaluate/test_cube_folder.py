@@ -40,7 +40,7 @@ def test_what_is_there_in_any_format_is_not_missing(tmp_path: Path) -> None:
     assert not incomplete
 
 
-def test_a_folder_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+def test_an_unreadable_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="cannot read"):
         find_captures(tmp_path / "none")
 

@@ -74,7 +74,7 @@ def test_a_strict_limit_is_reported_however_small(panel: RotationPanel, snapshot
     assert word(panel) == "▲ Turn back"
 
 
-def test_another_shape_is_told_beside_the_turn(panel: RotationPanel, snapshot: Make) -> None:
+def test_a_change_of_shape_is_shown_beside_the_turn(panel: RotationPanel, snapshot: Make) -> None:
     changed = {
         "shape_change_m": 0.004,
         "shape_text": "thumb 9 mm further out than in the cursor",
