@@ -7,7 +7,7 @@ from dataclasses import replace
 from handcal.station.snapshot import Snapshot
 
 _LASTS_S = 0.8
-"""A problem is shown once it has lasted so long."""
+"""Time for which a problem lasts before it is shown."""
 _STARTING_S = 4.0
 """The same before the first frame and pose: camera and headset take time to start."""
 _SLOW_HZ, _FAST_HZ = 8.0, 10.0

@@ -105,7 +105,7 @@ class WizardView:
     note: str = ""
     """The last event or current activity, such as a refusal; empty if none."""
     fact: str = ""
-    """What has been found so far; empty if nothing."""
+    """The findings so far; empty if there are none."""
     runs_after_s: float | None = None
     """Time for which the main button is enabled before it presses itself; None if it never does."""
     unearned: frozenset[Step] = frozenset()
