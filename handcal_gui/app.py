@@ -9,6 +9,7 @@ import argparse
 import os
 import re
 import sys
+import time
 from pathlib import Path
 from typing import NoReturn
 
@@ -18,6 +19,9 @@ from PySide6.QtWidgets import QApplication, QLabel
 from handcal.io.configuration import keep_font_list_in_configuration
 from handcal.io.x_display import x_server_answers
 from handcal_gui import FIRST_SIZE_PX
+
+_EXPOSED_S = 0.3
+"""Longest wait for the first window to be on the screen."""
 
 
 def main() -> NoReturn:
@@ -52,6 +56,13 @@ def first_window(size: QSize | None) -> QLabel:
     screen = QApplication.primaryScreen().availableSize()
     window.resize(size or screen.boundedTo(QSize(*FIRST_SIZE_PX)))
     window.show()
+    # A window manager shows it a little later, and nothing is painted while the rest is imported.
+    deadline_s = time.monotonic() + _EXPOSED_S
+    while time.monotonic() < deadline_s:
+        QApplication.processEvents()
+        if window.windowHandle().isExposed():
+            break
+        time.sleep(0.002)
     QApplication.processEvents()
     return window
 

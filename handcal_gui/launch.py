@@ -23,6 +23,7 @@ from handcal.station.settings import StationSettings
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.widgets.placement import show_on_screen
 
 _LOG_BYTES = 2**20
 
@@ -67,7 +68,9 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     awake.start(200)
     if arguments.size:
         program.window.resize(arguments.size)
-    program.window.show()
+        program.window.show()
+    else:
+        show_on_screen(program.window)
     first.close()
     try:
         demonstration = _begin(program, arguments)

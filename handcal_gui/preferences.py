@@ -18,7 +18,7 @@ from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
 
-Theme: TypeAlias = Literal["system", "light", "dark"]
+Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 _MOST_WEARERS, _MOST_SESSIONS = 20, 8
 
 
@@ -44,6 +44,10 @@ class Preferences:
     fine_tune_step_m: float = 5e-4
     evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
     theme: Theme = "system"
+    arrangement: Literal["panels", "station"] = "panels"
+    """Panels around the guide, or the guide alone."""
+    runs_itself: bool = True
+    """True if steps run by themselves, False if each waits for a person."""
     geometry: str = ""
     live_layout: str = ""
     review_layout: str = ""

@@ -41,6 +41,7 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
+from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
@@ -157,6 +158,7 @@ class Program(QObject):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.remembered.connect(self._remember_export)
         dialog.open()
+        keep_on_screen(dialog)
         return dialog
 
     def inspect(self) -> None:
@@ -179,6 +181,7 @@ class Program(QObject):
         wizard.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         wizard.rig_saved.connect(self._use_rig)
         wizard.open()
+        keep_on_screen(wizard)
         return wizard
 
     def evaluate(self) -> EvaluationWindow:
@@ -196,6 +199,7 @@ class Program(QObject):
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(self._remember_evaluation)
         window.show()
+        keep_on_screen(window)
         return window
 
     def close(self) -> None:
@@ -243,6 +247,12 @@ class Program(QObject):
         self.wizard_panel.plan_changed.connect(
             lambda plan: self._remember(replace(self._preferences, plan=plan))
         )
+        self.wizard_panel.hold_changed.connect(
+            lambda is_held: self._remember(replace(self._preferences, runs_itself=not is_held))
+        )
+        self.window.arrangement_changed.connect(
+            lambda chosen: self._remember(replace(self._preferences, arrangement=chosen))
+        )
         panels = self.window.panels
         panels.session.export_requested.connect(lambda: self.export())
         panels.session.inspect_requested.connect(self.inspect)
@@ -277,6 +287,7 @@ class Program(QObject):
             "review": preferences.review_layout,
         }
         self.window.restore_layouts({page: text for page, text in layouts.items() if text})
+        self.window.use_arrangement(preferences.arrangement)
 
     def _use_theme(self) -> None:
         use_theme(self._preferences.theme)
@@ -284,7 +295,10 @@ class Program(QObject):
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
-        self.live.start(open_station, self._preferences.plan)
+        verdict = self._preferences.station.calibration.solve.verdict
+        self.wizard_panel.picture.result.set_target(verdict.target_arcmin)
+        is_held = not self._preferences.runs_itself
+        self.live.start(open_station, self._preferences.plan, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
 
@@ -322,6 +336,7 @@ class Program(QObject):
 
     def _edit_preferences(self) -> None:
         dialog = PreferencesDialog(self._preferences, self.window)
+        keep_on_screen(dialog)
         if dialog.exec():
             self._remember(dialog.preferences())
             self._use_theme()

@@ -70,6 +70,17 @@ _DARK = Colors(
     muted="#9aa3ae",
     canvas="#17191c",
 )
+_CONTRAST = Colors(
+    live="#66c2ff",
+    cursor="#ffd800",
+    red="#ff8a80",
+    good="#7dff8a",
+    warning="#ffd800",
+    left="#5ff0ff",
+    right="#ffa6ff",
+    muted="#e0e0e0",
+    canvas="#000000",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +123,18 @@ _DARK_SHADES = _Shades(
     link=_DARK.live,
     box_edge="#99a1ab",
 )
+_CONTRAST_SHADES = _Shades(
+    window="#000000",
+    base="#000000",
+    stripe="#101010",
+    button="#1c1c1c",
+    text="#ffffff",
+    faint=_CONTRAST.muted,
+    disabled="#a8a8a8",
+    accent="#0060c0",
+    link=_CONTRAST.live,
+    box_edge="#ffffff",
+)
 _MAIN_BUTTON = "#0b3f8f"
 """Fusion lightens it; white text still has enough contrast."""
 _BOXES = (
@@ -129,18 +152,21 @@ _BOXES = (
 """Widgets whose edges must be visible in the dark theme, too."""
 
 
-def use_theme(theme: Literal["system", "light", "dark"]) -> None:
+def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
     """Use the system's colours or the chosen ones; call again when the system's change."""
     schemes = {
         "system": Qt.ColorScheme.Unknown,
         "light": Qt.ColorScheme.Light,
         "dark": Qt.ColorScheme.Dark,
+        "contrast": Qt.ColorScheme.Dark,
     }
     hints = QGuiApplication.styleHints()
     hints.setColorScheme(schemes[theme])
     # A plain X display has no colour schemes, so the choice itself decides.
     scheme = hints.colorScheme() if theme == "system" else schemes[theme]
     shades = _DARK_SHADES if scheme is Qt.ColorScheme.Dark else _LIGHT_SHADES
+    if theme == "contrast":
+        shades = _CONTRAST_SHADES
     palette = _palette(shades)
     QApplication.setPalette(palette)
     boxes, main = QPalette(palette), QPalette(palette)
@@ -160,6 +186,8 @@ def is_dark() -> bool:
 
 def colors() -> Colors:
     """Return the colours of the current scheme, which `follow_theme` observes."""
+    if QGuiApplication.palette().window().color() == QColor(_CONTRAST_SHADES.window):
+        return _CONTRAST
     return _DARK if is_dark() else _LIGHT
 
 

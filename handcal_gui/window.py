@@ -6,6 +6,7 @@ import base64
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
+from itertools import pairwise
 from typing import Literal, Protocol
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, QTimer, Signal
@@ -23,11 +24,10 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDockWidget,
-    QFrame,
     QMainWindow,
-    QScrollArea,
     QStackedWidget,
     QStatusBar,
+    QTabBar,
     QTabWidget,
     QWidget,
 )
@@ -46,17 +46,18 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 
 Page = Literal["start", "live", "review"]
-_LAYOUT_VERSION = 1
+Arrangement = Literal["panels", "station"]
+_LAYOUT_VERSION = 2
+_CHILDREN_ONLY = Qt.FindChildOption.FindDirectChildrenOnly
 _NARROWEST_PX, _WIDEST_PX = 360, 560
 """Limits of the initial width of a column of docks."""
-_LEFT, _RIGHT, _BOTTOM = (
-    Qt.DockWidgetArea.LeftDockWidgetArea,
-    Qt.DockWidgetArea.RightDockWidgetArea,
-    Qt.DockWidgetArea.BottomDockWidgetArea,
-)
+_SMALL_PX = 1200, 690
+"""Width and height below which all docks of a window are tabs."""
+_LEFT_COLUMN, _RIGHT_COLUMN = ("camera", "cloud", "rotation"), ("results", "fine_tune")
+_LEFT, _RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 
 
 _TITLES = {
@@ -118,9 +119,12 @@ class MainWindow(QMainWindow):
     ----------
     closing : Signal()
         The window is about to close.
+    arrangement_changed : Signal(str)
+        The user has chosen panels around the guide, or the guide alone.
     """
 
     closing = Signal()
+    arrangement_changed = Signal(str)
 
     def __init__(
         self, start: StartPage, wizard: WizardPanel, review: QWidget, panels: Panels
@@ -133,7 +137,7 @@ class MainWindow(QMainWindow):
         self._pages: dict[Page, QWidget] = {"start": start, "live": wizard, "review": review}
         self._stack = QStackedWidget()
         for page in self._pages.values():
-            self._stack.addWidget(_scrollable(page))
+            self._stack.addWidget(scrollable(page))
         middle = QWidget()
         vbox(
             self.banner,
@@ -159,8 +163,11 @@ class MainWindow(QMainWindow):
         self._docks = self._make_docks()
         self._layouts: dict[Page, QByteArray] = {}
         self._page: Page = "start"
-        self._arrange()
-        self._default_layout = self.saveState(_LAYOUT_VERSION)
+        self._arrangement: Arrangement = "panels"
+        self._guide = wizard
+        self._default_layouts = {
+            is_small: self._arranged(is_small=is_small) for is_small in (True, False)
+        }
         self._make_menus()
         self._keep_focus_off_clicked_buttons()
         self.show_page("start")
@@ -176,15 +183,29 @@ class MainWindow(QMainWindow):
         """The page shown."""
         return self._page
 
+    def use_arrangement(self, arrangement: Arrangement) -> None:
+        """Arrange calibrations as panels around the guide, or as the guide alone."""
+        self._keep_layout()
+        self._arrangement = arrangement
+        self._station.setChecked(arrangement == "station")
+        self._guide.fill_window(arrangement == "station")
+        page, self._page = self._page, "start"
+        self.show_page(page)
+
     def show_page(self, page: Page) -> None:
         """Show a page with its docks, in the layout used last."""
         self._keep_layout()
         self._page = page
         self.statusBar().setVisible(page == "live")
         self._stack.setCurrentIndex(list(self._pages).index(page))
-        self.restoreState(self._layouts.get(page, self._default_layout), _LAYOUT_VERSION)
+        is_small = self.width() < _SMALL_PX[0] or self.height() < _SMALL_PX[1]
+        self._guide.picture.set_camera(is_small or self._arrangement == "station")
+        layout = self._layouts.get(page, self._default_layouts[is_small])
+        self.restoreState(layout, _LAYOUT_VERSION)
+        if self.minimumSizeHint().height() > self.screen().availableGeometry().height():
+            self.restoreState(self._default_layouts[is_small], _LAYOUT_VERSION)
         for name, dock in self._docks.items():
-            belongs = name in _DOCKS_OF_PAGE[page]
+            belongs = name in self._docks_of_page
             if not belongs:
                 dock.hide()
             elif page not in self._layouts:
@@ -195,17 +216,22 @@ class MainWindow(QMainWindow):
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()
 
+    @property
+    def _docks_of_page(self) -> frozenset[str]:
+        is_alone = self._page == "live" and self._arrangement == "station"
+        return frozenset() if is_alone else _DOCKS_OF_PAGE[self._page]
+
     def bring_up(self, name: str) -> None:
         """Raise a panel above those tabbed with it, unless one of them has the keyboard focus."""
         dock, focus = self._docks.get(name), QApplication.focusWidget()
-        if dock is not None:
+        if dock is not None and name in self._docks_of_page:
             others = self.tabifiedDockWidgets(dock)
             if not any(focus and other.isAncestorOf(focus) for other in others):
                 dock.raise_()
 
     def go_to(self, name: str) -> None:
         """Raise a panel and give it the keyboard focus, if it belongs to the page."""
-        if name in _DOCKS_OF_PAGE[self._page]:
+        if name in self._docks_of_page:
             dock = self._docks[name]
             dock.show()
             dock.raise_()
@@ -277,7 +303,7 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
     def _keep_layout(self) -> None:
-        if self._page != "start":
+        if self._docks_of_page:
             self._layouts[self._page] = self.saveState(_LAYOUT_VERSION)
 
     def _make_docks(self) -> dict[str, QDockWidget]:
@@ -292,19 +318,26 @@ class MainWindow(QMainWindow):
             docks[name] = dock
         return docks
 
-    def _arrange(self) -> None:
-        docks = self._docks
-        for name, area in (
-            ("camera", _LEFT),
-            ("cloud", _LEFT),
-            ("rotation", _RIGHT),
-            ("results", _RIGHT),
-            ("wearer_view", _BOTTOM),
-        ):
-            self.addDockWidget(area, docks[name])
-        for name in ("fine_tune", "trials", "session", "link"):
-            self.tabifyDockWidget(docks["results"], docks[name])
+    def _arranged(self, *, is_small: bool) -> QByteArray:
+        """Arrange the docks around the page, in a small window as tabs beside it."""
+        docks, across = self._docks, Qt.Orientation.Vertical
+        for dock in docks.values():
+            dock.hide()  # or the window grows while they stand below one another
+        for name in _LEFT_COLUMN:
+            self.addDockWidget(_LEFT, docks[name])
+        for name in _RIGHT_COLUMN:
+            self.addDockWidget(_LEFT if is_small else _RIGHT, docks[name])
+        behind = {"results": ("wearer_view", "trials", "session", "link")}
+        if is_small:
+            behind = {"camera": tuple(name for name in docks if name != "camera")}
+        else:
+            for above, below in (*pairwise(_LEFT_COLUMN), *pairwise(_RIGHT_COLUMN)):
+                self.splitDockWidget(docks[above], docks[below], across)
+        for front, others in behind.items():
+            for name in others:
+                self.tabifyDockWidget(docks[front], docks[name])
         self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+        return self.saveState(_LAYOUT_VERSION)
 
     def _share_room(self) -> None:
         """Divide the window among the docks of a page whose layout the user has not changed."""
@@ -312,18 +345,16 @@ class MainWindow(QMainWindow):
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
         width, height = self.width(), self.height()
         left, right = (
-            min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (28, 32)
+            min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (26, 30)
         )
         if self._page == "review":  # the page itself needs little space
             page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
             left = right = (width - page) // 2
-        wizard = self._pages["live"].sizeHint().height() + 14 * SPACING_PX  # with the banner
-        self.resizeDocks([docks["camera"], docks["rotation"]], [left, right], across)
-        camera = left * 9 // 16 + 15 * SPACING_PX
-        self.resizeDocks([docks["camera"], docks["cloud"]], [camera, height - camera], down)
-        rotation = height * 42 // 100
-        self.resizeDocks([docks["rotation"], docks["results"]], [rotation, height - rotation], down)
-        self.resizeDocks([docks["wearer_view"]], [height - wizard - self._bar.height()], down)
+        self.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
+        column = [docks[name] for name in _LEFT_COLUMN]
+        self.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
+        results = height * 45 // 100
+        self.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
 
     def _draw_title_buttons(self) -> None:
         """Draw the buttons of docks like other icons: Qt's own are dark in the dark theme, too."""
@@ -343,6 +374,8 @@ class MainWindow(QMainWindow):
             elif not shared and title is not None:
                 dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
                 title.deleteLater()
+        for bar in self.findChildren(QTabBar, options=_CHILDREN_ONLY):
+            bar.setElideMode(Qt.TextElideMode.ElideNone)
         self._draw_title_buttons()  # Qt recreates them with the titles
 
     def _make_menus(self) -> None:
@@ -353,9 +386,16 @@ class MainWindow(QMainWindow):
         go_to = view.addMenu("&Go to")
         for number, (name, title) in enumerate(_TITLES.items(), 1):
             go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
+        self._station = view.addAction("&Station: the guide alone", QKeySequence("F11"), self._swap)
+        self._station.setCheckable(True)
         self._dock_actions_start = view.addSeparator()
         for dock in self._docks.values():
             view.addAction(dock.toggleViewAction())
+
+    def _swap(self) -> None:
+        arrangement: Arrangement = "panels" if self._arrangement == "station" else "station"
+        self.use_arrangement(arrangement)
+        self.arrangement_changed.emit(arrangement)
 
     def _keep_focus_off_clicked_buttons(self) -> None:
         """Keep the keyboard focus where it is when a button is clicked."""
@@ -387,11 +427,3 @@ def _press(widget: QWidget | None) -> None:
         widget.click()
     elif isinstance(widget, QComboBox) and not widget.isEditable():
         widget.showPopup()
-
-
-def _scrollable(page: QWidget) -> QScrollArea:
-    area = QScrollArea()
-    area.setWidget(page)
-    area.setWidgetResizable(True)
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    return area

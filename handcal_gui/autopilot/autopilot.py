@@ -13,6 +13,10 @@ from handcal_gui.pages.wizard.steps import Action, WizardView
 from handcal_gui.pages.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7
+_MOST_ADDED = 4
+"""Most times that another alignment is begun, however many are advised."""
+_WEARERS = Action.CONFIRM, Action.VERIFIED
+"""Actions that are left to the wearer, in the headset."""
 _PATIENCE_S = 120.0
 _PATIENCE_STEPS = 600
 """Engine steps to wait for as well, for a busy machine; an idle one makes five a second or more."""
@@ -21,7 +25,7 @@ _PATIENCE_STEPS = 600
 class Autopilot(QObject):
     """Presses the wizard's main button whenever it can be pressed, until the session is finished.
 
-    The alignment itself is confirmed by the wearer, in the headset.
+    Alignments and verifications are confirmed by the wearer, in the headset.
 
     Parameters
     ----------
@@ -53,7 +57,7 @@ class Autopilot(QObject):
         self._look = look
         self._view: WizardView | None = None
         self._since_s = self._moved_s = time.monotonic()
-        self._moved_at = 0
+        self._moved_at = self._added = 0
         self._is_paused = self._is_done = False
         live.polled.connect(self._watch)
 
@@ -79,7 +83,7 @@ class Autopilot(QObject):
         if now_s - self._moved_s > _PATIENCE_S and steps > _PATIENCE_STEPS:
             self._end(lambda: self.stuck.emit(self._complaint(view)))
         elif now_s - self._since_s > _LOOK_S and (
-            view.main.is_enabled or view.main.action is Action.CONFIRM
+            view.main.is_enabled or view.main.action in _WEARERS
         ):
             self._act(view)
 
@@ -90,7 +94,10 @@ class Autopilot(QObject):
             return
         if view.main.action is Action.NEXT_WEARER:
             self._end(self.finished.emit)
-        elif view.main.action is not Action.CONFIRM:
+        elif view.main.action is Action.ANOTHER and self._added == _MOST_ADDED:
+            self._wizard_panel.asked.emit(Action.NEXT)
+        elif view.main.action not in _WEARERS:
+            self._added += view.main.action is Action.ANOTHER
             self._wizard_panel.press_main()
 
     def _end(self, tell: Callable[[], None]) -> None:

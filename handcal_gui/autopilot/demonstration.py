@@ -56,6 +56,7 @@ class Demonstration(QObject):
 
         def calibrate() -> None:
             self._program.start_calibration(station, "Demonstration")
+            self._program.wizard_panel.hold(True)  # for pictures of every step
 
         if self._tour:
             self._tour.begin(self._tour.start_page(), calibrate)

@@ -17,6 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
+from handcal_gui.control.conditions import Conditions
 from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.steps import Action, Step, Wizard
 from handcal_gui.pages.wizard.wizard import WizardPanel
@@ -25,11 +26,14 @@ from handcal_gui.window import MainWindow, Panel
 _POLL_MS = 4
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
+    Step.ALIGN: "rotation",
     Step.SOLVE: "results",
     Step.VERIFY: "results",
     Step.SAVE: "session",
 }
 """The panel to show when a step begins."""
+_SLOW_EVERY = 2
+"""On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
 _RECORD = "record the trial"
 
 
@@ -71,8 +75,11 @@ class CalibrationController(QObject):
         self._is_broken = False
         self._snapshot: Snapshot | None = None
         self._is_watching = False
+        self._conditions = Conditions()
         panels = window.panels
-        self._turns: deque[Panel] = deque((panels.cloud, panels.rotation, panels.wearer_view))
+        self._turns: deque[Panel] = deque(
+            (panels.cloud, panels.rotation, panels.wearer_view, wizard_panel.picture)
+        )
         self._visible: set[object] = set()  # panels
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
@@ -87,12 +94,15 @@ class CalibrationController(QObject):
         """The snapshot shown; None while no calibration is running."""
         return self._snapshot
 
-    def start(self, open_station: Callable[[], Station], plan: EyePlan) -> None:
-        """End the present calibration and open a station."""
+    def start(
+        self, open_station: Callable[[], Station], plan: EyePlan, *, is_held: bool = True
+    ) -> None:
+        """End the present calibration and open a station; if held, no step runs by itself."""
         self.stop()
         self._is_watching = self._is_broken = False
         self._doing = self._shown = 0
-        self._wizard_panel.start(Wizard(plan))
+        self._conditions = Conditions()
+        self._wizard_panel.start(Wizard(plan), is_held=is_held)
         self._engine = EngineThread(open_station, self)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
@@ -137,18 +147,38 @@ class CalibrationController(QObject):
             Action.SOLVE: Calibration.solve,
             Action.APPLY: Calibration.apply,
             Action.REDO: Calibration.redo,
+            Action.VERIFIED: Calibration.verified,
+            Action.UNDO_NUDGE: Calibration.undo_nudge,
         }
+        unverified = self._wizard_panel.wizard.unverified(snapshot)
+        if unverified:
+            commands[Action.VERIFY] = lambda calibration: calibration.verify(unverified[0])
+        if snapshot.procedure.state is State.VERIFY:
+            commands[Action.SKIP] = _skip
+        if action is Action.SKIP:
+            self._wizard_panel.wizard.move(action, snapshot)
         if action in commands:
             self._doing = self._calibrate(action.value, commands[action])
         elif action is Action.FINISH:
             self._doing = self._submit(action.value, Station.finish)
         else:
-            self._wizard_panel.wizard.move(action, snapshot)
+            if action is not Action.SKIP:
+                self._wizard_panel.wizard.move(action, snapshot)
             self._wizard_panel.show_snapshot(snapshot)
+
+    def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
+        """Move the drawing of the eye that is verified."""
+        verifying = self._snapshot.procedure.verifying if self._snapshot is not None else None
+        if verifying is not None:
+            eye = verifying.eye
+            self._calibrate(
+                "move the outline", lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)
+            )
 
     def _connect(self) -> None:
         panels = self._window.panels
         self._wizard_panel.asked.connect(self.do)
+        self._wizard_panel.nudged.connect(self._nudge)
         self._wizard_panel.step_changed.connect(
             lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
         )
@@ -220,6 +250,8 @@ class CalibrationController(QObject):
         if snapshot is None or snapshot is self._snapshot:
             return
         self._shown = shown
+        condition = self._conditions.condition(snapshot)
+        snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
             self._comparison.use(snapshot.record, self._solve_settings)
         self._snapshot = snapshot
@@ -227,19 +259,17 @@ class CalibrationController(QObject):
         # Even while hidden: they may be used before the next snapshot.
         always = panels.fine_tune, panels.trials
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
-        self._turns.rotate()
-        waiting = tuple(self._turns)[1:]
-        for panel in panels.all():
-            if panel in always or (panel in self._visible and panel not in waiting):
-                panel.show_snapshot(snapshot)
         self._wizard_panel.show_snapshot(snapshot)
-        self._window.banner.show_condition(
-            snapshot.problem
-            or snapshot.camera.problem
-            or snapshot.link_problem
-            or snapshot.contradiction
-        )
-        self._watch_views(panels.wearer_view in self._visible)
+        self._turns.rotate()
+        picture = self._wizard_panel.picture
+        turns = [one for one in self._turns if one is picture or one in self._visible]
+        for panel in (*panels.all(), picture):
+            is_due = panel is turns[0] if panel in self._turns else panel in self._visible
+            is_due &= not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
+            if panel in always or is_due:
+                panel.show_snapshot(snapshot)
+        self._window.banner.show_condition(condition)
+        self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
 
     def _catch_up(self, panel: Panel, is_visible: bool) -> None:
@@ -302,3 +332,9 @@ def _confirm(calibration: Calibration) -> None:
     """Confirm for the wearer, who may have done so already."""
     if calibration.state is State.ALIGN:
         calibration.confirm()
+
+
+def _skip(calibration: Calibration) -> None:
+    """Skip the verification, which the wearer may have ended already."""
+    if calibration.state is State.VERIFY:
+        calibration.skip_verification()

@@ -14,7 +14,12 @@ from handcal_gui.widgets.fields import choice, number, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
-_THEMES: dict[Theme, str] = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
+_THEMES: dict[Theme, str] = {
+    "system": "Same as the system",
+    "light": "Light",
+    "dark": "Dark",
+    "contrast": "High contrast",
+}
 
 _TARGET_HELP = "Largest expected error of a calibration that is accepted, in arcminutes."
 _LEARN_HELP = (

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import TypeAlias, TypeVar
 
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFrame,
+    QHBoxLayout,
+    QLayout,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
 Item: TypeAlias = QWidget | QLayout | tuple[QWidget | QLayout, int] | int
 """A widget or layout, with its stretch if not 0; a number is an empty stretch."""
@@ -26,6 +34,17 @@ def vbox(
 ) -> QVBoxLayout:
     """Lay out items from top to bottom, on a widget or as a part of another layout."""
     return _fill(QVBoxLayout(on) if on else QVBoxLayout(), items, margins, spacing)
+
+
+def scrollable(content: QWidget) -> QScrollArea:
+    """Return a frameless area that scrolls its content where there is too little room."""
+    area = QScrollArea()
+    area.setWidget(content)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    for part in (area.viewport(), content):
+        part.setAutoFillBackground(False)  # the ground is that of what it stands on
+    return area
 
 
 def _fill(box: _Box, items: tuple[Item, ...], margins: Margins, spacing: int | None) -> _Box:

@@ -125,7 +125,14 @@ def preferences(tmp_path: Path) -> Path:
     station = {"sessions": str(tmp_path / "sessions"), "seed": 1, "rig": str(rig)}
     export = {"formats": ["report", "csv"]}
     path.write_text(
-        json.dumps({"station": station, "export": export, "export_folder": str(tmp_path / "out")})
+        json.dumps(
+            {
+                "station": station,
+                "export": export,
+                "export_folder": str(tmp_path / "out"),
+                "runs_itself": False,
+            }
+        )
     )
     return path
 
@@ -214,6 +221,40 @@ def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
         time.sleep(0.2)
 
 
+def test_begin_and_finish_are_all_that_is_pressed(
+    display: str, tmp_path: Path, preferences: Path
+) -> None:
+    """From the start page to a result that each eye has verified, in the guide alone."""
+    known = json.loads(preferences.read_text())
+    preferences.write_text(json.dumps(known | {"runs_itself": True, "arrangement": "station"}))
+    sessions = tmp_path / "sessions"
+    with Window(display, "--preferences", preferences) as window:
+        technician = Technician(window, sessions, preferences)
+        window.find()
+        time.sleep(2.0)
+        technician.start("Ada")
+
+        def is_begun() -> bool:
+            """Press once a second until a hand is asked for; more presses would do no more."""
+            if not technician.count("cursor_made"):
+                window.press("space")
+                time.sleep(1.0)
+            return technician.count("cursor_made") > 0
+
+        wait_for("the first cursor", is_begun, window)
+
+        def is_verified() -> bool:
+            session = technician.session()
+            return session is not None and set(session.facts.verified) == set(EYES)
+
+        wait_for("both verifications", is_verified, window)
+        window.shoot("real-8-verified")
+        technician.press_space_until("finished")
+        window.shoot("real-9-station")
+        window.press("ctrl+q")
+        window.end_well()
+
+
 def calibrated_and_exported(window: Window, technician: Technician) -> SessionRecord:
     technician.start("Ada")
     for eye in (1, 2):
@@ -222,6 +263,11 @@ def calibrated_and_exported(window: Window, technician: Technician) -> SessionRe
         technician.wait_until("alignment_saved", eye)  # the wearer confirms in the headset
         technician.press_space_until("applied", eye)
         window.shoot(f"real-3-applied-{eye}")
+    for _ in (1, 2):
+        time.sleep(2.0)
+        window.press("alt+s")  # skip the check
+    time.sleep(2.0)
+    window.press("alt+i")  # keep it as it is, if more alignments are advised
     technician.press_space_until("finished")
     session = technician.session()
     assert session is not None

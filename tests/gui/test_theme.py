@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Iterator
-from typing import ClassVar
+from dataclasses import fields
+from typing import ClassVar, Literal
 
 import pytest
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
@@ -74,3 +75,29 @@ def test_a_widget_follows_the_theme_while_it_lives(qtbot: QtBot) -> None:
     use_theme("light")
     QApplication.processEvents()
     assert not Sign.drawn
+
+
+def contrast(one: QColor, other: QColor) -> float:
+    """Return the contrast of two colours as WCAG 2 defines it, 1 to 21."""
+
+    def luminance(color: QColor) -> float:
+        parts = (color.redF(), color.greenF(), color.blueF())
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.usefixtures("themes")
+@pytest.mark.parametrize(("theme", "least"), [("light", 4.4), ("dark", 4.5), ("contrast", 7.0)])
+def test_every_colour_with_a_meaning_is_readable_as_text(
+    theme: Literal["light", "dark", "contrast"], least: float
+) -> None:
+    use_theme(theme)
+    ground = QGuiApplication.palette().window().color()
+    for field in fields(colors()):
+        if field.name != "canvas":
+            shade = QColor(getattr(colors(), field.name))
+            assert contrast(shade, ground) >= least, field.name
+    assert contrast(QGuiApplication.palette().windowText().color(), ground) >= 7.0

@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from PySide6.QtCore import Qt
@@ -18,24 +19,28 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
+    QScrollArea,
     QTabWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.verifying import VerifyingView
 from handcal_gui.keys import keys_by_group, keys_html
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, WizardView
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow
 from tests.gui.views import all_views
 
-TABBED = ("results", "fine_tune", "trials", "session", "link")
+TABBED = ("wearer_view", "results", "trials", "session", "link")
 
 
 @pytest.fixture
@@ -109,6 +114,79 @@ def test_layouts_are_remembered_for_each_page(
     again.window.close()
 
 
+def test_one_key_leaves_the_guide_alone_and_this_is_remembered(
+    qtbot: QtBot, program: Program, tmp_path: Path
+) -> None:
+    window = program.window
+    window.show_page("live")
+    window.docks["link"].close()
+    window.activateWindow()
+    qtbot.waitActive(window)
+    press(window, Qt.Key.Key_F11)
+    assert shown(window) == set()
+    window.bring_up("results")
+    window.go_to("results")
+    window.show_page("review")
+    assert shown(window) == {"cloud", "results", "trials", "session"}
+    window.show_page("live")
+    assert shown(window) == set()
+    again = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(again.window)
+    again.window.show_page("live")
+    assert shown(again.window) == set()
+    again.window.close()
+    press(window, Qt.Key.Key_F11)
+    assert shown(window) == set(window.docks) - {"link"}
+
+
+def test_the_guide_is_the_largest_thing_in_the_window(window: MainWindow) -> None:
+    for size_px in ((960, 510), (1280, 690), (1366, 738), (1920, 1050), (3840, 2160)):
+        window.show_page("start")
+        window.resize(*size_px)
+        window.show_page("live")
+        window.reset_layout()
+        QApplication.processEvents()
+        assert window.size().toTuple() == size_px
+        guide = window.centralWidget()
+        assert guide is not None
+        for name in shown(window):
+            dock = window.docks[name]
+            if is_in_front(window, name):
+                assert dock.width() * dock.height() < guide.width() * guide.height()
+
+
+@pytest.mark.parametrize("arrangement", ["panels", "station"])
+@pytest.mark.parametrize("size_px", [(960, 510), (1280, 690), (1366, 738)])
+def test_no_step_needs_scrolling(
+    program: Program,
+    snapshot: Maker,
+    size_px: tuple[int, int],
+    arrangement: Literal["panels", "station"],
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.show_page("start")
+    window.resize(*size_px)
+    window.use_arrangement(arrangement)
+    window.show_page("live")
+    window.reset_layout()
+    area = guide.parent().parent()
+    assert isinstance(area, QScrollArea)
+    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
+    for state in states:
+        seen = snapshot(state)
+        guide.show_snapshot(seen)
+        guide.picture.show_snapshot(seen)
+        for _ in range(3):
+            QApplication.processEvents()
+        assert window.size().toTuple() == size_px
+        bars = area.horizontalScrollBar(), area.verticalScrollBar()
+        assert [bar.maximum() for bar in bars] == [0, 0], state
+    card = window.findChild(ResultCard)
+    assert isinstance(card, ResultCard)
+    assert card.visibleRegion().boundingRect() == card.rect()
+    assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()
+
+
 @pytest.mark.parametrize("text", ["", "garbage", "AAAA"])
 def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -> None:
     window.restore_layouts({"live": text})
@@ -170,7 +248,7 @@ def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: M
     window.docks["link"].setFloating(True)
     qtbot.waitUntil(lambda: has_title(window, "link"))
     assert not has_title(window, "trials")
-    for name in ("fine_tune", "trials", "session"):
+    for name in ("wearer_view", "trials", "session"):
         window.docks[name].hide()
     qtbot.waitUntil(lambda: has_title(window, "results"))
 
@@ -201,10 +279,10 @@ def test_a_step_brings_up_its_panel_but_not_over_work(qtbot: QtBot, window: Main
     window.show_page("live")
     window.bring_up("session")
     qtbot.waitUntil(lambda: is_in_front(window, "session"))
-    window.go_to("fine_tune")
-    qtbot.waitUntil(lambda: is_in_front(window, "fine_tune"))
+    window.go_to("trials")
+    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
     window.bring_up("results")
-    assert is_in_front(window, "fine_tune")
+    assert is_in_front(window, "trials")
 
 
 def test_panels_are_reached_by_keys(qtbot: QtBot, window: MainWindow) -> None:
@@ -461,3 +539,34 @@ def test_keys_belong_to_other_pages_and_dialogs_as_usual(
     press(window, Qt.Key.Key_Space)
     press(window, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     assert asked == []
+
+
+def test_keys_move_the_outline_the_way_they_point_and_only_while_it_is_verified(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.show_page("live")
+    window.activateWindow()
+    qtbot.waitActive(window)
+    moved: list[tuple[float, float, float]] = []
+    guide.nudged.connect(lambda *nudge: moved.append(nudge))
+    keys = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
+    guide.show_snapshot(snapshot(State.ALIGN))
+    for key in keys:
+        press(window, key)
+    assert moved == []
+    zero = (0.0, 0.0, 0.0)
+    still = VerifyingView("left", NudgeSum(), zero, zero, can_undo=False, can_redo=False)
+    guide.show_snapshot(snapshot(State.VERIFY, procedure={"verifying": still}))
+    for key in (*keys, Qt.Key.Key_Plus, Qt.Key.Key_Minus):
+        press(window, key)
+    press(window, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+    assert moved == [
+        (-1.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+        (0.0, -1.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 0.002),
+        (0.0, 0.0, -0.002),
+        (0.0, -5.0, 0.0),
+    ]

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.verifying import VerifyingView
 from handcal_gui.pages.wizard.steps import PLANS, Action, Step, Wizard, WizardView
+
+_ZERO = (0.0, 0.0, 0.0)
 
 
 def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[WizardView]:
@@ -27,8 +31,12 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
         wizard.view(snapshot(State.SOLVED))
         views.append(wizard.view(snapshot(State.APPLIED, procedure={"results": None})))
         views.append(wizard.view(snapshot(State.APPLIED, record=one)))
+        nudged = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
+        views.append(wizard.view(snapshot(State.VERIFY, procedure={"verifying": nudged})))
         applied = snapshot(State.APPLIED)
-        views.append(wizard.view(applied))
+        for _ in range(3):  # each eye in turn, then the result
+            views.append(wizard.view(applied))
+            wizard.move(Action.SKIP, applied)
         wizard.move(Action.NEXT, applied)
         for is_finished in (False, True):
             finished = replace(record, is_finished=is_finished)

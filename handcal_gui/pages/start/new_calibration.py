@@ -18,7 +18,7 @@ from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
-from handcal_gui.widgets.layouts import hbox
+from handcal_gui.widgets.layouts import hbox, scrollable
 
 Check = Callable[[StationSettings, str], Mapping[Part, Finding]]
 
@@ -197,6 +197,5 @@ class NewCalibration(Card):
 
     def _lay_out(self) -> None:
         last = hbox((self._problem, 1), self._cancel, self._button, spacing=SPACING_PX)
-        self.body.addWidget(self._form)
-        self.body.addLayout(last)
-        self.body.addStretch(1)
+        self.body.addWidget(scrollable(self._form), 1)
+        self.body.addLayout(last)  # in sight, however long the form

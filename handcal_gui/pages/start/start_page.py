@@ -18,7 +18,7 @@ from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
@@ -164,10 +164,8 @@ class StartPage(QWidget):
         grid.setSpacing(2 * SPACING_PX)
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)
-        grid.addWidget(title, 0, 1)
-        grid.addWidget(
-            QLabel("Calibrate a see-through headset with the wearer's bare hand."), 1, 1, 1, 2
-        )
-        grid.addWidget(self.new, 2, 1)
-        grid.addLayout(right, 2, 2)
-        grid.setRowStretch(2, 1)
+        hint = QLabel("Calibrate a see-through headset with the wearer's bare hand.")
+        grid.addLayout(hbox(title, hint, 0, spacing=2 * SPACING_PX), 0, 1, 1, 2)
+        grid.addWidget(self.new, 1, 1)
+        grid.addLayout(right, 1, 2)
+        grid.setRowStretch(1, 1)

@@ -8,8 +8,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from handcal.register.verdict import Advice
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
@@ -23,6 +25,10 @@ PLANS: dict[EyePlan, str] = {
 _DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
 _LEAST_ALIGN_NS = 1_500_000_000
 _UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
+_SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
+"""Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
+_MOST_BY_ITSELF = 2
+"""Most further alignments of an eye that are begun without asking."""
 _SENDS_UNUSABLE = "Draws with a result that should not be used"
 
 
@@ -54,6 +60,10 @@ class Action(StrEnum):
     REPEAT_RIGHT = "repeat right eye"
     REDO = "redo"
     BACK = "back"
+    VERIFY = "verify the eye"
+    VERIFIED = "confirm the verification"
+    UNDO_NUDGE = "undo the last nudge"
+    SKIP = "skip the verification"
     FINISH = "finish"
     NEXT_WEARER = "next wearer"
     EXPORT = "export"
@@ -94,6 +104,12 @@ class WizardView:
     others: tuple[ButtonSpec, ...] = ()
     note: str = ""
     """The last event or current activity, such as a refusal; empty if none."""
+    fact: str = ""
+    """The findings so far; empty if there are none."""
+    runs_after_s: float | None = None
+    """Time for which the main button is enabled before it presses itself; None if it never does."""
+    unearned: frozenset[Step] = frozenset()
+    """Earlier steps that were left without what they are for."""
 
 
 def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ...]:
@@ -122,7 +138,8 @@ class Wizard:
 
     def __init__(self, plan: EyePlan = "each") -> None:
         self.plan = plan
-        self._repeat: Eye | None = None
+        self._repeat: tuple[Eye, ...] | None = None
+        self._skipped: set[Eye] = set()
         self._free = Step.CONNECT
 
     def step(self, snapshot: Snapshot) -> Step:
@@ -131,6 +148,11 @@ class Wizard:
             case State.ALIGN:
                 self._free = Step.VERIFY
                 return Step.ALIGN
+            case State.VERIFY:
+                self._free = Step.VERIFY
+                return Step.VERIFY
+            case State.APPLYING if snapshot.procedure.verifications:
+                return Step.VERIFY
             case State.ALIGNED | State.SOLVED | State.APPLYING:
                 self._free = Step.VERIFY
                 return Step.SOLVE
@@ -154,8 +176,11 @@ class Wizard:
                 to_verify = is_another and self._free is Step.SHOW_HAND
                 self._free = Step.VERIFY if to_verify else STEPS[place - 1]
             case Action.ANOTHER | Action.REPEAT_LEFT | Action.REPEAT_RIGHT:
-                self._repeat = _REPEATS.get(action)
+                advice = _advice(snapshot) if self._is_complete(snapshot) else None
+                self._repeat = _REPEATS.get(action, advice.eyes if advice else None)
                 self._free = Step.SHOW_HAND
+            case Action.SKIP:
+                self._skipped |= set(self.unverified(snapshot)[:1])
             case _:
                 raise ValueError(f"{action} is an action of the engine")
 
@@ -166,8 +191,18 @@ class Wizard:
     def eyes(self, snapshot: Snapshot) -> tuple[Eye, ...]:
         """Return the eyes that the next alignment is for."""
         if self._repeat is not None:
-            return (self._repeat,)
+            return self._repeat
         return next_eyes(self.plan, snapshot.procedure.alignments.values())
+
+    def unverified(self, snapshot: Snapshot) -> tuple[Eye, ...]:
+        """Return the solved eyes that are still to be verified, in order."""
+        procedure = snapshot.procedure
+        solved = () if procedure.results is None else procedure.results.eyes
+        done = {*procedure.verifications, *self._skipped}
+        return tuple(eye for eye in EYES if eye in solved and eye not in done)
+
+    def _is_complete(self, snapshot: Snapshot) -> bool:
+        return is_complete(self.plan, snapshot.procedure.alignments.values())
 
     def _connect(self, snapshot: Snapshot) -> WizardView:
         camera, link = snapshot.camera, snapshot.link
@@ -191,7 +226,7 @@ class Wizard:
             Step.CONNECT,
             "Put the headset on the wearer and wait until camera and headset are connected.",
             checks,
-            ButtonSpec(Action.NEXT, "Next", is_ready),
+            ButtonSpec(Action.NEXT, "Begin", is_ready),
         )
 
     def _show_hand(self, snapshot: Snapshot) -> WizardView:
@@ -202,19 +237,19 @@ class Wizard:
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
             (_hand_check(snapshot),),
-            ButtonSpec(Action.NEXT, "Next", _hand_check(snapshot).holds),
+            ButtonSpec(Action.NEXT, "Next", _is_placed(snapshot)),
             (back,),
+            runs_after_s=_SHOWN_S,
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
-        seen = snapshot.observation
-        is_steady = seen is not None and seen.is_steady
         return WizardView(
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
-            (_hand_check(snapshot), Precondition("Hand held still", is_steady)),
-            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady),
+            (_hand_check(snapshot), _still_check(snapshot)),
+            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", _is_steady(snapshot)),
             (ButtonSpec(Action.BACK, "&Back"),),
+            runs_after_s=_STILL_S,
         )
 
     def _align(self, snapshot: Snapshot) -> WizardView:
@@ -232,7 +267,7 @@ class Wizard:
             Step.ALIGN,
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
             (hand, Precondition(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
-            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", hand.holds and is_due),
+            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", _is_placed(snapshot) and is_due),
             (ButtonSpec(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
             procedure.refusal,
         )
@@ -253,6 +288,7 @@ class Wizard:
                 (aligned,),
                 ButtonSpec(Action.SOLVE, "Solve"),
                 (redo,),
+                runs_after_s=_SHOWN_S,
             )
         verdicts = _verdict_checks(snapshot)
         if procedure.state is State.APPLYING:
@@ -275,11 +311,23 @@ class Wizard:
         elif kept:
             instruction = f"Send the projections to the headset, those of {_names(kept)} offline."
         return WizardView(
-            Step.SOLVE, instruction, (aligned, *verdicts), send, others, snapshot.problem
+            Step.SOLVE,
+            instruction,
+            (aligned, *verdicts),
+            send,
+            others,
+            snapshot.problem,
+            runs_after_s=_READ_S,
         )
 
     def _verify(self, snapshot: Snapshot) -> WizardView:
         checks = _verdict_checks(snapshot)
+        if snapshot.procedure.state is State.APPLYING:
+            wait = "Waiting for the headset to acknowledge its projections."
+            sending = ButtonSpec(Action.APPLY, "Sending…", False)
+            return WizardView(Step.VERIFY, wait, checks, sending)
+        if snapshot.procedure.verifying is not None:
+            return _nudge(snapshot, snapshot.procedure.verifying)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return WizardView(
                 Step.VERIFY,
@@ -288,7 +336,7 @@ class Wizard:
                 ButtonSpec(Action.SOLVE, "Solve"),
                 (ButtonSpec(Action.ANOTHER, "&Add alignment"),),
             )
-        if not is_complete(self.plan, snapshot.procedure.alignments.values()):
+        if not self._is_complete(snapshot):
             eyes = _names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
@@ -296,46 +344,86 @@ class Wizard:
                 checks,
                 ButtonSpec(Action.ANOTHER, f"Align {eyes}"),
                 (ButtonSpec(Action.NEXT, "Finish with &one eye"),),
+                runs_after_s=_READ_S,
             )
-        instruction = (
-            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
-            "add an alignment or fine-tune φ."
+        each = (
+            ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
+            ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
         )
-        if any(check.verdict == "repeat" for check in checks):
-            instruction = (
-                "The wearer looks at the raised hand. Not accepted yet: add the alignments "
-                "advised below, unless the outline fits."
+        is_usable = not any(check.verdict in _UNUSABLE for check in checks)
+        if is_usable and (unverified := self.unverified(snapshot)):
+            eye = unverified[0]
+            return WizardView(
+                Step.VERIFY,
+                f"Raise the hand and hold it still, to measure the error of the {eye} eye.",
+                (_hand_check(snapshot), _still_check(snapshot), *checks),
+                ButtonSpec(Action.VERIFY, f"Verify the {eye} eye", _is_steady(snapshot)),
+                (ButtonSpec(Action.SKIP, "&Skip"), *each),
+                runs_after_s=_STILL_S,
+            )
+        if advice := _advice(snapshot):
+            eyes = _names(advice.eyes)
+            few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
+            return WizardView(
+                Step.VERIFY,
+                f"Not accepted yet: align {eyes} again, or keep the result as it is.",
+                checks,
+                ButtonSpec(Action.ANOTHER, f"Add {eyes}"),
+                (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
+                runs_after_s=_ADVICE_S if few else None,
+            )
+        if not is_usable:
+            return WizardView(
+                Step.VERIFY,
+                "Do not use this result. Follow the advice below, then add alignments.",
+                checks,
+                ButtonSpec(Action.ANOTHER, "Add alignment"),
+                (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
+            )
+        if not self._skipped:
+            return WizardView(
+                Step.VERIFY,
+                "The wearer has verified the result. Finish, or add an alignment.",
+                checks,
+                ButtonSpec(Action.NEXT, "Finish"),
+                (ButtonSpec(Action.ANOTHER, "&Add alignment"), *each),
             )
         return WizardView(
             Step.VERIFY,
-            instruction,
+            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
+            "add an alignment or fine-tune φ.",
             checks,
             ButtonSpec(Action.NEXT, "It fits"),
-            (
-                ButtonSpec(Action.ANOTHER, "&Add alignment"),
-                ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
-                ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
-            ),
+            (ButtonSpec(Action.ANOTHER, "&Add alignment"), *each),
         )
 
     def _save(self, snapshot: Snapshot) -> WizardView:
-        where = snapshot.session_path
+        checks = (
+            Precondition(f"Saved in {snapshot.session_path}", not snapshot.problem),
+            *_verdict_checks(snapshot),
+        )
         others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
+        is_accepted = len(checks) > 1 and all(check.holds for check in checks[1:])
+        is_verified = is_accepted and len(snapshot.procedure.verifications) == len(checks) - 1
+        unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
         if snapshot.record.is_finished:
             return WizardView(
                 Step.SAVE,
                 "The session is complete. Take the headset off, or continue with the next wearer.",
-                (Precondition(f"Saved in {where}", True),),
+                checks,
                 ButtonSpec(Action.NEXT_WEARER, "Next wearer"),
                 others,
+                unearned=unearned,
             )
         return WizardView(
             Step.SAVE,
             "Everything is already saved. Finish the session when you are done.",
-            (Precondition(f"Saved in {where}", not snapshot.problem),),
+            checks,
             ButtonSpec(Action.FINISH, "Finish session"),
             others,
             snapshot.problem,
+            runs_after_s=None if snapshot.problem else _READ_S,
+            unearned=unearned,
         )
 
 
@@ -350,12 +438,61 @@ _VIEWS = {
 }
 
 
-_REPEATS: dict[Action, Eye] = {Action.REPEAT_LEFT: "left", Action.REPEAT_RIGHT: "right"}
+_REPEATS: dict[Action, tuple[Eye, ...]] = {
+    Action.REPEAT_LEFT: ("left",),
+    Action.REPEAT_RIGHT: ("right",),
+}
+
+
+def _advice(snapshot: Snapshot) -> Advice | None:
+    """Return the advice for the eye with the largest expected error; None if none is to repeat."""
+    results = snapshot.procedure.results
+    if results is None:
+        return None
+    repeated = [eye for eye in results.advice if results.verdicts[eye].name == "repeat"]
+    worst = max(repeated, key=lambda eye: results.benefits[eye].after_arcmin, default=None)
+    return None if worst is None else results.advice[worst]
+
+
+def _nudge(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
+    """Return the view while an eye's outline is moved until it covers the hand."""
+    eye, moved = verifying.eye, verifying.moved
+    other = "right" if eye == "left" else "left"
+    across, along = ("right", "left")[moved.right_arcmin < 0], ("down", "up")[moved.down_arcmin < 0]
+    total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
+    return WizardView(
+        Step.VERIFY,
+        f"Close the {other} eye. Arrow keys move the outline, + and − change its size, until it "
+        "covers the hand.",
+        (_hand_check(snapshot), _still_check(snapshot)),
+        ButtonSpec(Action.VERIFIED, "It covers the hand", _is_steady(snapshot)),
+        (
+            ButtonSpec(Action.UNDO_NUDGE, "&Undo", verifying.can_undo),
+            ButtonSpec(Action.SKIP, "&Skip"),
+        ),
+        snapshot.procedure.refusal,
+        fact=f"{eye.capitalize()} eye moved by {total_arcmin:.1f}′: "
+        f"{abs(moved.right_arcmin):.1f}′ {across}, {abs(moved.down_arcmin):.1f}′ {along}, "
+        f"size {100 * moved.size:+.1f} %",
+    )
+
+
+def _is_steady(snapshot: Snapshot) -> bool:
+    return snapshot.observation is not None and snapshot.observation.is_steady
+
+
+def _still_check(snapshot: Snapshot) -> Precondition:
+    return Precondition("Hand held still", _is_steady(snapshot))
+
+
+def _is_placed(snapshot: Snapshot) -> bool:
+    return snapshot.observation is not None and snapshot.observation.hand is not None
 
 
 def _hand_check(snapshot: Snapshot) -> Precondition:
     seen = snapshot.observation
-    if seen is not None and seen.hand is not None:
+    # A hand that is seen without a problem is placed with one of the next frames.
+    if _is_placed(snapshot) or (seen and seen.cloud is not None and not seen.problem):
         return Precondition("Hand found", True)
     problem = seen.problem if seen is not None else ""
     return Precondition(sentence(problem or "no hand in view"), False)

@@ -1,9 +1,14 @@
-"""The wizard's page: the steps, one sentence, the preconditions; its buttons are in a bar."""
+"""The guide: the steps, one sentence, the preconditions, a picture; its buttons are in a bar."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from functools import partial
+
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QHBoxLayout,
     QLabel,
@@ -13,13 +18,43 @@ from PySide6.QtWidgets import (
 
 from handcal.station.snapshot import Snapshot
 from handcal.types import EyePlan
+from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import PLANS, STEPS, Precondition, Step, Wizard, WizardView
+from handcal_gui.pages.wizard.automatic import Automatic
+from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
+from handcal_gui.pages.wizard.steps import (
+    PLANS,
+    STEPS,
+    Action,
+    Precondition,
+    Step,
+    Wizard,
+    WizardView,
+)
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
+from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
 _MOST_CHECKS = 3
+_RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
+_SENTENCE_SCALE, _CHECK_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
+"""Size of the ring and scales of texts, in a window with panels and in one without."""
+_ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
+_NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
+    ("Move the outline left", "Left"): (-_ARCMIN, 0.0, 0.0),
+    ("Move the outline right", "Right"): (_ARCMIN, 0.0, 0.0),
+    ("Move the outline up", "Up"): (0.0, -_ARCMIN, 0.0),
+    ("Move the outline down", "Down"): (0.0, _ARCMIN, 0.0),
+    ("Move the outline far left", "Shift+Left"): (-_FAR_ARCMIN, 0.0, 0.0),
+    ("Move the outline far right", "Shift+Right"): (_FAR_ARCMIN, 0.0, 0.0),
+    ("Move the outline far up", "Shift+Up"): (0.0, -_FAR_ARCMIN, 0.0),
+    ("Move the outline far down", "Shift+Down"): (0.0, _FAR_ARCMIN, 0.0),
+    ("Make the outline larger", "+ ="): (0.0, 0.0, _GROWTH),
+    ("Make the outline smaller", "-"): (0.0, 0.0, -_GROWTH),
+}
+"""Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
 
 
 class WizardPanel(QWidget):
@@ -32,9 +67,15 @@ class WizardPanel(QWidget):
         Its buttons, for the window's bottom strip.
     shown : WizardView or None
         The view shown; None before the first snapshot.
+    picture : GuidePicture
     asked : Signal(Action)
-        A button was pressed.
+        A button was pressed, by a person or by itself.
     plan_changed : Signal(str)
+    hold_changed : Signal(bool)
+        A person has chosen whether every step waits for a person.
+    nudged : Signal(float, float, float)
+        The outline of a verification is to move to the right and down, in arcminutes, and to grow
+        by a share.
     step_changed : Signal(Step)
         Another step is shown.
     """
@@ -42,29 +83,39 @@ class WizardPanel(QWidget):
     asked = Signal(object)
     step_changed = Signal(object)
     plan_changed = Signal(str)
+    hold_changed = Signal(bool)
+    nudged = Signal(float, float, float)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("wizard")
         self.wizard = Wizard()
         self.shown: WizardView | None = None
+        self.picture = GuidePicture()
+        self._automatic = Automatic()
+        self._ring = ProgressRing("wizardRing")
+        self._hold = self._hold_action()
+        self._nudges = self._nudge_actions()
         self._rail = _Rail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True)
         self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
+        self._fact = QLabel(wordWrap=True)
+        self._fact.setObjectName("wizardFact")
         self._note = QLabel(wordWrap=True)
         self._note.setObjectName("wizardNote")
         self.bar = ActionBar()
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
-        self.bar.asked.connect(self.asked)
+        self.bar.asked.connect(self._on_asked)
         self._plan.currentIndexChanged.connect(self._choose_plan)
         follow_theme(self, self._refresh)
 
-    def start(self, wizard: Wizard) -> None:
-        """Switch to another wizard."""
+    def start(self, wizard: Wizard, *, is_held: bool = True) -> None:
+        """Switch to another wizard; if it is held, every step waits for a person."""
         self.wizard = wizard
+        self.hold(is_held)
         self._plan.setCurrentText(PLANS[wizard.plan])
         self.shown = None
         self.bar.show_view(None)
@@ -77,18 +128,75 @@ class WizardPanel(QWidget):
             self._refresh()
             if before is None or before.step is not view.step:
                 self.step_changed.emit(view.step)
+        self.picture.step = view.step
+        self._run(view, snapshot)
+
+    def hold(self, is_held: bool) -> None:
+        """Let every step wait for a person, or let steps run by themselves."""
+        self._automatic.is_held = is_held
+        self._hold.setChecked(is_held)
+
+    def fill_window(self, is_alone: bool) -> None:
+        """Use the room of a window without panels, or less."""
+        for texts, scale in (
+            ([self._sentence], _SENTENCE_SCALE[is_alone]),
+            ([*self._checks, self._fact, self._note], _CHECK_SCALE[is_alone]),
+        ):
+            font = self.font()
+            font.setPointSizeF(scale * font.pointSizeF())
+            for text in texts:
+                text.setFont(font)
+        self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
+        self._ring.set_diameter(_RING_PX[is_alone])
 
     def press_main(self) -> None:
         """Press the main button."""
         self.bar.press_main()
 
+    def _hold_action(self) -> QAction:
+        hold = add_action(
+            self, "Hold", "H", tooltip="Hold: no step runs by itself, each waits for you (H)"
+        )
+        hold.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+        hold.setWhatsThis("Hold the steps that run by themselves, or let them run")
+        hold.setCheckable(True)
+        hold.triggered.connect(self._choose_hold)
+        return hold
+
+    def _nudge_actions(self) -> list[QAction]:
+        """Return the actions that move the outline of a verification the way that keys point."""
+        actions = []
+        for (name, keys), nudge in _NUDGES.items():
+            action = add_action(self, name, keys, partial(self.nudged.emit, *nudge))
+            action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+            action.setEnabled(False)
+            actions.append(action)
+        return actions
+
+    def _choose_hold(self, is_held: bool) -> None:
+        self.hold(is_held)
+        self.hold_changed.emit(is_held)
+
+    def _on_asked(self, action: Action) -> None:
+        if action is Action.BACK:
+            self.hold(True)  # or the step would run again
+        self.asked.emit(action)
+
+    def _run(self, view: WizardView, snapshot: Snapshot) -> None:
+        """Press the main button once a step that runs by itself has waited long enough."""
+        now_s = 1e-9 * snapshot.t_host_ns
+        share = self._automatic.share(view, now_s)
+        done = len(snapshot.procedure.alignments)
+        planned = 2 if self.wizard.plan == "each" else 1
+        self._ring.show_share(share, f"{done}/{max(planned, done)}")
+        if share == 1.0 and QApplication.activeModalWidget() is None:
+            self._automatic.note_pressed(now_s)
+            self.press_main()
+
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
-        scale_font(self._sentence, 1.2)
         self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
-        # Always two lines, so that the widgets below do not move.
-        self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
-        self._note.setMinimumHeight(2 * self._note.fontMetrics().lineSpacing() + 2)
+        self.fill_window(False)
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._plan.addItems(list(PLANS.values()))
         self._plan.setToolTip(
@@ -98,28 +206,43 @@ class WizardPanel(QWidget):
         )
         plan_label = QLabel("E&yes")
         plan_label.setBuddy(self._plan)
-        plan = hbox(self._title, 0, plan_label, self._plan)
+        hold = tool_button()
+        hold.setDefaultAction(self._hold)
+        self._choice = QWidget()
+        hbox(plan_label, self._plan, on=self._choice, margins=0, spacing=SPACING_PX)
+        head = hbox(self._title, 0, self._choice, self.picture.result.buttons, hold)
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addSpacing(SPACING_PX)
-        layout.addLayout(plan)
-        layout.addWidget(self._sentence)
-        layout.addSpacing(SPACING_PX // 2)
-        for row in self._checks:
-            layout.addWidget(row)
-        layout.addWidget(self._note)
-        layout.addStretch()
+        layout.addLayout(head)
+        self._ring.setToolTip("Alignments made; the ring fills until a step runs by itself")
+        texts = vbox(
+            self._sentence, *self._checks, self._fact, self._note, 0, spacing=SPACING_PX // 2
+        )
+        ring = vbox(self._ring, 0)
+        layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
+        layout.addWidget(self.picture, 1)
 
     def _refresh(self) -> None:
         view = self.shown
         if view is None:
             return
-        self._rail.show_step(view.step)
+        self._rail.show_step(view.step, view.unearned)
         self._title.setText(view.step.value)
         self._sentence.setText(view.sentence)
+        # The result card gives the verdicts, with their reasons.
+        has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
+        self._choice.setVisible(view.step not in OF_THE_RESULT)
+        self.picture.result.buttons.setVisible(has_card)
+        checks = [check for check in view.checks if not (has_card and check.verdict)]
         for i, row in enumerate(self._checks):
-            row.show_check(view.checks[i] if i < len(view.checks) else None)
+            row.show_check(checks[i] if i < len(checks) else None)
         self._note.setText(view.note)
         self._note.setStyleSheet(f"color: {colors().red}")
+        self._fact.setText(view.fact)
+        self._fact.setVisible(bool(view.fact))
+        self._note.setVisible(bool(view.note))
+        for action in self._nudges:
+            action.setEnabled(view.main.action is Action.VERIFIED)
         self.bar.show_view(view)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:
@@ -146,11 +269,12 @@ class _Rail(QWidget):
             label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             layout.addWidget(label)
 
-    def show_step(self, present: Step) -> None:
+    def show_step(self, present: Step, unearned: Collection[Step]) -> None:
         place = STEPS.index(present)
         for i, (step, label) in enumerate(self._labels.items()):
-            mark = "✓ " if i < place else ""
-            color = colors().good if i < place else colors().muted
+            mark, color = ("✓ ", colors().good) if i < place else ("", colors().muted)
+            if step in unearned:
+                mark, color = "– ", colors().warning
             label.setText(f"{mark}{step.value}")
             if step is present:
                 label.setText(f"▸ {step.value}")

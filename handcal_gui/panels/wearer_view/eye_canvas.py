@@ -49,6 +49,7 @@ class EyeCanvas(QWidget):
         self._message = ""
         self._crop = QRectF()
         self._is_whole = self._is_offline_shown = False
+        self._is_drawn_shown = True
 
     @property
     def crop_px(self) -> QRectF:
@@ -76,6 +77,11 @@ class EyeCanvas(QWidget):
     def show_offline(self, is_shown: bool) -> None:
         """Show or hide the outline drawn with the offline projection."""
         self._is_offline_shown = is_shown
+        self.update()
+
+    def show_drawn(self, is_shown: bool) -> None:
+        """Show or hide the outline that the headset draws."""
+        self._is_drawn_shown = is_shown
         self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
@@ -110,9 +116,9 @@ class EyeCanvas(QWidget):
             ("hand", view.hand_px),
             ("hand", view.target_px),
             ("cursor", view.cursor_px),
-            ("drawn", view.drawn.outline_px),
-            ("drawn", view.drawn_target_px),
         ]
+        if self._is_drawn_shown:
+            outlines += [("drawn", view.drawn.outline_px), ("drawn", view.drawn_target_px)]
         to_widget = self._to_widget()
         painter.setClipRect(to_widget.mapRect(_display(view)))
         lines = [(what, to_widget.map(_closed(px))) for what, px in outlines if len(px)]

@@ -110,13 +110,13 @@ class _EyeColumn(QWidget):
     def show_view(self, view: EyeView | None, message: str, *, is_solved: bool) -> None:
         """Show a view or a message; errors only if the eye's position is known."""
         self.canvas.show_view(view, message or ("" if view else _EMPTY))
-        self._title.setText(f"{self._name}{_origin(view, is_solved=is_solved)}")
+        self._title.setText(f"{self._name}{origin_text(view, is_solved=is_solved)}")
         is_known = view is not None and (view.is_true or is_solved) and not message
         self._now.show_overlay(view.drawn if view and is_known else None)
         self._before.show_overlay(view.offline if view and is_known else None)
 
 
-def _origin(view: EyeView | None, *, is_solved: bool) -> str:
+def origin_text(view: EyeView | None, *, is_solved: bool) -> str:
     """Return the source of the eye's position."""
     if view is None:
         return ""

@@ -1,16 +1,19 @@
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, get_args
 
 import pytest
 
 from handcal.errors import FileError
+from handcal.link.nudges import NudgeSum
+from handcal.register.verdict import Advice
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName
+from handcal.station.verifying import VerifyingView
+from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.steps import (
     STEPS,
     Action,
@@ -22,6 +25,7 @@ from handcal_gui.pages.wizard.steps import (
 )
 
 Maker = Callable[..., Snapshot]
+VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
 
 
 def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
@@ -86,8 +90,8 @@ def test_the_whole_way_of_one_eye_after_the_other(
     assert wizard.eyes(applied) == ("right",)
     two = aligned(record, alignments[0], ("left",), ("right",))
     wizard.view(snapshot(State.ALIGN, record=two))
-    applied = snapshot(State.APPLIED, record=two)
-    assert wizard.view(applied).main.label == "It fits"
+    applied = judged(snapshot, "accept", "accept", State.APPLIED, record=two)
+    assert wizard.view(applied).main.label == "Finish"
     wizard.move(Action.NEXT, applied)
     way.append(wizard.view(applied).main.action)
     finished = snapshot(State.APPLIED, record=replace(two, is_finished=True))
@@ -175,9 +179,11 @@ def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> No
     assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
 
 
-def judged(snapshot: Maker, left: VerdictName, right: VerdictName, state: State) -> Snapshot:
-    """Return a snapshot with these verdicts."""
-    seen = snapshot(state)
+def judged(
+    snapshot: Maker, left: VerdictName, right: VerdictName, state: State, **changes: Any
+) -> Snapshot:
+    """Return a snapshot with these verdicts, of eyes that were verified."""
+    seen = snapshot(state, procedure={"verifications": dict.fromkeys(EYES, VERIFIED)}, **changes)
     assert seen.procedure.results is not None
     verdicts: dict[Eye, Verdict] = {
         "left": Verdict(left, "as told"),
@@ -234,10 +240,151 @@ def test_verify_points_at_the_advice_while_an_eye_is_not_accepted(snapshot: Make
     assert "Not accepted yet" not in accepted.sentence
 
 
+def advised(
+    snapshot: Maker, advice: Mapping[Eye, tuple[tuple[Eye, ...], int]], **changes: Any
+) -> Snapshot:
+    """Return a snapshot in which eyes are to repeat, with the eyes and the number of alignments."""
+    names: list[VerdictName] = ["repeat" if eye in advice else "accept" for eye in EYES]
+    left, right = names
+    seen = judged(snapshot, left, right, State.APPLIED, **changes)
+    assert seen.procedure.results is not None
+    given = {
+        eye: Advice(eyes, count, 5.0, 0.97, meets_target=True, is_accepted=True)
+        for eye, (eyes, count) in advice.items()
+    }
+    results = replace(seen.procedure.results, advice=given)
+    return replace(seen, procedure=replace(seen.procedure, results=results))
+
+
+@pytest.mark.parametrize(
+    ("eyes", "label"),
+    [(EYES, "Add both eyes"), (("right",), "Add the right eye")],
+)
+def test_an_eye_that_is_not_accepted_does_not_fit(
+    snapshot: Maker, eyes: tuple[Eye, ...], label: str
+) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    repeat = advised(snapshot, {"right": (eyes, 1)})
+    view = wizard.view(repeat)
+    assert (view.main.action, view.main.label) == (Action.ANOTHER, label)
+    assert "fits" not in "".join(offer.label for offer in view.others)
+    wizard.move(Action.ANOTHER, repeat)
+    assert wizard.eyes(repeat) == eyes
+
+
+def test_the_advice_for_the_worst_eye_comes_first(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    both = advised(snapshot, {"left": (("left",), 1), "right": (("right",), 1)})
+    results = both.procedure.results
+    assert results is not None
+    worst = max(EYES, key=lambda eye: results.benefits[eye].after_arcmin)
+    assert wizard.view(both).main.label == f"Add the {worst} eye"
+
+
+def test_a_result_that_must_not_be_used_does_not_fit_either(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    view = wizard.view(judged(snapshot, "contradicted", "accept", State.APPLIED))
+    assert view.sentence.startswith("Do not use this result.")
+    assert view.main.action is Action.ANOTHER
+
+
+def test_only_what_a_person_need_not_decide_runs_by_itself(
+    snapshot: Maker, start: Snapshot, record: SessionRecord, alignments: tuple[Alignment, ...]
+) -> None:
+    wizard = Wizard("each")
+    runs: dict[Step | State, float | None] = {}
+    for step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR):
+        reach(wizard, start, step)
+        runs[step] = wizard.view(start).runs_after_s
+    one = aligned(record, alignments[0], ("left",))
+    for state in (State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED):
+        runs[state] = wizard.view(snapshot(state, record=one)).runs_after_s
+    assert [what for what, after_s in runs.items() if after_s is None] == [
+        Step.CONNECT,
+        State.ALIGN,
+    ]
+    two = aligned(record, alignments[0], ("left",), ("right",))
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED, record=two)
+    assert wizard.view(accepted).runs_after_s is None  # the wearer says if it fits
+    few, many = (advised(snapshot, {"left": (("left",), count)}, record=two) for count in (1, 5))
+    assert wizard.view(few).runs_after_s is not None
+    assert wizard.view(many).runs_after_s is None
+    wizard.move(Action.NEXT, accepted)
+    assert wizard.view(accepted).runs_after_s is not None
+    assert wizard.view(replace(accepted, problem="the disk is full")).runs_after_s is None
+
+
+def test_each_solved_eye_is_verified_before_anything_is_said_to_fit(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    labels = []
+    for eyes in ((), ("left",), EYES):
+        verifications = dict.fromkeys(eyes, VERIFIED)
+        procedure = replace(accepted.procedure, verifications=verifications)
+        view = wizard.view(replace(accepted, procedure=procedure))
+        labels.append(view.main.label)
+        assert (view.runs_after_s is not None) == (eyes != EYES)
+    assert labels == ["Verify the left eye", "Verify the right eye", "Finish"]
+    unverified = replace(accepted, procedure=replace(accepted.procedure, verifications={}))
+    for _ in EYES:
+        assert Action.SKIP in actions(wizard.view(unverified))
+        wizard.move(Action.SKIP, unverified)
+    assert wizard.view(unverified).main.label == "It fits"
+    wizard.move(Action.NEXT, unverified)
+    assert wizard.view(unverified).unearned == {Step.VERIFY}
+
+
+def test_a_restless_hand_is_not_verified(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    assert wizard.view(snapshot(State.APPLIED)).main.is_enabled
+    restless = snapshot(State.APPLIED, observation={"is_steady": False})
+    assert not wizard.view(restless).main.is_enabled
+
+
+def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> None:
+    triple = (0.0, 0.0, 0.0)
+    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, 0.006), triple, triple, True, False)
+    seen = snapshot(
+        State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
+    )
+    view = Wizard().view(seen)
+    assert view.step is Step.VERIFY
+    assert view.sentence.startswith("Close the right eye.")
+    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size +0.6 %"
+    assert view.note == "Hold your hand still."
+    assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
+    assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]
+
+
+def test_what_a_verification_leads_to_is_sent_at_the_same_step(snapshot: Maker) -> None:
+    verified = {"verifications": {"left": VERIFIED}}
+    view = Wizard().view(snapshot(State.APPLYING, procedure=verified))
+    assert view.step is Step.VERIFY
+    assert not view.main.is_enabled
+
+
+def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    repeat = judged(snapshot, "repeat", "accept", State.APPLIED)
+    wizard.view(accepted)
+    wizard.move(Action.NEXT, accepted)
+    assert not wizard.view(accepted).unearned
+    view = wizard.view(repeat)
+    assert view.unearned == {Step.VERIFY}
+    assert [check.holds for check in view.checks[1:]] == [False, True]
+
+
 def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> None:
     wizard = Wizard("both")
     wizard.view(snapshot(State.SOLVED))
-    applied = snapshot(State.APPLIED)
+    applied = judged(snapshot, "accept", "accept", State.APPLIED)
     assert actions(wizard.view(applied)) == [
         Action.ANOTHER,
         Action.REPEAT_LEFT,
@@ -315,7 +462,8 @@ def test_a_plan_of_one_eye_is_complete_with_it(
     wizard = Wizard("left")
     wizard.view(snapshot(State.SOLVED))
     one = aligned(record, alignments[0], ("left",))
-    assert wizard.view(snapshot(State.APPLIED, record=one)).main.label == "It fits"
+    applied = judged(snapshot, "accept", "accept", State.APPLIED, record=one)
+    assert wizard.view(applied).main.label == "Finish"
 
 
 def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:

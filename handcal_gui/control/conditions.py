@@ -1,0 +1,87 @@
+"""The one message about what is wrong at present: neither flashing, nor raised while starting."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from handcal.station.snapshot import Snapshot
+
+_LASTS_S = 0.8
+"""Time for which a problem lasts before it is shown."""
+_STARTING_S = 4.0
+"""The same before the first frame and pose: camera and headset take time to start."""
+_SLOW_HZ, _FAST_HZ = 8.0, 10.0
+"""Frame rates below which, and above which again, hand and confirmation are hard to match."""
+_SLOW_S = 3.0
+
+
+class Conditions:
+    """Watches the snapshots of one calibration.
+
+    Attributes
+    ----------
+    is_slow : bool
+        True if too few frames a second are processed.
+    """
+
+    def __init__(self) -> None:
+        self.is_slow = False
+        self._slow_text = ""
+        self._rate_since_s: float | None = None
+        self._problem, self._problem_since_s = "", 0.0
+        self._hand_problem, self._hand_since_s = "", 0.0
+        self._has_started = False
+
+    def condition(self, snapshot: Snapshot) -> str:
+        """Return the message about the most important problem that lasts; empty if there is none.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+            The newest one.
+        """
+        now_s = 1e-9 * snapshot.t_host_ns
+        camera, link = snapshot.camera, snapshot.link
+        self._has_started |= camera.rate_hz > 0 and link.pose_rate_hz > 0
+        self._watch_rate(camera.rate_hz, now_s)
+        found = (
+            snapshot.problem
+            or camera.problem
+            or snapshot.link_problem
+            or snapshot.contradiction
+            or self._slow_text
+        )
+        if found != self._problem:
+            is_first = not self._problem
+            self._problem = found
+            if is_first or not found:
+                self._problem_since_s = now_s
+        lasts_s = _LASTS_S if self._has_started else _STARTING_S
+        return found if now_s - self._problem_since_s >= lasts_s else ""
+
+    def calm(self, snapshot: Snapshot) -> Snapshot:
+        """Return the snapshot without a passing problem of a hand that is seen."""
+        seen, now_s = snapshot.observation, 1e-9 * snapshot.t_host_ns
+        problem = "" if seen is None or seen.cloud is None else seen.problem
+        if bool(problem) != bool(self._hand_problem):
+            self._hand_since_s = now_s
+        self._hand_problem = problem
+        if seen is None or not problem or now_s - self._hand_since_s >= _LASTS_S:
+            return snapshot
+        return replace(snapshot, observation=replace(seen, problem=""))
+
+    def _watch_rate(self, rate_hz: float, now_s: float) -> None:
+        """Note that frames are few, or many again, once this has lasted."""
+        changes = rate_hz >= _FAST_HZ if self.is_slow else 0.0 < rate_hz < _SLOW_HZ
+        if not self._has_started or not changes:
+            self._rate_since_s = None
+        elif self._rate_since_s is None:
+            self._rate_since_s = now_s
+        elif now_s - self._rate_since_s >= _SLOW_S:
+            self.is_slow, self._rate_since_s = not self.is_slow, None
+            self._slow_text = (
+                f"frames per second: only {rate_hz:.0f} of the {_SLOW_HZ:.0f} that are needed; "
+                "close other programs, and plug the camera into a USB 3 port"
+                if self.is_slow
+                else ""
+            )

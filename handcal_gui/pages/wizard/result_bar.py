@@ -1,0 +1,101 @@
+"""The result of a running calibration, with the buttons that pass it on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QAction, QGuiApplication, QTextDocument
+from PySide6.QtPrintSupport import QPrintDialog, QPrinter
+from PySide6.QtWidgets import QDialog, QWidget
+
+from handcal.register.results import Results
+from handcal.register.verdict import VerdictSettings
+from handcal.session.session import SessionRecord
+from handcal.station.snapshot import Snapshot
+from handcal_gui.keys import add_action
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.result_card import ResultCard, result_text
+from handcal_gui.widgets.times import local_time
+
+
+class ResultBar(QWidget):
+    """The result card; its buttons to blink, copy and print stand elsewhere.
+
+    Attributes
+    ----------
+    buttons : QWidget
+    blink_toggled : Signal(bool)
+        Before and after are to be shown in turn, or no longer.
+    """
+
+    blink_toggled = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("resultBar")
+        self._results: Results | None = None
+        self._target_arcmin = VerdictSettings().target_arcmin
+        self._record: SessionRecord | None = None
+        self._card = ResultCard()
+        self._blink = add_action(self, "Blink before/after", "", tooltip="Show both in turn")
+        self._blink.setCheckable(True)
+        self._blink.toggled.connect(self.blink_toggled)
+        actions = (
+            self._blink,
+            add_action(self, "Copy", "", self.copy, tooltip="Copy the result as text"),
+            add_action(self, "Print…", "", self._ask_printer, tooltip="Print the result"),
+        )
+        self.buttons = QWidget()
+        hbox(*map(_button, actions), on=self.buttons, margins=0, spacing=SPACING_PX)
+        vbox(self._card, on=self, margins=0)
+
+    def set_target(self, target_arcmin: float) -> None:
+        """Set the lab's target for the error."""
+        self._target_arcmin = target_arcmin
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the results of a snapshot if they have changed."""
+        self._record = snapshot.record
+        if snapshot.procedure.results is not self._results:
+            self._results = snapshot.procedure.results
+            self._card.show_results(self._results, self._target_arcmin)
+
+    def text(self) -> str:
+        """Return the result as text; empty if there is none."""
+        if self._results is None or self._record is None:
+            return ""
+        return result_text(self._results, self._target_arcmin, _head(self._record))
+
+    def copy(self) -> None:
+        """Copy the result as text."""
+        QGuiApplication.clipboard().setText(self.text())
+
+    def print_to(self, printer: QPrinter) -> None:
+        """Print the result as text."""
+        document = QTextDocument()
+        document.setPlainText(self.text())
+        document.print_(printer)
+
+    def _ask_printer(self) -> None:
+        printer = QPrinter(QPrinter.PrinterMode.HighResolution)
+        dialog = QPrintDialog(printer, self)
+        if dialog.exec() == QDialog.DialogCode.Accepted:
+            self.print_to(printer)
+
+
+def _head(record: SessionRecord) -> Mapping[str, str]:
+    return {
+        "Wearer": record.wearer or "without a name",
+        "Started": local_time(record.events[0].time),
+        "Rig": record.rig.name,
+        "Session": record.path.name,
+    }
+
+
+def _button(action: QAction) -> QWidget:
+    button = tool_button()
+    button.setDefaultAction(action)
+    return button

@@ -1,0 +1,226 @@
+"""The result card: for each eye the error before and after, the lab's target and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
+
+from handcal.register.results import Results
+from handcal.types import EYES, Eye, VerdictName
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_COLORS, VERDICT_WORDS
+from handcal_gui.widgets.sentence import sentence
+
+_NOT_MEASURED = "not measured"
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """One error of an eye."""
+
+    name: str
+    arcmin: float | None
+    """None if it was not measured."""
+
+    @property
+    def text(self) -> str:
+        """The error with its unit."""
+        return _NOT_MEASURED if self.arcmin is None else f"{self.arcmin:.1f}′"
+
+
+@dataclass(frozen=True, slots=True)
+class EyeResult:
+    """The result of one eye."""
+
+    eye: Eye
+    verdict: VerdictName
+    reason: str
+    bars: tuple[Bar, ...]
+    another: str
+    """The effect of one more alignment."""
+
+
+def eye_results(results: Results) -> list[EyeResult]:
+    """Return the result of each solved eye."""
+    found = []
+    for eye in EYES:
+        if eye not in results.eyes:
+            continue
+        benefit, verdict = results.benefits[eye], results.verdicts[eye]
+        before = Bar("Before, expected", benefit.without_arcmin)
+        if eye in results.measured_arcmin:
+            checked, left = results.measured_arcmin[eye]
+            bars = before, Bar("Check found", checked), Bar("After the check", left)
+        else:
+            after = Bar("After, expected", benefit.after_arcmin)
+            bars = before, after, Bar("After, measured", None)
+        another = f"One more alignment: {results.expected_after_another_arcmin[eye]:.1f}′ expected"
+        found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another))
+    return found
+
+
+def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] = {}) -> str:
+    """Return the card as plain text, one fact a line.
+
+    Parameters
+    ----------
+    results : Results
+    target_arcmin : float
+        The lab's target.
+    head : mapping of str to str
+        Facts to begin with, such as the wearer.
+    """
+    lines = [f"{name}: {value}" for name, value in head.items()]
+    lines.append(f"Target: {target_arcmin:.1f}′")
+    for one in eye_results(results):
+        lines += ["", f"{EYE_NAMES[one.eye]}: {VERDICT_WORDS[one.verdict]}", one.reason]
+        lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
+        lines.append(one.another)
+    return "\n".join(lines)
+
+
+class ResultCard(QWidget):
+    """Shows the result of each eye, side by side."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("resultCard")
+        self.setAccessibleName("Result")
+        self._results: Results | None = None
+        self._columns = {eye: _Column(eye) for eye in EYES}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(2 * SPACING_PX)
+        for i, column in enumerate(self._columns.values()):
+            grid.addWidget(column, 0, i)
+            grid.setColumnStretch(i, 1)
+        follow_theme(self, self._refresh)
+
+    def show_results(self, results: Results | None, target_arcmin: float) -> None:
+        """Show results; without any, the card is empty."""
+        self._results = results
+        found = {one.eye: one for one in eye_results(results)} if results else {}
+        widest = max((b.arcmin or 0.0 for one in found.values() for b in one.bars), default=0.0)
+        scale_arcmin = 1.1 * max(widest, target_arcmin)
+        for eye, column in self._columns.items():
+            column.show_result(found.get(eye), target_arcmin, scale_arcmin)
+        self.setAccessibleDescription(result_text(results, target_arcmin) if results else "")
+
+    def _refresh(self) -> None:
+        for column in self._columns.values():
+            column.refresh()
+
+
+class _Column(QWidget):
+    """One eye: verdict, bars, effect of another alignment, reason."""
+
+    def __init__(self, eye: Eye) -> None:
+        super().__init__()
+        self._eye = eye
+        self._result: EyeResult | None = None
+        self._verdict = QLabel()
+        self._verdict.setObjectName(f"card-verdict-{eye}")
+        scale_font(self._verdict, 1.1, is_bold=True)
+        self._bars = _Bars()
+        self._another = QLabel()
+        self._reason = paragraph(f"card-reason-{eye}")
+        self._reason.setAlignment(Qt.AlignmentFlag.AlignTop)
+        vbox(
+            self._verdict,
+            self._bars,
+            self._another,
+            (self._reason, 1),
+            on=self,
+            margins=0,
+            spacing=SPACING_PX // 2,
+        )
+
+    def show_result(
+        self, result: EyeResult | None, target_arcmin: float, scale_arcmin: float
+    ) -> None:
+        self._result = result
+        word = "– Not solved" if result is None else VERDICT_WORDS[result.verdict]
+        self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
+        self._reason.setText(result.reason if result else "")
+        self._another.setText(result.another if result else "")
+        self._bars.show_bars(result, target_arcmin, scale_arcmin)
+        self.refresh()
+
+    def refresh(self) -> None:
+        shade = getattr(colors(), VERDICT_COLORS[self._result.verdict]) if self._result else ""
+        self._verdict.setStyleSheet(f"color: {shade}" if shade else "")
+        self._another.setStyleSheet(f"color: {colors().muted}")
+        self._bars.update()
+
+
+class _Bars(QWidget):
+    """Bars below one another on one scale, with a line at the target."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._result: EyeResult | None = None
+        self._target = self._scale = 1.0
+
+    def show_bars(
+        self, result: EyeResult | None, target_arcmin: float, scale_arcmin: float
+    ) -> None:
+        self._result, self._target, self._scale = result, target_arcmin, scale_arcmin
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(26 * SPACING_PX, 4 * self._line_px())
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        if self._result is None:
+            return
+        painter = QPainter(self)
+        line, metrics = self._line_px(), self.fontMetrics()
+        name_px = max(metrics.horizontalAdvance(b.name) for b in self._result.bars) + SPACING_PX
+        text_px = metrics.horizontalAdvance("888.8′") + SPACING_PX
+        room = max(self.width() - name_px - text_px, 1)
+        text = self.palette().windowText().color()
+        good, late = QColor(colors().good), QColor(colors().warning)
+        for i, bar in enumerate(self._result.bars):
+            top = i * line
+            painter.setPen(text)
+            row = QRectF(0, top, self.width(), line)
+            painter.drawText(row, Qt.AlignmentFlag.AlignVCenter, bar.name)
+            length = room * (bar.arcmin or 0.0) / self._scale
+            if bar.arcmin is not None:
+                is_after = i > 0
+                shade = (good if bar.arcmin <= self._target else late) if is_after else None
+                painter.fillRect(
+                    QRectF(name_px, top + line * 0.2, length, line * 0.6),
+                    shade or QColor(colors().muted),
+                )
+            is_known = bar.arcmin is not None
+            side = Qt.AlignmentFlag.AlignRight if is_known else Qt.AlignmentFlag.AlignLeft
+            painter.setPen(text if is_known else QColor(colors().muted))
+            place = row if is_known else row.adjusted(name_px, 0, 0, 0)
+            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | side, bar.text)
+        x = name_px + room * self._target / self._scale
+        painter.setPen(QPen(text, 1.5, Qt.PenStyle.DashLine))
+        count = len(self._result.bars)
+        known = sum(bar.arcmin is not None for bar in self._result.bars)
+        painter.drawLine(round(x), 0, round(x), known * line)
+        painter.setPen(text)
+        label = f"target {self._target:g}′"
+        width = metrics.horizontalAdvance(label)
+        left = min(max(x - width / 2, 0.0), self.width() - width)
+        painter.drawText(
+            QRectF(left, count * line, width + 1, line), Qt.AlignmentFlag.AlignVCenter, label
+        )
+
+    def _line_px(self) -> int:
+        return self.fontMetrics().height() + 2

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal_gui.control.conditions import Conditions
+
+Maker = Callable[..., Snapshot]
+UNPLUGGED = {"camera": {"problem": "the camera was unplugged"}}
+
+
+def after(snapshot: Snapshot, seconds: float) -> Snapshot:
+    return replace(snapshot, t_host_ns=snapshot.t_host_ns + round(1e9 * seconds))
+
+
+def watch(conditions: Conditions, snapshot: Snapshot, times_s: list[float]) -> list[str]:
+    return [conditions.condition(after(snapshot, one)) for one in times_s]
+
+
+def test_a_problem_that_passes_is_not_shown(snapshot: Maker) -> None:
+    conditions = Conditions()
+    fine, bad = snapshot(), snapshot(**UNPLUGGED)
+    assert watch(conditions, fine, [0.0]) == [""]
+    assert watch(conditions, bad, [1.0, 1.5]) == ["", ""]
+    assert watch(conditions, fine, [1.6]) == [""]
+    assert watch(conditions, bad, [2.0, 3.0]) == ["", "the camera was unplugged"]
+    assert watch(conditions, fine, [3.1]) == [""]
+
+
+def test_a_start_is_no_problem(snapshot: Maker) -> None:
+    conditions = Conditions()
+    silent = snapshot(
+        camera={"problem": "nothing seen", "rate_hz": 0.0}, link={"pose_rate_hz": 0.0}
+    )
+    assert watch(conditions, silent, [0.0, 2.0, 3.9]) == ["", "", ""]
+    assert watch(conditions, silent, [4.1]) == ["nothing seen"]
+
+
+def test_a_slow_computer_is_named_once_until_it_is_fast_again(snapshot: Maker) -> None:
+    conditions = Conditions()
+    slow, fast = snapshot(camera={"rate_hz": 2.0}), snapshot(camera={"rate_hz": 30.0})
+    assert watch(conditions, fast, [0.0]) == [""]
+    assert watch(conditions, slow, [1.0, 3.0]) == ["", ""]
+    texts = watch(conditions, slow, [4.0, 5.0, 6.0])
+    assert conditions.is_slow
+    assert texts[-1].startswith("frames per second: only 2 of")
+    slower = snapshot(camera={"rate_hz": 1.0})
+    assert watch(conditions, slower, [7.0]) == texts[-1:]  # the text does not flicker
+    watch(conditions, fast, [8.0, 11.0])
+    assert not conditions.is_slow
+    assert watch(conditions, fast, [12.0]) == [""]
+
+
+@pytest.mark.parametrize("rate_hz", [8.0, 15.0, 30.0])
+def test_a_camera_that_is_fast_enough_is_not_named(snapshot: Maker, rate_hz: float) -> None:
+    conditions = Conditions()
+    seen = snapshot(camera={"rate_hz": rate_hz})
+    assert watch(conditions, seen, [0.0, 5.0, 10.0]) == ["", "", ""]
+
+
+def test_a_gap_in_the_poses_flashes_nowhere(snapshot: Maker) -> None:
+    conditions = Conditions()
+    fine = snapshot(State.SHOW_HAND)
+    gap = snapshot(State.SHOW_HAND, observation={"hand": None, "problem": "a gap of 64 ms"})
+    no_hand = snapshot(
+        State.SHOW_HAND, observation={"hand": None, "cloud": None, "problem": "no hand"}
+    )
+
+    def problem(seen: Snapshot, seconds: float) -> str:
+        calm = conditions.calm(after(seen, seconds)).observation
+        assert calm is not None
+        return calm.problem
+
+    assert problem(fine, 0.0) == ""
+    assert problem(gap, 0.1) == ""
+    assert problem(fine, 0.2) == ""
+    assert problem(gap, 0.3) == ""
+    assert problem(gap, 1.2) == "a gap of 64 ms"
+    assert problem(no_hand, 1.3) == "no hand"

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtWidgets import QLabel
+from pytestqt.qtbot import QtBot
+
+from handcal.register.results import Results
+from handcal_gui.widgets.result_card import ResultCard, eye_results, result_text
+from tests.gui.helpers import show, text
+
+
+def test_expected_and_measured_are_told_apart(results: Results) -> None:
+    left, right = eye_results(results)
+    assert (left.eye, right.eye) == ("left", "right")
+    benefit = results.benefits["left"]
+    assert [(bar.name, bar.arcmin) for bar in left.bars] == [
+        ("Before, expected", benefit.without_arcmin),
+        ("After, expected", benefit.after_arcmin),
+        ("After, measured", None),
+    ]
+    assert left.bars[-1].text == "not measured"
+    assert f"{results.expected_after_another_arcmin['left']:.1f}′" in left.another
+
+
+def test_the_text_has_every_number_with_its_unit(results: Results) -> None:
+    lines = result_text(results, 8.0, {"Wearer": "Ada"}).splitlines()
+    assert lines[:2] == ["Wearer: Ada", "Target: 8.0′"]
+    for eye in ("left", "right"):
+        assert f"After, expected: {results.benefits[eye].after_arcmin:.1f}′" in lines
+    assert lines.count("After, measured: not measured") == 2
+
+
+def test_the_card_shows_the_verdicts(qtbot: QtBot, results: Results) -> None:
+    card = show(qtbot, ResultCard(), 600, 240)
+    card.show_results(results, 8.0)
+    assert text(card, "card-verdict-left").startswith("Left eye: ↻ Repeat")
+    [reason] = card.findChildren(QLabel, "card-reason-left")
+    assert results.verdicts["left"].reason[1:] in reason.text()
+    one = replace(
+        results,
+        eyes={"left": results.eyes["left"]},
+        verdicts={"left": results.verdicts["left"]},
+    )
+    card.show_results(one, 8.0)
+    assert text(card, "card-verdict-right") == "Right eye: – Not solved"
+    card.show_results(None, 8.0)
+    assert text(card, "card-verdict-left") == "Left eye: – Not solved"
+
+
+def test_a_bar_within_the_target_is_painted_otherwise(qtbot: QtBot, results: Results) -> None:
+    card = show(qtbot, ResultCard(), 600, 240)
+    pictures = []
+    for target_arcmin in (1.0, 50.0):
+        card.show_results(results, target_arcmin)
+        pictures.append(card.grab().toImage())
+    assert pictures[0] != pictures[1]
