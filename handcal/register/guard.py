@@ -20,11 +20,11 @@ Axis: TypeAlias = Literal["x", "y", "z"]
 AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
 # Mean error with 1.5 mm of noise 0.7° in a few milliseconds, and 0.4° in twice the time.
-_LIVE = RigidSettings(max_points=500, max_interior=200, tolerance_m=3e-4)
-_ONCE = RigidSettings(max_points=800, max_interior=400, tolerance_m=3e-4)
+_LIVE = RigidSettings(max_points=300, tolerance_m=3e-4)
+_ONCE = RigidSettings(max_points=800, tolerance_m=3e-4)
 # More points than for the rotation: with 500 the noise of the shape is a millimetre.
-_SHAPE = RigidSettings(max_points=1000, max_interior=400, tolerance_m=3e-4)
-_LIVE_SHAPE = RigidSettings(max_points=700, max_interior=250, tolerance_m=3e-4)
+_SHAPE = RigidSettings(max_points=1000, tolerance_m=3e-4)
+_LIVE_SHAPE = RigidSettings(max_points=700, tolerance_m=3e-4)
 # A registration that starts near its end may stop sooner: mean error 0.55° instead of 0.52°.
 _FOLLOWED_TOLERANCE_M = 1e-3
 # A hand that fits this much worse than after the last full registration may have been lost.

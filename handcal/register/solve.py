@@ -18,6 +18,7 @@ from handcal.register.rcicp import (
     solve_linear,
     solve_paper,
 )
+from handcal.register.surface import mean_point
 from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
 
 MIN_POINTS = 100
@@ -150,9 +151,10 @@ def check_cloud(name: str, points_m: ArrayLike) -> Float64:
         raise ValueError(
             f"{name} has {len(cloud)} points; between {MIN_POINTS} and {MAX_POINTS:,} are needed"
         )
-    if not (np.abs(cloud) < _FARTHEST_M).all():
+    if not (cloud.max() < _FARTHEST_M and cloud.min() > -_FARTHEST_M):
         raise ValueError(f"{name} contains NaN or infinity, or points as far away")
-    if np.linalg.eigvalsh(np.cov(cloud.T))[1] < _LEAST_WIDTH_M**2:
+    centred = cloud - mean_point(cloud)
+    if np.linalg.eigvalsh(centred.T @ centred / len(cloud))[1] < _LEAST_WIDTH_M**2:
         raise ValueError(f"{name} has all its points on one line; a hand's surface is needed")
     return cloud
 
