@@ -85,7 +85,7 @@ def solve_eye_shift(
     ...     hand_cut=alignment.hand_is_cut,
     ... )
     >>> print(shift)
-    φ = (-4.37 ± 0.40, +1.00 ± 0.28, +0.17 ± 0.74) mm; rms 1.43 mm, 97 % inliers, converged
+    φ = (-4.27 ± 0.27, +0.90 ± 0.23, +0.16 ± 0.62) mm; rms 1.42 mm, 97 % inliers, converged
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
