@@ -34,10 +34,10 @@ from handcal.register.surface import (
 )
 from handcal.types import Bool, EyeShift, Float64
 
-# First a coarse registration, to cut both clouds alike, then a fine one.
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.
 _SPACING_POINTS = 200
+# First a coarse registration, to cut both clouds alike, then a fine one.
 _COARSE = RigidSettings(tolerance_m=1e-3)
 _FINE = RigidSettings()
 # Standard deviation of the hand's apparent change of size between cursor and alignment.
@@ -54,7 +54,7 @@ _GAIN = 0.01
 # together by up to a pixel.
 _SAME_POINTS = 0.97
 # An error of φ, over the measured change of shape: which part of a bent hand is the hand, nobody
-# can tell. Fitted to pairs of frames of color_aligned_640.
+# can tell. Fitted to pairs of frames of color_aligned_640 and _b.
 _SHAPE_SHARE = 1.35
 # Lower bound of a registration's error, whatever its residuals say, and the share of the hand's
 # movement by a rotation that becomes an error in every direction.
@@ -71,7 +71,7 @@ class HandMatch:
     """Cursor and hand registered rigidly; the same for both eyes."""
 
     cursor_m: Float64
-    """(M, 3); without what lies beyond the common cut."""
+    """(M, 3)."""
     hand_m: Float64
     """(N, 3); both clouds in one frame."""
     find_pairs: Callable[[Float64], Pairs]

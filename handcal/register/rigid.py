@@ -2,7 +2,7 @@
 
 A hand seen from one side is a sheet. In its interior, nearest neighbours measure only the distance
 of the sheets along their normals; sliding shows only at the outline. So interior pairs count along
-the normal and outline pairs in full, which converges in about ten Gauss-Newton steps where
+the normal and outline pairs in full, which converges in a few Gauss-Newton steps where
 point-to-point ICP needs a hundred (see docs/registration.md). Pairs are searched from both clouds,
 so that the inward bias of nearest neighbours at an outline cancels, and pairs that end on a cut
 edge are dropped, because the hand continues there.
@@ -45,6 +45,7 @@ class RigidSettings:
     """Interior points used from each cloud until a step is below `near_m`, and then all. With a
     known start all are used at once."""
     near_m: float = 1e-3
+    """Step, of a point of the hand, from which on all interior points are used."""
     max_iterations: int = 40
     tolerance_m: float = 3e-5
     """The iteration stops when a step moves no point of the hand by more than this."""

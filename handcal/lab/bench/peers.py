@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import process_time
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import small_gicp
@@ -72,7 +72,7 @@ def measure_peers(settings: BenchSettings, progress: Progress) -> Measured:
     return Measured(figures, rows)
 
 
-def _measure_size(points: int, trials: int) -> list[dict[str, float | str]]:
+def _measure_size(points: int, trials: int) -> list[dict[str, Any]]:
     """Return a row for each method: median time, and mean errors; the methods alternate."""
     times_ms: dict[str, list[float]] = {}
     errors: dict[str, list[tuple[float, float]]] = {}
@@ -87,9 +87,9 @@ def _measure_size(points: int, trials: int) -> list[dict[str, float | str]]:
             times_ms.setdefault(name, []).append(1e3 * (process_time() - start_s))
             if T_cursor_hand is not None:
                 errors.setdefault(name, []).append(_errors(T_cursor_hand, made))
-    rows: list[dict[str, float | str]] = []
+    rows: list[dict[str, Any]] = []
     for name, each_ms in times_ms.items():
-        row: dict[str, float | str] = {"method": name, "points": points}
+        row: dict[str, Any] = {"method": name, "points": points}
         row |= {"ms": float(np.median(each_ms)), "shortest_ms": min(each_ms)}
         if name in errors:
             mm, deg = np.mean(errors[name], axis=0)
@@ -170,7 +170,7 @@ def _open3d() -> dict[str, Register]:
     sharp = registration.ICPConvergenceCriteria(1e-8, 1e-8, _ITERATIONS)
     around = open3d.geometry.KDTreeSearchParamKNN(16)
 
-    def clouds(made: SimulatedAlignment) -> list[object]:
+    def clouds(made: SimulatedAlignment) -> list[Any]:
         found = []
         for points_m in (made.hand_m, made.cursor_m):
             cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points_m))
