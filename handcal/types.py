@@ -360,7 +360,7 @@ class EyeShift:
 
 
 def phi_text(shift: EyeShift) -> str:
-    """Return φ ± σ in one line: ``φ = (-4.07 ± 0.75, +0.91 ± 0.69, +2.27 ± 1.82) mm``."""
+    """Return φ ± σ in one line: ``φ = (-4.04 ± 0.70, +0.82 ± 0.68, +2.15 ± 1.80) mm``."""
     return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
 
 

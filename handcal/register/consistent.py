@@ -7,26 +7,39 @@ overrule it (the paper's own simulated data shrink the hand by 1 - φ3φ4).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from small_gicp import KdTree
 
 from handcal.display import update_matrix
 from handcal.geometry import transform
-from handcal.register.cut import common_cut
-from handcal.register.model import balance, design
+from handcal.register.cut import CUT_BAND_M, common_cut
+from handcal.register.model import balance, design, predict
 from handcal.register.rcicp import best_rotation
 from handcal.register.rigid import RigidResult, RigidSettings, motion_covariance, register_rigid
 from handcal.register.shape import ShapeChange, measure_shape_change
-from handcal.register.surface import describe_surface, near_cut_edge, nearest
+from handcal.register.surface import (
+    Indices,
+    clip_surface,
+    describe_surface,
+    mean_point,
+    near_cut_edge,
+    nearest,
+    point_spacing_m,
+)
 from handcal.types import Bool, EyeShift, Float64
 
+_POINTS = 1000
+# Number of points at which the distance between neighbours of a whole cloud is measured.
+_SPACING_POINTS = 200
 # First a coarse registration, to cut both clouds alike, then a fine one.
-_COARSE = RigidSettings()
-_FINE = RigidSettings(max_points=4000, max_interior=1000)
+_COARSE = RigidSettings(tolerance_m=1e-3)
+_FINE = RigidSettings()
 # Standard deviation of the hand's apparent change of size between cursor and alignment.
 _SIZE_SIGMA = 3e-4
 # Effective number of independent pairs: neighbours share the sensor's error.
@@ -41,12 +54,16 @@ _GAIN = 0.01
 # together by up to a pixel.
 _SAME_POINTS = 0.97
 # An error of φ, over the measured change of shape: which part of a bent hand is the hand, nobody
-# can tell. Fitted to pairs of frames of color_aligned_640.
-_SHAPE_SHARE = 1.4
+# can tell. Fitted to pairs of frames of color_aligned_640 and _b.
+_SHAPE_SHARE = 1.35
 # Lower bound of a registration's error, whatever its residuals say, and the share of the hand's
 # movement by a rotation that becomes an error in every direction.
 _LEAST_SIGMA_M = 5e-5
 _TURNED_SHARE = 0.03
+
+
+Pairs: TypeAlias = tuple[Float64, Indices, Bool]
+"""Each hand point's distance to its partner, m, the partner's index, and if the pair counts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,17 +71,15 @@ class HandMatch:
     """Cursor and hand registered rigidly; the same for both eyes."""
 
     cursor_m: Float64
-    """(M, 3); without what lies beyond the common cut."""
+    """(M, 3)."""
     hand_m: Float64
     """(N, 3); both clouds in one frame."""
-    cursor_near_cut: Bool
-    """(M,)."""
-    hand_is_common: Bool
-    """(N,); False beyond the common cut."""
-    spacing_m: float
-    """Distance between neighbours in the thinned cursor."""
-    tree: cKDTree
-    """Surface of the cursor."""
+    find_pairs: Callable[[Float64], Pairs]
+    """Pair (N, 3) places of the hand's points with the cursor's."""
+    pairs: Pairs
+    """Of the registered hand."""
+    same_points: bool
+    """True if nearly all points are paired one to one, so that both clouds hold the same points."""
     rigid: RigidResult
     """Its target is the cursor, its source the hand."""
     covariance: Float64
@@ -80,31 +95,36 @@ def match_hands(
     hand_cut: Bool | None,
 ) -> HandMatch:
     """Register the hand at t_b to the cursor, (M, 3) and (N, 3) float64 in any common frame."""
-    coarse = register_rigid(
-        describe_surface(hand_m, hand_cut, _COARSE.max_points),
-        describe_surface(cursor_m, cursor_cut, _COARSE.max_points),
-        _COARSE,
-    )
-    common, is_common = hand_m, np.ones(len(hand_m), np.bool_)
-    cut = common_cut(cursor_m, hand_m, cursor_cut, hand_cut, coarse.T_target_source)
+    hand = describe_surface(hand_m, hand_cut, _POINTS)
+    cursor = describe_surface(cursor_m, cursor_cut, _POINTS)
+    T_cursor_hand = register_rigid(hand, cursor, _COARSE).T_target_source
+    tree = KdTree(cursor_m)
+    spacing_m = point_spacing_m(tree, cursor_m[:: 1 + len(cursor_m) // _SPACING_POINTS])
+    near_cut = near_cut_edge(cursor_m, cursor_m, cursor_cut, spacing_m)
+    is_common = np.ones(len(hand_m), np.bool_)
+    cut = common_cut(cursor_m, hand_m, cursor_cut, hand_cut, T_cursor_hand)
     if cut is not None:
-        kept, is_common, cursor_cut, hand_cut = cut
-        cursor_m, cursor_cut = cursor_m[kept], cursor_cut[kept]
-        common, hand_cut = hand_m[is_common], hand_cut[is_common]
-    cursor = describe_surface(cursor_m, cursor_cut, _FINE.max_points)
-    hand = describe_surface(common, hand_cut, _FINE.max_points)
-    fine = register_rigid(hand, cursor, _FINE, coarse.T_target_source)
+        along, limit_m = cut
+        hand_beyond_m = transform(T_cursor_hand, hand.points_m) @ along - limit_m
+        hand = clip_surface(hand, hand_beyond_m, CUT_BAND_M)
+        cursor = clip_surface(cursor, cursor.points_m @ along - limit_m, CUT_BAND_M)
+        is_common = transform(T_cursor_hand, hand_m) @ along <= limit_m
+        near_cut |= cursor_m @ along > limit_m - CUT_BAND_M - spacing_m
+    fine = register_rigid(hand, cursor, _FINE, T_cursor_hand)
     T_cursor_hand = fine.T_target_source
+    find = partial(_pairs, tree, near_cut, is_common, spacing_m)
+    pairs = find(transform(T_cursor_hand, hand_m))
+    partners = pairs[1][pairs[2]]
+    paired_once = np.count_nonzero(np.bincount(partners, minlength=1))
     return HandMatch(
         cursor_m=cursor_m,
         hand_m=hand_m,
-        cursor_near_cut=near_cut_edge(cursor_m, cursor_m, cursor_cut, cursor.spacing_m),
-        hand_is_common=is_common,
-        spacing_m=cursor.spacing_m,
-        tree=cKDTree(cursor_m),
+        find_pairs=find,
+        pairs=pairs,
+        same_points=bool(paired_once > _SAME_POINTS * len(partners)),
         rigid=fine,
-        covariance=motion_covariance(hand, cursor, T_cursor_hand, _FINE),
-        shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE),
+        covariance=motion_covariance(fine.rows, hand, cursor, T_cursor_hand),
+        shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE, fine.rows),
     )
 
 
@@ -127,18 +147,19 @@ def fit_match(
     T_cursor = T_E if T_drawn is None else T_drawn @ T_E
     T_back = np.asarray(np.linalg.inv(T_cursor))
     hand = transform(T_E, match.hand_m)
-    cursor = transform(T_cursor, match.cursor_m)
     registered = transform(T_cursor @ match.rigid.T_target_source, match.hand_m)
-    gap_m, index, kept = _pairs(match, transform(T_back, registered))
-    same_points = len(np.unique(index[kept])) > _SAME_POINTS * np.count_nonzero(kept)
+    gap_m, index, kept = match.pairs
     history = [float(np.mean(gap_m[kept] ** 2))]
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-    R, unturned = _unturned(hand[kept], registered[kept])
-    rigid_fit_m, _ = _fit_pairs(unturned, hand[kept], distance_m, history[0] / 3.0)
-    shift_m = balance(unturned, hand[kept], rigid_fit_m, distance_m)
+    paired = hand[kept]
+    R, unturned = _unturned(paired, registered[kept])
+    rigid_fit_m, _ = _fit_pairs(unturned, paired, distance_m, history[0] / 3.0)
+    shift_m = balance(unturned, paired, rigid_fit_m, distance_m)
     aspect_m = shift_m - rigid_fit_m
-    shape, paired = hand, hand[kept]
+    same_points = match.same_points
     if same_points:
+        shape = predict(hand, shift_m, distance_m, exact=True)
+        cursor = transform(T_cursor, match.cursor_m)
         kept = kept & _is_nearest(index, gap_m)
     while same_points:
         fitted = hand[kept]
@@ -148,7 +169,7 @@ def fit_match(
         R_next, _ = _unturned(shape[kept], cursor[index[kept]])
         centre = shape[kept].mean(axis=0)
         turned = centre + (shape - centre) @ R_next.T
-        gap_m, index, kept = _pairs(match, transform(T_back, turned))
+        gap_m, index, kept = match.find_pairs(transform(T_back, turned))
         kept &= _is_nearest(index, gap_m)
         error_m2 = float(np.mean(gap_m[kept] ** 2))
         if error_m2 >= (1.0 - _GAIN) * history[-1]:
@@ -179,13 +200,18 @@ def _fit_pairs(
 
     With κ = 1 - φ3φ4 + δ the equation gains the column -d for δ and stays linear.
     """
-    A = np.concatenate(
-        [design(cursor_m, hand_m, distance_m, exact=True), -cursor_m[:, :, None]], axis=2
-    ).reshape(-1, 4)
-    normal = A.T @ A
+    phi_4, hand, cursor = 1.0 / distance_m, hand_m.T, cursor_m.T
+    apart = cursor - hand
+    A = np.zeros((4, 3, len(hand_m)))
+    A[0, 0] = A[1, 1] = phi_4 * hand[2] - 1.0
+    A[2, :2] = phi_4 * apart[:2]
+    A[2, 2] = phi_4 * cursor[2] - 1.0
+    A[3] = -cursor
+    rows = A.reshape(4, -1)
+    normal = rows @ rows.T
     normal[3, 3] += variance_m2 * len(hand_m) / _INDEPENDENT_PAIRS / _SIZE_SIGMA**2
-    solution = np.linalg.solve(normal, A.T @ (cursor_m - hand_m).ravel())
-    return solution[:3], 1.0 - solution[2] / distance_m + solution[3]
+    solution = np.linalg.solve(normal, rows @ apart.ravel())
+    return np.asarray(solution[:3]), float(1.0 - solution[2] / distance_m + solution[3])
 
 
 def _covariance(
@@ -208,26 +234,31 @@ def _covariance(
     # A rotation that noise explains is none.
     surplus = 1.0 - 3.0 / max(float(turned_rad @ np.linalg.solve(noise_rad2, turned_rad)), 3.0)
     lever = np.eye(3) - Rotation.from_rotvec(np.sqrt(surplus) * turned_rad).as_matrix()
-    turned = lever @ np.cov(hand_m.T) @ lever.T
+    centred = _centred(hand_m)
+    turned = lever @ (centred.T @ centred / len(hand_m)) @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
     measured = match.covariance[3:, 3:] + _SHAPE_SHARE**2 * match.shape.scatter_m2
     displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
-    gain = np.linalg.inv(design(cursor_m, hand_m, distance_m, exact=True).mean(axis=0))
+    # The rows are linear in the points: their mean is that of the middles.
+    middle_m = np.array([mean_point(cursor_m), mean_point(hand_m)])
+    gain = np.linalg.inv(design(middle_m[:1], middle_m[1:], distance_m, exact=True)[0])
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
 
 
-def _pairs(match: HandMatch, hand_m: Float64) -> tuple[Float64, NDArray[np.intp], Bool]:
-    """Return the distance of each hand point to its partner, the partner, and if the pair counts.
+def _pairs(
+    tree: KdTree, near_cut: Bool, is_common: Bool, spacing_m: float, hand_m: Float64
+) -> Pairs:
+    """Return the pairs of hand points.
 
     Pairs do not count beyond the common cut, beside a cut edge, or much farther apart than most.
     """
-    gap_m, index = nearest(match.tree, hand_m)
-    kept = match.hand_is_common & ~match.cursor_near_cut[index]
-    kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), match.spacing_m)
+    gap_m, index = nearest(tree, hand_m)
+    kept = is_common & ~near_cut[index]
+    kept &= gap_m <= max(_OUTLIER_MEDIANS * float(np.median(gap_m[kept])), spacing_m)
     return gap_m, index, kept
 
 
-def _is_nearest(index: NDArray[np.intp], gap_m: Float64) -> Bool:
+def _is_nearest(index: Indices, gap_m: Float64) -> Bool:
     """Return (N,): True for the nearest of the points that are paired with the same partner.
 
     Of two clouds that hold the same points, the others have lost their partner beyond the cut.
@@ -241,10 +272,12 @@ def _is_nearest(index: NDArray[np.intp], gap_m: Float64) -> Bool:
 
 def _unturned(shape: Float64, partner: Float64) -> tuple[Float64, Float64]:
     """Return the rotation of paired points, and the partners without it, about their centroid."""
-    R = best_rotation(_centred(shape), _centred(partner))
-    return R, partner.mean(axis=0) + _centred(partner) @ R
+    centre = mean_point(partner)
+    centred = partner - centre
+    R = best_rotation(_centred(shape), centred)
+    return R, centre + centred @ R
 
 
 def _centred(points_m: Float64) -> Float64:
-    centred: Float64 = points_m - points_m.mean(axis=0)
+    centred: Float64 = points_m - mean_point(points_m)
     return centred

@@ -12,7 +12,7 @@ from handcal.geometry import transform
 from handcal.types import Bool, Float64
 
 # Points this near the common cut count as beside it.
-_BAND_M = 0.002
+CUT_BAND_M = 0.002
 # Cut edges farther than this from most of them, such as a finger at the image border, are others.
 _ONE_EDGE_M = 0.05
 # A cut edge is not straight: its innermost part counts.
@@ -27,8 +27,8 @@ def common_cut(
     cursor_cut: Bool | None,
     hand_cut: Bool | None,
     T_cursor_hand: Float64,
-) -> tuple[Bool, Bool, Bool, Bool] | None:
-    """Cut two registered clouds by one plane across the forearm.
+) -> tuple[Float64, float] | None:
+    """Find one plane across the forearm by which two registered clouds can be cut.
 
     Parameters
     ----------
@@ -39,9 +39,10 @@ def common_cut(
 
     Returns
     -------
-    tuple of cursor and hand kept, cursor and hand beside a cut edge; or None
-        (M,), (N,), (M,), (N,) bool; None if neither cloud has a cut edge, or it is not across the
-        forearm.
+    tuple of direction and limit, or None
+        The forearm continues along the direction, (3,), of which the limit, m, is the coordinate of
+        the plane, in the cursor's frame; None if neither cloud has a cut edge, or it is not across
+        the forearm.
     """
     clouds = cursor_m, transform(T_cursor_hand, hand_m)
     given = [
@@ -64,8 +65,6 @@ def common_cut(
         if len(at_wrist):
             ends.append(float(np.quantile(at_wrist @ along, _INNERMOST)))
     limit = min(ends)
-    kept = [place <= limit for place in places]
-    if min(float(np.mean(one)) for one in kept) < _LEAST_KEPT:
+    if min(float(np.mean(place <= limit)) for place in places) < _LEAST_KEPT:
         return None
-    cut = [old | (place > limit - _BAND_M) for old, place in zip(given, places, strict=True)]
-    return kept[0], kept[1], cut[0], cut[1]
+    return along, limit

@@ -83,19 +83,20 @@ def balance(cursor_m: Float64, hand_m: Float64, shift_m: Float64, distance_m: fl
     distance_m : float
         z(C0→S).
     """
-    drawn = distance_m * cursor_m[:, :2] / cursor_m[:, 2:]
+    x, y, z = np.ascontiguousarray(hand_m.T)
+    drawn_x, drawn_y = distance_m * (cursor_m[:, :2] / cursor_m[:, 2:]).T
     for _ in range(_BALANCE_STEPS):
-        ray = hand_m - shift_m
-        ratio = (distance_m - shift_m[2]) / ray[:, 2]
-        slope = ray[:, :2] / ray[:, 2:]
-        left = shift_m[:2] + ratio[:, None] * ray[:, :2] - drawn
-        by_hand = np.zeros((len(hand_m), 2, 3))
-        by_hand[:, 0, 0] = by_hand[:, 1, 1] = ratio
-        by_hand[:, :, 2] = -ratio[:, None] * slope
-        by_shift = -by_hand
-        by_shift[:, 0, 0] += 1.0
-        by_shift[:, 1, 1] += 1.0
-        by_shift[:, :, 2] -= slope
-        normal = np.einsum("nki,nkj->ij", by_hand, by_shift)
-        shift_m = shift_m - np.linalg.solve(normal, np.einsum("nki,nk->i", by_hand, left))
+        depth_m = z - shift_m[2]
+        ratio = (distance_m - shift_m[2]) / depth_m
+        slope_x, slope_y = (x - shift_m[0]) / depth_m, (y - shift_m[1]) / depth_m
+        # J_s is the ratio times G = [[1, 0, -slope_x], [0, 1, -slope_y]]; u_φ(s) changes with φ by
+        # 1 minus the ratio times G.
+        left_x = ratio * (shift_m[0] + ratio * (x - shift_m[0]) - drawn_x)
+        left_y = ratio * (shift_m[1] + ratio * (y - shift_m[1]) - drawn_y)
+        weight = ratio * (1.0 - ratio)
+        wx, wy = -(weight @ slope_x), -(weight @ slope_y)
+        w, wz = weight.sum(), weight @ (slope_x**2 + slope_y**2)
+        normal = np.array([[w, 0.0, wx], [0.0, w, wy], [wx, wy, wz]])
+        wanted = [left_x.sum(), left_y.sum(), -(left_x @ slope_x + left_y @ slope_y)]
+        shift_m = shift_m - np.linalg.solve(normal, wanted)
     return shift_m

@@ -6,8 +6,8 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from small_gicp import KdTree
 
 from handcal.geometry import rigid, transform
 from handcal.register.surface import nearest
@@ -55,7 +55,7 @@ def matched_pairs(
     cursor, hand = cursor_m[cursor_index], hand_m[hand_index]
     back = Rotation.from_rotvec(rotation_rad).inv().as_matrix()
     moved = transform(rigid(back), hand - hand.mean(axis=0)) + cursor.mean(axis=0)
-    tree = cKDTree(cursor)
+    tree = KdTree(cursor)
     for _ in range(_STEPS):
         _, partner = nearest(tree, moved)
         moved += np.median(cursor[partner] - moved, axis=0)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from scipy.spatial import cKDTree
+from small_gicp import KdTree
 
 from handcal.errors import HandcalError
 from handcal.geometry import rigid, transform
@@ -62,7 +62,7 @@ def solve_paper(
         Called before each iteration; any exception it raises ends the solving.
     """
     phi_4 = 1.0 / distance_m
-    tree = cKDTree(cursor_m)
+    tree = KdTree(cursor_m)
     shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
     moved = hand_m - shift_m
     history: list[float] = []
@@ -97,7 +97,7 @@ def solve_linear(
     cursor_m: Float64, hand_m: Float64, distance_m: float, checkpoint: Checkpoint = lambda: None
 ) -> Iterated:
     """Solve the paper's model with all three rows of each pair; parameters as in `solve_paper`."""
-    tree = cKDTree(cursor_m)
+    tree = KdTree(cursor_m)
     shift_m = hand_m.mean(axis=0) - cursor_m.mean(axis=0)
     moved = hand_m - shift_m
     history: list[float] = []
@@ -122,7 +122,7 @@ def solve_icp(
     UQ's translation is -φ at E's origin. This is the paper's baseline. Parameters as in
     `solve_paper`.
     """
-    tree = cKDTree(cursor_m)
+    tree = KdTree(cursor_m)
     T = rigid(translation_m=cursor_m.mean(axis=0) - hand_m.mean(axis=0))
     history: list[float] = []
     while True:
@@ -196,7 +196,7 @@ def best_rotation(source_m: Float64, target_m: Float64) -> Float64:
     return turn
 
 
-def _pair(tree: cKDTree, cursor_m: Float64, moved_m: Float64) -> tuple[Float64, float]:
+def _pair(tree: KdTree, cursor_m: Float64, moved_m: Float64) -> tuple[Float64, float]:
     distance_m, index = nearest(tree, moved_m)
     return cursor_m[index], float(distance_m @ distance_m) / len(moved_m)
 

@@ -2,7 +2,7 @@
 
 A hand seen from one side is a sheet. In its interior, nearest neighbours measure only the distance
 of the sheets along their normals; sliding shows only at the outline. So interior pairs count along
-the normal and outline pairs in full, which converges in about ten Gauss-Newton steps where
+the normal and outline pairs in full, which converges in a few Gauss-Newton steps where
 point-to-point ICP needs a hundred (see docs/registration.md). Pairs are searched from both clouds,
 so that the inward bias of nearest neighbours at an outline cancels, and pairs that end on a cut
 edge are dropped, because the hand continues there.
@@ -10,25 +10,27 @@ edge are dropped, because the hand continues there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from small_gicp import KdTree
 
 from handcal.geometry import invert, rigid, transform
-from handcal.register.surface import Indices, Surface, cover, nearest
+from handcal.register.surface import Indices, Surface, cube_means, mean_point, nearest
 from handcal.types import Float64
 
 # Pairs are searched again at every step, which lets them slide with the motion they measure, so
 # they hold less information than their number says. Fitted to pairs of disjoint samples of real
 # frames, color_aligned_640; simulated clouds agree.
 PAIRING_FACTOR = 2.4
-# Errors within a patch of this radius count as one: the camera's matching windows, and fingers.
-_PATCH_M = 0.015
+# Errors within a patch of this width count as one: the camera's matching windows, and fingers.
+_PATCH_M = 0.022
 # Unknown place of a patch of outline, in distances between the points of both clouds: the outline
 # is known no better than it is sampled, and edges grow fat.
-_OUTLINE_GAPS = 0.5
+_OUTLINE_GAPS = 0.1
+# After this many steps they become shorter, so that pairs that change to and fro come to rest.
+_FULL_STEPS = 12
 # Lower bound of each variance, so that exact clouds have one: 10 µm, and 10 µrad.
 _EXACT_M2 = 1e-10
 
@@ -39,68 +41,17 @@ class RigidSettings:
 
     max_points: int = 1500
     """Number of points to which each cloud is thinned."""
-    max_interior: int = 500
-    """Interior points used from each cloud in every step."""
+    start_interior: int = 150
+    """Interior points used from each cloud until a step is below `near_m`, and then all. With a
+    known start all are used at once."""
+    near_m: float = 1e-3
+    """Step, of a point of the hand, from which on all interior points are used."""
     max_iterations: int = 40
     tolerance_m: float = 3e-5
     """The iteration stops when a step moves no point of the hand by more than this."""
     outlier_m: float = 0.004
     """Distance at which an outline pair has a weight of one quarter (Geman-McClure), once most
     pairs are closer than a third of it."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RigidResult:
-    """A rigid registration."""
-
-    T_target_source: Float64
-    """(4, 4)."""
-    information: Float64
-    """(6, 6); final Gauss-Newton matrix for a rotation (rad) about the source's centroid and
-    a translation (m), for residuals of unit variance."""
-    history_m2: Float64
-    """(iterations,); weighted mean squared residual at each iteration."""
-    converged: bool
-    stop_reason: str
-
-
-def register_rigid(
-    source: Surface,
-    target: Surface,
-    settings: RigidSettings = RigidSettings(),
-    T_start: Float64 | None = None,
-) -> RigidResult:
-    """Register `source` to `target`.
-
-    Parameters
-    ----------
-    source, target : Surface
-        From `describe_surface`.
-    settings : RigidSettings
-    T_start : (4, 4) float64, optional
-        Initial T_target_source; by default the means coincide.
-    """
-    offset_m = target.points_m.mean(axis=0) - source.points_m.mean(axis=0)
-    T_target_source = rigid(translation_m=offset_m) if T_start is None else T_start
-    reach_m = np.sqrt(source.points_m.var(axis=0).sum())
-    history: list[float] = []
-    information = np.eye(6)
-    reason = None
-    for _ in range(settings.max_iterations):
-        T_target_source, information, cost_m2, step = _step(
-            source, target, T_target_source, settings
-        )
-        history.append(cost_m2)
-        if np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:]) < settings.tolerance_m:
-            reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
-            break
-    return RigidResult(
-        T_target_source,
-        information,
-        np.array(history),
-        reason is not None,
-        reason or f"limit of {settings.max_iterations} iterations",
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +75,78 @@ class Rows:
     @property
     def jacobian(self) -> Float64:
         """(N, 6); of the gaps with respect to a rotation about the centre and a translation."""
-        return np.hstack([np.cross(self.at_m - self.centre_m, self.toward), self.toward])
+        at, to = (self.at_m - self.centre_m).T, self.toward.T
+        J = np.empty((6, len(self.at_m)))
+        J[0] = at[1] * to[2] - at[2] * to[1]
+        J[1] = at[2] * to[0] - at[0] * to[2]
+        J[2] = at[0] * to[1] - at[1] * to[0]
+        J[3:] = to
+        return J.T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidResult:
+    """A rigid registration."""
+
+    T_target_source: Float64
+    """(4, 4)."""
+    information: Float64
+    """(6, 6); final Gauss-Newton matrix for a rotation (rad) about the source's centroid and
+    a translation (m), for residuals of unit variance."""
+    history_m2: Float64
+    """(iterations,); weighted mean squared residual at each iteration."""
+    converged: bool
+    stop_reason: str
+    rows: Rows
+    """Pairs of the last step, with the gaps that it left."""
+
+
+def register_rigid(
+    source: Surface,
+    target: Surface,
+    settings: RigidSettings = RigidSettings(),
+    T_start: Float64 | None = None,
+) -> RigidResult:
+    """Register `source` to `target`.
+
+    Parameters
+    ----------
+    source, target : Surface
+        From `describe_surface`.
+    settings : RigidSettings
+    T_start : (4, 4) float64, optional
+        Initial T_target_source; by default the means coincide.
+    """
+    offset_m = mean_point(target.points_m) - mean_point(source.points_m)
+    T_target_source = rigid(translation_m=offset_m) if T_start is None else T_start
+    reach_m = np.sqrt(source.points_m.var(axis=0).sum())
+    history: list[float] = []
+    information = np.eye(6)
+    reason = None
+    is_near = T_start is not None
+    for _ in range(settings.max_iterations):
+        T_target_source, information, cost_m2, step, rows = _step(
+            source,
+            target,
+            T_target_source,
+            settings,
+            None if is_near else settings.start_interior,
+            1.0 / max(len(history) - _FULL_STEPS, 1),
+        )
+        history.append(cost_m2)
+        length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
+        if is_near and length_m < settings.tolerance_m:
+            reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
+            break
+        is_near = is_near or bool(length_m < settings.near_m)
+    return RigidResult(
+        T_target_source,
+        information,
+        np.array(history),
+        reason is not None,
+        reason or f"limit of {settings.max_iterations} iterations",
+        rows,
+    )
 
 
 def registration_rows(
@@ -133,6 +155,7 @@ def registration_rows(
     T_target_source: Float64,
     settings: RigidSettings,
     bent_m: Float64 | None = None,
+    max_interior: int | None = None,
 ) -> Rows:
     """Pair two surfaces at a given pose.
 
@@ -143,12 +166,15 @@ def registration_rows(
     settings : RigidSettings
     bent_m : (N, 3) float64, optional
         Places of the source's points, if its shape is changed.
+    max_interior : int, optional
+        Number of interior points used from each cloud; by default all.
     """
     R = T_target_source[:3, :3]
     source_m = source.points_m if bent_m is None else bent_m
     trees = (source.tree, source.outline_tree)
     if bent_m is not None:
-        trees = cKDTree(bent_m), cKDTree(bent_m[source.outline])
+        outline_tree = KdTree(bent_m[source.outline]) if len(source.outline) else None
+        trees = KdTree(bent_m), outline_tree
     moved = transform(T_target_source, source_m)
     outward = source.outward @ R.T
     T_source_target = invert(T_target_source)
@@ -156,40 +182,41 @@ def registration_rows(
         source, target, moved, T_source_target, outward, settings, trees[1]
     )
     inner, inner_partner, normal = _interior_pairs(
-        source, target, moved, T_source_target, R, settings, trees[0]
+        source, target, moved, T_source_target, R, trees[0], max_interior
     )
     first = np.concatenate([outline, inner])
     second = np.concatenate([partner, inner_partner])
     direction = np.concatenate([toward, normal])
+    at = moved.take(first, axis=0)
     return Rows(
-        centre_m=moved.mean(axis=0),
-        at_m=moved[first],
+        centre_m=mean_point(moved),
+        at_m=at,
         index=first,
         outlines=len(outline),
         toward=direction,
-        gap_m=np.sum((moved[first] - target.points_m[second]) * direction, axis=1),
+        gap_m=np.einsum("nd,nd->n", at - target.points_m.take(second, axis=0), direction),
         weight=np.concatenate([weight, np.ones(len(inner))]),
     )
 
 
 def motion_covariance(
-    source: Surface, target: Surface, T_target_source: Float64, settings: RigidSettings
+    rows: Rows, source: Surface, target: Surface, T_target_source: Float64
 ) -> Float64:
     """Return the covariance (6, 6) of a registration: rotation about the mean, and translation.
 
     It is estimated from the residuals, of which those in one patch of the surface may be
     correlated in any way (cluster-robust, Liang & Zeger 1986).
     """
-    rows = registration_rows(source, target, T_target_source, settings)
-    J = rows.weight[:, None] * rows.jacobian
-    inverse = np.linalg.inv(J.T @ rows.jacobian + 1e-9 * np.eye(6))
+    jacobian = rows.jacobian
+    J = rows.weight[:, None] * jacobian
+    inverse = np.linalg.inv(J.T @ jacobian + 1e-9 * np.eye(6))
     moved = transform(T_target_source, source.points_m)
-    centres = moved[cover(moved, _PATCH_M)]
-    _, patch = nearest(cKDTree(centres), rows.at_m)
+    centres = cube_means(moved, _PATCH_M)
+    _, patch = nearest(KdTree(centres), rows.at_m)
     count = len(centres)
-    scores, outlines = np.zeros((2, count, 6))
-    np.add.at(scores, patch, rows.gap_m[:, None] * J)
-    np.add.at(outlines, patch[: rows.outlines], J[: rows.outlines])
+    is_of = (patch == np.arange(count)[:, None]).astype(np.float64)
+    scores = is_of @ (rows.gap_m[:, None] * J)
+    outlines = is_of[:, : rows.outlines] @ J[: rows.outlines]
     apart_m, _ = nearest(target.tree, moved)
     unknown_m = _OUTLINE_GAPS * float(np.median(apart_m))
     meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores.T @ scores
@@ -198,19 +225,33 @@ def motion_covariance(
 
 
 def _step(
-    source: Surface, target: Surface, T_target_source: Float64, settings: RigidSettings
-) -> tuple[Float64, Float64, float, Float64]:
-    """Take one Gauss-Newton step; return transform, information, mean squared residual, step."""
-    rows = registration_rows(source, target, T_target_source, settings)
+    source: Surface,
+    target: Surface,
+    T_target_source: Float64,
+    settings: RigidSettings,
+    max_interior: int | None,
+    share: float,
+) -> tuple[Float64, Float64, float, Float64, Rows]:
+    """Take a share of a Gauss-Newton step.
+
+    Returned are the transform, information, mean squared residual, step and rows.
+    """
+    rows = registration_rows(source, target, T_target_source, settings, max_interior=max_interior)
     J, weight, gap_m = rows.jacobian, rows.weight, rows.gap_m
     information = J.T @ (weight[:, None] * J)
     gradient = J.T @ (weight * gap_m)
-    step = np.asarray(-np.linalg.solve(information + 1e-9 * np.eye(6), gradient), np.float64)
+    step = -share * np.asarray(np.linalg.solve(information + 1e-9 * np.eye(6), gradient))
     turn = rigid(Rotation.from_rotvec(step[:3]).as_matrix())
     centre = rows.centre_m
     about_centre = rigid(translation_m=centre + step[3:]) @ turn @ rigid(translation_m=-centre)
     cost_m2 = float(weight @ gap_m**2 / weight.sum())
-    return about_centre @ T_target_source, information, cost_m2, step
+    left = replace(
+        rows,
+        at_m=transform(about_centre, rows.at_m),
+        centre_m=centre + step[3:],
+        gap_m=gap_m + J @ step,
+    )
+    return about_centre @ T_target_source, information, cost_m2, step, left
 
 
 def _outline_pairs(
@@ -220,10 +261,10 @@ def _outline_pairs(
     T_source_target: Float64,
     outward: Float64,
     settings: RigidSettings,
-    source_outline_tree: cKDTree,
+    source_outline_tree: KdTree | None,
 ) -> tuple[Indices, Indices, Float64, Float64]:
     """Return pairs of outline points found from both clouds: indices, mean outward, weights."""
-    if not (len(source.outline) and len(target.outline)):
+    if source_outline_tree is None or target.outline_tree is None:
         none = np.empty(0, dtype=np.intp)
         return none, none, np.empty((0, 3)), np.empty(0)
     d_1, i_1 = nearest(target.outline_tree, moved[source.outline])
@@ -233,7 +274,7 @@ def _outline_pairs(
     second = np.concatenate([target.outline[i_1], target.outline])
     distance_m = np.concatenate([d_1, d_2])
     toward = outward[first] + target.outward[second]
-    agreement = 0.5 * np.linalg.norm(toward, axis=1)
+    agreement = 0.5 * np.sqrt(np.einsum("nd,nd->n", toward, toward))
     toward /= np.maximum(2.0 * agreement, 1e-9)[:, None]
     scale_m = max(settings.outlier_m, 3.0 * float(np.median(distance_m)))
     weight = np.concatenate([source.outline_weight, target.outline_weight])
@@ -247,16 +288,24 @@ def _interior_pairs(
     moved: Float64,
     T_source_target: Float64,
     R: Float64,
-    settings: RigidSettings,
-    source_tree: cKDTree,
+    source_tree: KdTree,
+    max_interior: int | None,
 ) -> tuple[Indices, Indices, Float64]:
     """Return pairs found from both clouds: source and target indices, target normals."""
-    count = settings.max_interior
-    _, i_1 = nearest(target.tree, moved[:count])
+    used = [
+        np.arange(0, count, 1 if max_interior is None else 1 + (count - 1) // max_interior)
+        for count in (len(source.points_m), len(target.points_m))
+    ]
+    _, i_1 = nearest(target.tree, moved[used[0]])
     keep_1 = ~target.near_cut[i_1]
-    _, i_2 = nearest(source_tree, transform(T_source_target, target.points_m[:count]))
+    _, i_2 = nearest(source_tree, transform(T_source_target, target.points_m[used[1]]))
     keep_2 = ~source.near_cut[i_2]
-    first = np.concatenate([np.flatnonzero(keep_1), i_2[keep_2]])
-    second = np.concatenate([i_1[keep_1], np.flatnonzero(keep_2)])
-    normals = np.concatenate([target.normals[i_1[keep_1]], source.normals[i_2[keep_2]] @ R.T])
+    first = np.concatenate([used[0][keep_1], i_2[keep_2]])
+    second = np.concatenate([i_1[keep_1], used[1][keep_2]])
+    # On a curved surface a point lies below its partner's tangent plane; the mean of both normals
+    # has no such bias (symmetric ICP, Rusinkiewicz 2019).
+    normals = target.normals.take(second, axis=0)
+    others = (source.normals @ R.T).take(first, axis=0)
+    normals += np.copysign(1.0, np.einsum("nd,nd->n", normals, others))[:, None] * others
+    normals /= np.sqrt(np.einsum("nd,nd->n", normals, normals))[:, None]
     return first, second, normals

@@ -12,21 +12,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
-from scipy.spatial import cKDTree
+from small_gicp import KdTree
 
 from handcal.geometry import invert, transform
 from handcal.register.rcicp import best_rigid
-from handcal.register.rigid import RigidSettings, registration_rows
-from handcal.register.surface import Surface, cover, nearest
+from handcal.register.rigid import RigidSettings, Rows, registration_rows
+from handcal.register.surface import Indices, Surface, cube_means
 from handcal.types import Float64, brief, freeze
 
 _NODE_SPACING_M = 0.018
+_NODE_CUBE_M = 0.030
 # Each point moves with the mean of this many nodes, weighted by their distance.
 _NODES_PER_POINT = 4
 # Weight of the prior that neighbouring nodes move alike, against the pairs of one node.
 _STIFFNESS = 0.1
-_STEPS = 3
+_STEPS = 2
 # Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
 # to simulated clouds (2.4 to 6.5).
 _NOISE_FACTOR = 4.5
@@ -74,6 +74,7 @@ def measure_shape_change(
     hand: Surface,
     T_hand_cursor: Float64,
     settings: RigidSettings = RigidSettings(),
+    rows: Rows | None = None,
 ) -> ShapeChange:
     """Measure how the shape of registered hands differs.
 
@@ -84,34 +85,36 @@ def measure_shape_change(
         From `register_rigid`.
     settings : RigidSettings
         Of the search for pairs.
+    rows : Rows, optional
+        Of the registration, if they are known.
     """
     points = cursor.points_m
-    nodes = points[cover(points, _NODE_SPACING_M)]
+    nodes = cube_means(points, _NODE_CUBE_M)
     count = len(nodes)
-    tree = cKDTree(nodes)
-    per_point = min(_NODES_PER_POINT, count)
-    distance_m, node = nearest(tree, points, per_point)
-    distance_m, node = distance_m.reshape(-1, per_point), node.reshape(-1, per_point)
-    share = np.exp(-0.5 * (distance_m / _NODE_SPACING_M) ** 2)
-    share /= share.sum(axis=1, keepdims=True)
-    prior = np.kron(_laplacian(nodes, tree), np.eye(3)) + 1e-3 * np.eye(3 * count)
+    node, share = _shares(nodes, points)
+    if rows is None:
+        rows = registration_rows(cursor, hand, T_hand_cursor, settings)
+    stiffness = _STIFFNESS * _laplacian(nodes) + 1e-4 * np.eye(count)
     moved: Float64 = np.zeros((count, 3))
-    for _ in range(_STEPS):
-        bent = points + np.einsum("nk,nkd->nd", share, moved[node])
-        rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
+    for step in range(_STEPS):
+        point_moved = np.einsum("nk,nkd->nd", share, moved[node])
+        if step:
+            bent = points + point_moved
+            rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
         toward = rows.toward @ T_hand_cursor[:3, :3]
-        columns = (3 * node[rows.index][:, :, None] + np.arange(3)).ravel()
-        values = (share[rows.index][:, :, None] * toward[:, None]).ravel()
-        starts = np.arange(len(toward) + 1) * 3 * per_point
-        A = csr_matrix((values, columns, starts), (len(toward), 3 * count))
-        weighted = (diags(rows.weight) @ A).T.tocsr()
-        before = moved
-        normal = np.asarray((weighted @ A).toarray()) + _STIFFNESS * len(toward) / count * prior
-        wanted = np.asarray(weighted @ (A @ moved.ravel() - rows.gap_m))
+        before_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - rows.gap_m
+        measured, wanted = _normal_equation(
+            node, share, rows.index, toward, rows.weight, before_m, count
+        )
+        normal = measured.copy()
+        for i in range(3):
+            normal[i::3, i::3] += len(toward) / count * stiffness
         moved = np.asarray(np.linalg.solve(normal, wanted).reshape(-1, 3), np.float64)
-    left_m = A @ (moved - before).ravel() + rows.gap_m
+    point_moved = np.einsum("nk,nkd->nd", share, moved[node])
+    left_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - before_m
     variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
-    scatter = np.linalg.solve(normal, np.linalg.solve(normal, (weighted @ A).toarray()).T)
+    inverse = np.linalg.inv(normal)
+    scatter = np.sum((inverse @ measured) * inverse)
     cut_m = points[cursor.near_cut]
     T_moved = best_rigid(nodes, nodes + moved)
     return ShapeChange(
@@ -119,8 +122,46 @@ def measure_shape_change(
         moved_m=transform(invert(T_moved), nodes + moved) - nodes,
         toward_arm=(cut_m.mean(axis=0) if len(cut_m) else points.mean(axis=0))
         - points.mean(axis=0),
-        noise_m=float(np.sqrt(variance_m2 * np.trace(scatter) / count)),
+        noise_m=float(np.sqrt(variance_m2 * scatter / count)),
     )
+
+
+def _shares(nodes_m: Float64, points_m: Float64) -> tuple[Indices, Float64]:
+    """Return the nodes nearest to each point and their shares in its movement, (N, K) each."""
+    index, distance_m2 = KdTree(nodes_m).batch_knn_search(
+        points_m, min(_NODES_PER_POINT, len(nodes_m))
+    )
+    share = np.exp(-0.5 * distance_m2 / _NODE_SPACING_M**2)
+    return index.view(np.intp), share / share.sum(axis=1, keepdims=True)
+
+
+def _normal_equation(
+    node: Indices,
+    share: Float64,
+    point: Indices,
+    toward: Float64,
+    weight: Float64,
+    wanted_m: Float64,
+    count: int,
+) -> tuple[Float64, Float64]:
+    """Return the normal matrix (3K, 3K) and right side (3K,) of the K nodes' movements.
+
+    A row says that its point moves by `wanted_m` along `toward`. The rows of one point are added
+    first, as they share its nodes.
+    """
+    places = (node[:, :, None] * count + node[:, None]).ravel()
+    products = share[:, :, None] * share[:, None]
+    weighted = toward * weight[:, None]
+    normal = np.empty((count, 3, count, 3))
+    wanted = np.empty((count, 3))
+    for i in range(3):
+        at_point = np.bincount(point, weighted[:, i] * wanted_m, len(node))
+        wanted[:, i] = np.bincount(node.ravel(), (share * at_point[:, None]).ravel(), count)
+        for j in range(i + 1):
+            at_point = np.bincount(point, weighted[:, i] * toward[:, j], len(node))
+            block = np.bincount(places, (products * at_point[:, None, None]).ravel(), count**2)
+            normal[:, i, :, j] = normal[:, j, :, i] = block.reshape(count, count)
+    return normal.reshape(3 * count, 3 * count), wanted.ravel()
 
 
 def change_text(change: ShapeChange, R_D: Float64) -> str:
@@ -177,12 +218,11 @@ def _part(across: Float64, along: Float64, at_across: float, at_along: float) ->
     return "wrist" if at_along < 0.6 * float(along.min()) else "palm"
 
 
-def _laplacian(nodes_m: Float64, tree: cKDTree) -> Float64:
+def _laplacian(nodes_m: Float64) -> Float64:
     """Return the graph Laplacian of neighbouring nodes, (K, K), of mean diagonal 1."""
-    first, second = tree.query_pairs(2.0 * _NODE_SPACING_M, output_type="ndarray").T
-    apart_m = np.linalg.norm(nodes_m[first] - nodes_m[second], axis=1)
-    laplacian = np.zeros((len(nodes_m), len(nodes_m)))
-    laplacian[first, second] = -np.exp(-0.5 * (apart_m / _NODE_SPACING_M) ** 2)
-    laplacian += laplacian.T
-    np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
+    apart_m2 = np.sum((nodes_m[:, None] - nodes_m) ** 2, axis=2)
+    weight = np.exp(-0.5 * apart_m2 / _NODE_SPACING_M**2)
+    weight[apart_m2 > (2.0 * _NODE_SPACING_M) ** 2] = 0.0
+    np.fill_diagonal(weight, 0.0)
+    laplacian = np.diag(weight.sum(axis=1)) - weight
     return np.asarray(laplacian / max(float(np.mean(np.diag(laplacian))), 1e-9))

@@ -7,7 +7,8 @@ import pytest
 
 from handcal.lab.bench.trials import trial_alignment
 from handcal.lab.study.trials import solve_trial
-from handcal.register.cut import common_cut
+from handcal.register.cut import CUT_BAND_M, common_cut
+from handcal.register.surface import clip_surface, describe_surface, nearest
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 from handcal.types import Bool, Float64
 
@@ -47,7 +48,8 @@ def test_both_clouds_end_at_the_same_place() -> None:
     made = trial_alignment(0, 0.0, replace(MAKING, cursor_forearm_m=0.02, shift_max_m=1e-6))
     found = common_cut(made.cursor_m, made.hand_m, made.cursor_cut, made.hand_cut, np.eye(4))
     assert found is not None
-    cursor_kept, hand_kept, cursor_cut, hand_cut = found
+    along, limit_m = found
+    cursor_kept, hand_kept = made.cursor_m @ along <= limit_m, made.hand_m @ along <= limit_m
     assert cursor_kept.mean() > 0.95
     assert 0.6 < hand_kept.mean() < 0.95
     toward = made.hand_m[made.hand_cut].mean(axis=0) - made.hand_m.mean(axis=0)
@@ -56,8 +58,17 @@ def test_both_clouds_end_at_the_same_place() -> None:
         for cloud in (made.cursor_m[cursor_kept], made.hand_m[hand_kept])
     ]
     assert ends[0] == pytest.approx(ends[1], abs=0.004)
-    assert cursor_cut[cursor_kept].any()
-    assert hand_cut[hand_kept].any()
+
+    surface = describe_surface(made.hand_m, made.hand_cut, 1000)
+    clipped = clip_surface(surface, surface.points_m @ along - limit_m, CUT_BAND_M)
+    place = clipped.points_m @ along
+    assert place.max() <= limit_m
+    assert clipped.near_cut[place > limit_m - CUT_BAND_M].all()
+    assert not clipped.near_cut[clipped.outline].any()
+    assert 0.6 * len(surface.points_m) < len(clipped.points_m) < len(surface.points_m)
+    distance_m, index = nearest(clipped.tree, clipped.points_m)
+    assert not distance_m.any()
+    np.testing.assert_array_equal(index, np.arange(len(clipped.points_m)))
 
 
 def test_a_cut_that_is_not_across_the_forearm_is_left_alone() -> None:

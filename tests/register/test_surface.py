@@ -1,8 +1,19 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from handcal.errors import HandError
-from handcal.register.surface import Surface, describe_surface, near_cut_edge, nearest
+from handcal.geometry import rigid, transform
+from handcal.register.surface import (
+    Surface,
+    describe_surface,
+    near_cut_edge,
+    nearest,
+    thin,
+    thinnest,
+)
 from handcal.types import Bool, Float64
 
 PITCH_M = 0.003
@@ -70,11 +81,17 @@ def test_near_cut_edge_knows_nothing_without_cuts(square_m: Float64) -> None:
 
 def test_thinning_takes_some_of_the_points_always_the_same(square_m: Float64) -> None:
     one, again = (describe_surface(square_m, None, 300) for _ in range(2))
-    assert len(one.points_m) == 300
-    assert set(map(tuple, one.points_m)) <= set(map(tuple, square_m))
+    assert 150 < len(one.points_m) < 450
+    # Each is the mean of its own points, and the square keeps its middle.
+    assert len(set(map(tuple, one.points_m.round(9)))) == len(one.points_m)
+    np.testing.assert_allclose(one.points_m[:, 2], 0.5)
+    np.testing.assert_allclose(one.points_m.mean(axis=0), square_m.mean(axis=0), atol=PITCH_M)
+    assert _from_border_m(one.points_m).min() >= -1e-12
     np.testing.assert_array_equal(one.points_m, again.points_m)
     np.testing.assert_array_equal(one.outline, again.outline)
-    assert one.spacing_m == pytest.approx(PITCH_M * np.sqrt(len(square_m) / 300), rel=0.3)
+    assert one.spacing_m == pytest.approx(
+        PITCH_M * np.sqrt(len(square_m) / len(one.points_m)), rel=0.3
+    )
 
 
 def test_a_surface_wholly_beside_cuts_is_refused(square_m: Float64) -> None:
@@ -83,7 +100,31 @@ def test_a_surface_wholly_beside_cuts_is_refused(square_m: Float64) -> None:
 
 
 def test_nearest(square: Surface) -> None:
-    distance_m, index = nearest(square.tree, np.array([[0.0, 0.0, 0.5], [9.0, 0.0, 0.5]]), 1, 0.1)
+    distance_m, index = nearest(square.tree, np.array([[0.0, 0.0, 0.5], [9.0, 0.117, 0.5]]))
     assert distance_m[0] == 0.0
     np.testing.assert_array_equal(square.points_m[index[0]], [0.0, 0.0, 0.5])
-    assert np.isinf(distance_m[1])
+    assert distance_m[1] == pytest.approx(9.0 - PITCH_M * (SIZE - 1))
+
+
+def test_normals_of_any_scatter() -> None:
+    """The closed form agrees with LAPACK where the least spread is clearly the least."""
+    rng = np.random.default_rng(0)
+    axes = Rotation.random(200, rng=rng).as_matrix()
+    spread = rng.uniform(0.1, 1.0, (200, 3)) * [0.1, 1.0, 1.0] * 1e-5
+    around = np.einsum("nij,nj,nkj->nik", axes, spread, axes)
+    normals, least = thinnest(around)
+    values, vectors = np.linalg.eigh(around)
+    np.testing.assert_allclose(least, values[:, 0], rtol=1e-6)
+    agreement = np.abs(np.einsum("nd,nd->n", normals, vectors[:, :, 0]))
+    assert agreement.min() > 1.0 - 1e-6
+    assert np.isfinite(thinnest(np.zeros((1, 3, 3)))[0]).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 6))
+def test_thinning_does_not_depend_on_the_frame(pose: tuple[float, ...]) -> None:
+    T = rigid(pose[:3], pose[3:])
+    cloud_m = np.random.default_rng(0).gamma(2.0, 0.01, (3000, 3)) * [3.0, 2.0, 0.05]
+    once, again = thin(cloud_m, 400), thin(transform(T, cloud_m), 400)
+    np.testing.assert_allclose(again, transform(T, once), atol=1e-9)
+    assert 200 < len(once) < 700

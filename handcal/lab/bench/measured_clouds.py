@@ -11,14 +11,12 @@ from handcal.lab.bench.trials import (
     Measured,
     collect_errors,
     mean_length_mm,
+    measured_alignment,
     run_trials,
-    trial_alignment,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
 from handcal.progress import Progress
-from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 
-_FOREARM_M = 0.02, 0.06
 _CUT_SIGMA_M = 0.0015
 _SIGMA_M = 0.0005, 0.002
 _ANGLE_MAX_DEG = 9.0
@@ -29,7 +27,7 @@ def measure_cuts(settings: BenchSettings, progress: Progress) -> Measured:
 
     def solve(angle_deg: float, trial: int) -> Errors:
         rng = np.random.default_rng([trial, 1])
-        made = _measured(rng, trial, angle_deg, _CUT_SIGMA_M, settings.points)
+        made = measured_alignment(rng, trial, angle_deg, _CUT_SIGMA_M, settings.points)
         error_m = solve_trial(made, "consistent").shift_m - made.shift_m
         return {"floor": floor_error_m(made, exact=True), "consistent": error_m}
 
@@ -60,7 +58,7 @@ def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
     def solve(trial: int) -> float:
         rng = np.random.default_rng([trial, 2])
         angle_deg, sigma_m = rng.uniform(0.0, _ANGLE_MAX_DEG), rng.uniform(*_SIGMA_M)
-        made = _measured(rng, trial, angle_deg, sigma_m, settings.points)
+        made = measured_alignment(rng, trial, angle_deg, sigma_m, settings.points)
         solved = solve_trial(made, "consistent")
         error_m = solved.shift_m - made.shift_m
         return float(error_m @ np.linalg.solve(solved.covariance_m2, error_m))
@@ -71,18 +69,3 @@ def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
         [BenchFigure("normalised squared error, mean", mean, "", at_least=2.4, at_most=3.6)],
         {"trials": len(squares), "mean": mean, "median": float(np.median(squares))},
     )
-
-
-def _measured(
-    rng: np.random.Generator, trial: int, angle_deg: float, sigma_m: float, points: int
-) -> SimulatedAlignment:
-    """Return an alignment whose forearms are cut 20 to 60 mm below the wrist."""
-    cursor_forearm_m, hand_forearm_m = rng.uniform(*_FOREARM_M, 2)
-    making = AlignmentSettings(
-        count=points,
-        resample=True,
-        depth_sigma_m=sigma_m,
-        cursor_forearm_m=cursor_forearm_m,
-        hand_forearm_m=hand_forearm_m,
-    )
-    return trial_alignment(trial, angle_deg, making)

@@ -13,6 +13,7 @@ from handcal.lab.bench.delivery import measure_delivery
 from handcal.lab.bench.measured_clouds import measure_covariance, measure_cuts
 from handcal.lab.bench.offline import measure_offline
 from handcal.lab.bench.paper_simulation import measure_paper_simulation
+from handcal.lab.bench.peers import measure_peers
 from handcal.lab.bench.scale import measure_scale
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.speed import measure_speed
@@ -22,6 +23,7 @@ from handcal.progress import Progress
 
 PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "speed": measure_speed,
+    "peers": measure_peers,
     "delivery": measure_delivery,
     "wearer": measure_wearer,
     "cuts": measure_cuts,
@@ -30,7 +32,15 @@ PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "paper_simulation": measure_paper_simulation,
     "scale": measure_scale,
 }
-_LIBRARIES = ("handcal", "numpy", "scipy", "opencv-python-headless", "open3d-cpu", "open3d")
+_LIBRARIES = (
+    "handcal",
+    "numpy",
+    "scipy",
+    "opencv-python-headless",
+    "small_gicp",
+    "open3d-cpu",
+    "open3d",
+)
 _MET = {True: "met", False: "missed", None: ""}
 
 

@@ -26,6 +26,10 @@ class BenchSettings:
     """Repetitions of each timing."""
     paper_repeats: int = 3
     """Repetitions of timing ``paper``."""
+    peer_points: tuple[int, ...] = (1000, 2000, 5000, 20_000, 200_000)
+    """Sizes of the clouds registered beside other libraries; the middle one is the usual one."""
+    peer_trials: int = 12
+    """Alignments of each size for these."""
     offline_rigs: int = 1
     """Rigs calibrated from rendered photographs, which takes minutes for each."""
     offline_wearers: int = 100
@@ -43,6 +47,8 @@ QUICK = BenchSettings(
     covariance_trials=10,
     repeats=3,
     paper_repeats=1,
+    peer_points=(500, 1000, 2000),
+    peer_trials=1,
     offline_rigs=0,
     study_trials=0,
 )

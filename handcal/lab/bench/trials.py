@@ -27,6 +27,7 @@ Errors: TypeAlias = Mapping[str, Float64]
 """Errors of φ by method or floor: (3,) for one trial, (trials, 3) for several."""
 
 _HANDS = 10
+_FOREARM_M = 0.02, 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +78,21 @@ def trial_alignment(trial: int, angle_deg: float, making: AlignmentSettings) -> 
     """Return the alignment of a trial; it is the same at all angles except for the angle."""
     rng = np.random.default_rng(trial)
     return simulate_alignment(rng, trial_hand(trial), np.radians(angle_deg), making)
+
+
+def measured_alignment(
+    rng: np.random.Generator, trial: int, angle_deg: float, sigma_m: float, points: int
+) -> SimulatedAlignment:
+    """Return an alignment whose forearms are cut 20 to 60 mm below the wrist."""
+    cursor_forearm_m, hand_forearm_m = rng.uniform(*_FOREARM_M, 2)
+    making = AlignmentSettings(
+        count=points,
+        resample=True,
+        depth_sigma_m=sigma_m,
+        cursor_forearm_m=cursor_forearm_m,
+        hand_forearm_m=hand_forearm_m,
+    )
+    return trial_alignment(trial, angle_deg, making)
 
 
 def mean_length_mm(errors_m: Float64) -> float:
