@@ -24,6 +24,7 @@ from handcal.types import Float64, Intrinsics, UInt8
 MAX_VIEWS = 500
 _CELLS = (8, 6)
 _STANDS_OUT = 1.5
+_LEAST_MOVED_SHARE = 0.03
 
 
 class ViewsError(HandcalError):
@@ -154,6 +155,26 @@ def used(views: Iterable[BoardImage], at_least: int) -> dict[str, BoardView]:
         )
     one_size(found)
     return found
+
+
+def check_moved(found: Mapping[str, BoardView]) -> None:
+    """Raise ViewsError if the board is at nearly the same place in all views."""
+    first, *others = found.values()
+    moved_px = [moved(first, other) for other in others]
+    limit_px = _LEAST_MOVED_SHARE * first.size[0]
+    if moved_px and max(moved_px) < limit_px:
+        raise ViewsError(
+            f"the board hardly moved between the images, by {max(moved_px):.0f} px at most: show "
+            "it at other places, distances and angles"
+        )
+
+
+def moved(a: BoardView, b: BoardView) -> float:
+    """Return the mean distance in pixels of the corners found in both; infinite without any."""
+    _, of_a, of_b = np.intersect1d(a.ids, b.ids, assume_unique=True, return_indices=True)
+    if not len(of_a):
+        return np.inf
+    return float(np.linalg.norm(a.pixels[of_a] - b.pixels[of_b], axis=1).mean())
 
 
 def one_size(found: Mapping[str, BoardView]) -> tuple[int, int]:
