@@ -114,7 +114,7 @@ def next_view(
         None if no view of the catalogue shows the board.
     """
     by = _derivatives(camera, solved)
-    information: Float64 = np.linalg.inv(covariance)
+    information = np.asarray(np.linalg.inv(covariance), np.float64)
     best: NextView | None = None
     most = -1
     for words, pose in candidate_views(camera, points_m):
@@ -125,7 +125,7 @@ def next_view(
         basis, _ = np.linalg.qr(derivatives[seen, :6])
         shared = derivatives[seen][:, [6 + number for number in solved]] / noise_px
         shared = shared - basis @ (basis.T @ shared)
-        new_covariance: Float64 = np.linalg.inv(information + shared.T @ shared)
+        new_covariance = np.asarray(np.linalg.inv(information + shared.T @ shared), np.float64)
         after = _uncertainty(by, new_covariance).edge_px
         if best is None or (-new, after) < (-most, best.uncertainty):
             best, most = NextView(words, pose, after), new
@@ -155,7 +155,7 @@ def next_pair(
     limits : (float, float)
         Rotation, rad, and translation, m, that count the same.
     """
-    information: Float64 = np.linalg.inv(covariance)
+    information = np.asarray(np.linalg.inv(covariance), np.float64)
     scale = np.repeat(limits, 3)
     best: NextView | None = None
     for words, pose in candidate_views(setup.cameras[0], points_m):
