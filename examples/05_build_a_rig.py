@@ -50,7 +50,7 @@ def main() -> None:
     rig = with_stereo(truth, stereo)  # keeps what the headset itself states: T_V_H, sizes
 
     # Each display, from its grid seen by a camera whose place a tracked board gives.
-    camera = calibrate_camera(views_of("viewpoint")).intrinsics
+    camera = calibrate_camera(views_of("viewpoint")).pinhole
     for eye in EYES:
         poses = read_tracked(images / f"tracked-{eye}.json")
         viewpoint = viewpoint_from_tracked(views_of(f"board-{eye}"), poses, camera)

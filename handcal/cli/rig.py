@@ -19,7 +19,7 @@ from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.board import Board, BoardKind
-from handcal.rig.camera import LensModel
+from handcal.rig.camera import LENS_CHOICES
 from handcal.rig.formats import CALIBRATION_FORMATS
 from handcal.rig.print_page import PAPERS
 from handcal.rig.views import MAX_VIEWS
@@ -70,7 +70,12 @@ GRID_OPTION = arg(
 )
 _CALIBRATION_OPTIONS = (
     *BOARD_OPTIONS,
-    arg("--lens", choices=get_args(LensModel), default="full", help="distortion model"),
+    arg(
+        "--lens",
+        choices=LENS_CHOICES,
+        default="auto",
+        help="lens model (default: the one that fits best images not used to solve it)",
+    ),
     arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
     arg("--output", type=Path, metavar="FILE", help="file for the result (default: only print it)"),
     arg(
@@ -207,12 +212,21 @@ def camera(arguments: argparse.Namespace) -> None:
         f"c {solved.cx:.2f} ± {sigma[2]:.2f}, {solved.cy:.2f} ± {sigma[3]:.2f} px; "
         f"{result.arcmin_per_px:.2f}′ per pixel"
     )
-    console.print(f"Distortion: {' '.join(f'{one:.5f}' for one in solved.distortion) or 'none'}")
+    coefficients = " ".join(f"{one:.5f}" for one in solved.distortion) or "no distortion"
+    console.print(f"Lens {result.lens}: {coefficients}")
+    for one in result.compared:
+        console.print(
+            f"  {one.lens}: RMS {one.fit.rms_px:.3f} px, of views left out {one.held_out_px:.3f} px"
+        )
+    if result.left_out:
+        console.print(
+            f"{result.left_out} single corners left out: they contradict those beside them"
+        )
     _conclude(result.rms_px, result.worst, result.verdict)
     _write(
         arguments,
         camera_json(result),
-        lambda path: write_intrinsics(path, solved, arguments.format),
+        lambda path: write_intrinsics(path, result.pinhole, arguments.format),
     )
 
 

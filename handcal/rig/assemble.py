@@ -14,6 +14,7 @@ import numpy as np
 
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen
+from handcal.rig.lens import as_pinhole
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import ViewsError
@@ -99,7 +100,7 @@ def with_stereo(
         stereo.covariance,
     )
     T_H_D = stereo.T_H_D if T_C_D is None else stereo.T_H_D @ T_C_D
-    intrinsics = stereo.depth if depth_intrinsics is None else depth_intrinsics
+    intrinsics = depth_intrinsics or as_pinhole(stereo.depth, "the depth camera")
     calibrated = replace(
         rig,
         T_H_D=T_H_D,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
@@ -96,6 +96,12 @@ class BoardView:
         freeze(self, "points_m", np.float64, None, 3)
         freeze(self, "pixels", np.float64, len(self.points_m), 2)
         freeze(self, "ids", np.int64, len(self.points_m))
+
+    def only(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> BoardView:
+        """Return the view with some of its corners, by index or mask."""
+        return replace(
+            self, points_m=self.points_m[which], pixels=self.pixels[which], ids=self.ids[which]
+        )
 
 
 def corners_m(board: Board) -> Float64:

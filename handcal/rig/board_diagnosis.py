@@ -15,6 +15,9 @@ from handcal.types import Float64, UInt8
 
 # Fewer markers than this may be false detections, as in leaves or carpets.
 _ENOUGH_MARKERS = 4
+# Places along each side of a square, and the most that its shades differ there, of the contrast.
+_WITHIN = (0.25, 0.4, 0.5, 0.6, 0.75)
+_PLAIN_SHARE = 0.15
 _FAMILIES = (
     "DICT_4X4_1000",
     "DICT_5X5_1000",
@@ -64,10 +67,12 @@ def why_not_plain(gray: UInt8) -> str:
 
 
 def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
-    markers = why_not_plain(gray)
+    grid = _checkerboard(gray)
+    # To look for markers of all families takes ten times longer than to find the checkerboard.
+    markers = "" if grid is not None and _is_plain(gray, grid) else why_not_plain(gray)
     if markers:
         return markers
-    other = _checkerboard_size(gray)
+    other = _size(grid)
     if other and other != tuple(sorted(board.squares)):
         return (
             f"a checkerboard of {other[1]}×{other[0]} squares is seen, "
@@ -86,7 +91,8 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     other_print = replace(board, legacy=not board.legacy)
     if len(find(gray, other_print)[0]) >= MIN_CORNERS:
         kind = "an older" if other_print.legacy else "a newer"
-        return f"the board was printed by {kind} OpenCV: set `legacy` to {other_print.legacy}"
+        use = "use" if other_print.legacy else "leave out"
+        return f"the board was printed by {kind} OpenCV: {use} --legacy"
     ids = _markers(gray, board.marker_dictionary)
     on_board = (board.squares[0] * board.squares[1]) // 2
     if len(ids) >= _ENOUGH_MARKERS:
@@ -99,7 +105,7 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     seen = _markers_of_some_family(gray)
     if seen and not seen.startswith(board.dictionary[:8]):
         return f"markers of another dictionary are seen ({seen}), not {board.dictionary}"
-    other = _checkerboard_size(gray)
+    other = _size(_checkerboard(gray))
     if other and not seen:
         return f"a plain checkerboard of {other[1]}×{other[0]} squares is seen, without markers"
     if ids:
@@ -124,10 +130,34 @@ def _markers_of_some_family(gray: UInt8) -> str:
     return best.removesuffix("_1000")
 
 
-def _checkerboard_size(gray: UInt8) -> tuple[int, int] | None:
-    """Return the numbers of squares of a checkerboard, the smaller first; None if not found."""
-    found, _, meta = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), cv2.CALIB_CB_LARGER)
-    if not found:
+def _checkerboard(gray: UInt8) -> Float64 | None:
+    """Return the inner corners (R, C, 2) of a checkerboard of any size; None if not found."""
+    found, corners, meta = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), cv2.CALIB_CB_LARGER)
+    return np.asarray(corners, np.float64).reshape(*meta.shape[:2], 2) if found else None
+
+
+def _size(grid: Float64 | None) -> tuple[int, int] | None:
+    """Return the numbers of squares of a grid of corners, the smaller first."""
+    if grid is None:
         return None
-    few, many = sorted(meta.shape[:2])
+    few, many = sorted(grid.shape[:2])
     return few + 1, many + 1
+
+
+def _is_plain(gray: UInt8, grid: Float64) -> bool:
+    """Return whether each square of a checkerboard has one shade, as it has without markers."""
+    upper, lower = grid[:-1], grid[1:]
+    places = np.stack(
+        [
+            (1 - v) * ((1 - u) * upper[:, :-1] + u * upper[:, 1:])
+            + v * ((1 - u) * lower[:, :-1] + u * lower[:, 1:])
+            for u in _WITHIN
+            for v in _WITHIN
+        ]
+    )
+    x, y = np.rint(places).astype(int).reshape(-1, 2).T
+    height, width = gray.shape
+    inside = gray[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
+    shades = inside.reshape(places.shape[:-1]).astype(np.float64)
+    contrast = float(np.ptp(np.percentile(shades.mean(axis=0), (10, 90))))
+    return bool(np.percentile(shades.std(axis=0), 90) < _PLAIN_SHARE * contrast)

@@ -1,50 +1,39 @@
 """A camera's intrinsics from views of a board, with their uncertainty.
 
-The method is Zhang's, "A flexible new technique for camera calibration", 2000, by OpenCV.
+The method is Zhang's, "A flexible new technique for camera calibration", 2000, with any lens model
+of `handcal.rig.lens`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
-import cv2
 import numpy as np
-from numpy.typing import ArrayLike
 
-from handcal.geometry import camera_matrix, rigid
 from handcal.rig.board import BoardView
-from handcal.rig.fit import marginal_covariance, rms
+from handcal.rig.bundle import as_transform
+from handcal.rig.fit import rms
+from handcal.rig.lens import Camera, LensModel, as_pinhole, solved_parameters
+from handcal.rig.lens_fit import LensFit, best_lens, compare_lenses, fit_lens
+from handcal.rig.uncertainty import ProjectionUncertainty, next_view, projection_uncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import (
     BoardImage,
     Coverage,
     ViewsError,
     WorstView,
+    check_moved,
     coverage,
-    one_size,
     used,
     worst_view,
 )
 from handcal.types import Float64, Intrinsics, freeze
 
-LensModel: TypeAlias = Literal["none", "radial", "full", "rational"]
-_FIX_HIGHER = cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3
-_FLAGS: dict[LensModel, int] = {
-    "none": cv2.CALIB_ZERO_TANGENT_DIST | _FIX_HIGHER,
-    "radial": cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K3,
-    "full": 0,
-    "rational": cv2.CALIB_RATIONAL_MODEL,
-}
-# Which of OpenCV's coefficients each solves for.
-_SOLVED: dict[LensModel, tuple[int, ...]] = {
-    "none": (),
-    "radial": (0, 1),
-    "full": (0, 1, 2, 3, 4),
-    "rational": (0, 1, 2, 3, 4, 5, 6, 7),
-}
+LensChoice: TypeAlias = Literal["auto", LensModel]
+LENS_CHOICES: tuple[str, ...] = ("auto", *get_args(LensModel))
 MIN_VIEWS = 3
 
 
@@ -52,18 +41,19 @@ MIN_VIEWS = 3
 class CameraSettings:
     """Settings of the solver for intrinsics, and limits of a good result."""
 
-    lens: LensModel = "full"
-    """Distortion: none; k1, k2; k1, k2, p1, p2, k3; the same and k4 to k6."""
+    lens: LensChoice = "full"
+    """Lens model, or auto: the one that fits best views that are not used to solve it."""
     good_views: int = 10
     """With fewer views, the verdict asks for more."""
     good_coverage: float = 0.6
     """Minimum share of the image's cells that contain a corner in any view."""
     good_spread_rad: float = 0.2
     """Least spread of the boards' normals about their mean, RMS."""
-    max_focal_sigma: float = 0.001
+    max_projection_arcmin: float = 2.0
+    max_projection_px: float = 0.25
+    """Projection uncertainty exceeded in half of the image: good up to the larger of the two."""
     bad_focal_sigma: float = 0.03
-    """Relative standard deviation of the focal lengths: good up to the first, useless from the
-    second."""
+    """Relative standard deviation of the focal lengths from which they are useless."""
     max_rms_px: float = 1.0
     """A larger residual indicates a fault: board, focus or exposure."""
 
@@ -72,14 +62,17 @@ class CameraSettings:
 class CameraCalibration:
     """A camera's intrinsics, with their uncertainty."""
 
-    intrinsics: Intrinsics
+    intrinsics: Camera
+    lens: LensModel
     covariance: Float64 | None
     """(P, P); of fx, fy, cx, cy and the coefficients solved for, in order; None if not
     determined."""
     rms_px: float
-    """Root mean square distance between detected and predicted corners."""
+    """Root mean square distance between detected and predicted corners, without `left_out`."""
     residuals_px: Mapping[str, float]
     """The same for each view."""
+    left_out: int
+    """Number of single corners that contradict those beside them."""
     T_C_B: Mapping[str, Float64]
     """each (4, 4); the board's pose in each view."""
     dropped: tuple[str, ...]
@@ -87,11 +80,20 @@ class CameraCalibration:
     coverage: Coverage
     worst: WorstView
     verdict: CalibrationVerdict
+    uncertainty: ProjectionUncertainty | None
+    """None if not determined."""
+    compared: tuple[LensFit, ...] = ()
+    """All lens models, if the best was to be chosen."""
 
     def __post_init__(self) -> None:
         freeze(self, "covariance", np.float64, None, None)
         object.__setattr__(self, "residuals_px", MappingProxyType(dict(self.residuals_px)))
         object.__setattr__(self, "T_C_B", MappingProxyType(dict(self.T_C_B)))
+
+    @property
+    def pinhole(self) -> Intrinsics:
+        """The intrinsics; ViewsError if they are a fisheye's."""
+        return as_pinhole(self.intrinsics, "the camera")
 
     @property
     def arcmin_per_px(self) -> float:
@@ -119,67 +121,43 @@ def calibrate_camera(
     """
     settings = settings or CameraSettings()
     found = used(views, MIN_VIEWS)
-    intrinsics, poses = _solve(found, settings.lens)
-    fits = {name: linearise(seen, poses[name], intrinsics) for name, seen in found.items()}
-    off_px = {name: off for name, (off, _) in fits.items()}
-    solved = solved_columns(settings.lens)
-    everything_px = np.vstack(list(off_px.values()))
-    covariance = marginal_covariance(
-        ((by[:, solved], by[:, :6]) for _, by in fits.values()), everything_px.ravel()
-    )
+    check_moved(found)
+    compared = compare_lenses(tuple(found.values())) if settings.lens == "auto" else ()
+    if settings.lens != "auto":
+        solved = fit_lens(tuple(found.values()), settings.lens)
+    else:
+        solved = best_lens(compared) if compared else None
+    if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
+        raise ViewsError(
+            "nothing can be solved from these views: take more, of a board tilted to every side"
+        )
+    fit, camera = solved.fit, solved.camera
+    poses = {name: as_transform(pose) for name, pose in zip(found, fit.setup.poses, strict=True)}
+    off_px = {name: off[kept] for name, off, kept in zip(found, fit.off_px, fit.kept, strict=True)}
     tilt_rad = {name: tilt(poses[name], seen) for name, seen in found.items()}
-    worst = worst_view(found, off_px, tilt_rad)
-    seen_area = coverage(found.values())
+    worst = worst_view(
+        {name: seen.only(kept) for (name, seen), kept in zip(found.items(), fit.kept, strict=True)},
+        off_px,
+        tilt_rad,
+    )
+    covariance = fit.covariance()
+    uncertainty = None
+    if covariance is not None:
+        uncertainty = projection_uncertainty(camera, solved_parameters(solved.lens), covariance)
     return CameraCalibration(
-        intrinsics=intrinsics,
+        intrinsics=camera,
+        lens=solved.lens,
         covariance=covariance,
-        rms_px=rms(everything_px),
+        rms_px=fit.rms_px,
         residuals_px={name: rms(off) for name, off in off_px.items()},
+        left_out=fit.left_out,
         T_C_B=poses,
         dropped=tuple(view.name for view in views if view.dropped),
-        coverage=seen_area,
+        coverage=coverage(found.values()),
         worst=worst,
-        verdict=_judge(
-            intrinsics, covariance, rms(everything_px), poses, seen_area.share, worst, settings
-        ),
-    )
-
-
-def linearise(seen: BoardView, T_C_B: Float64, intrinsics: Intrinsics) -> tuple[Float64, Float64]:
-    """Return residuals (N, 2), detected minus predicted, px, and the derivatives of the predicted.
-
-    The derivatives, (2N, 10 + coefficients), are by the rotation vector, the translation, fx, fy,
-    cx, cy and the coefficients.
-    """
-    rotation, _ = cv2.Rodrigues(T_C_B[:3, :3])
-    coefficients = np.array(intrinsics.distortion or (0.0,) * 4)
-    expected, by = cv2.projectPoints(
-        seen.points_m, rotation, T_C_B[:3, 3], camera_matrix(intrinsics), coefficients
-    )
-    off_px: Float64 = seen.pixels - expected.reshape(-1, 2)
-    return off_px, np.asarray(by, dtype=np.float64)
-
-
-def solved_columns(lens: LensModel) -> list[int]:
-    """Return the columns of `linearise`'s derivatives that belong to a lens model's intrinsics."""
-    return [*range(6, 10), *(10 + number for number in _SOLVED[lens])]
-
-
-def lens_flags(lens: LensModel) -> int:
-    """Return OpenCV's flags for a lens model."""
-    return _FLAGS[lens]
-
-
-def refined(intrinsics: Intrinsics, K: ArrayLike, coefficients: ArrayLike) -> Intrinsics:
-    """Return the intrinsics from OpenCV's result, with the same number of coefficients."""
-    K, found = np.asarray(K), np.asarray(coefficients).ravel()
-    return replace(
-        intrinsics,
-        fx=float(K[0, 0]),
-        fy=float(K[1, 1]),
-        cx=float(K[0, 2]),
-        cy=float(K[1, 2]),
-        distortion=tuple(float(one) for one in found[: len(intrinsics.distortion)]),
+        verdict=_judge(solved, covariance, uncertainty, found, poses, worst, settings),
+        uncertainty=uncertainty,
+        compared=compared,
     )
 
 
@@ -198,75 +176,72 @@ def normal_spread(poses: Mapping[str, Float64]) -> float:
     return float(np.sqrt(np.mean(angles**2)))
 
 
-def _solve(
-    found: Mapping[str, BoardView], lens: LensModel
-) -> tuple[Intrinsics, dict[str, Float64]]:
-    width, height = one_size(found)
-    try:
-        _, K, coefficients, rotations, translations, *_ = cv2.calibrateCameraExtended(
-            [seen.points_m.astype(np.float32) for seen in found.values()],
-            [seen.pixels.astype(np.float32) for seen in found.values()],
-            (width, height),
-            np.eye(3),
-            np.zeros(8),
-            flags=lens_flags(lens),
-        )
-    except cv2.error as error:
-        raise ViewsError(
-            "nothing can be solved from these views: take more, of a board tilted to every side"
-        ) from error
-    count = {"none": 0, "rational": 8}.get(lens, 5)
-    intrinsics = refined(Intrinsics(width, height, 1, 1, 0, 0, (0.0,) * count), K, coefficients)
-    if not np.isfinite([intrinsics.fx, intrinsics.fy, *intrinsics.distortion]).all():
-        raise ViewsError("these views determine no camera: tilt the board to every side")
-    poses = {
-        name: rigid(cv2.Rodrigues(rotation)[0], translation.ravel())
-        for name, rotation, translation in zip(found, rotations, translations, strict=True)
-    }
-    return intrinsics, poses
-
-
 def _judge(
-    intrinsics: Intrinsics,
+    solved: LensFit,
     covariance: Float64 | None,
-    rms_px: float,
+    uncertainty: ProjectionUncertainty | None,
+    found: Mapping[str, BoardView],
     poses: Mapping[str, Float64],
-    share: float,
     worst: WorstView,
     settings: CameraSettings,
 ) -> CalibrationVerdict:
+    rms_px, camera = solved.fit.rms_px, solved.camera
     spread_rad = normal_spread(poses)
     if rms_px > settings.max_rms_px:
         return CalibrationVerdict(
             "bad",
             f"corners are {rms_px:.2f} px off, more than {settings.max_rms_px:g}: check that the "
-            f"board is flat and focus fixed; drop the worst image, {worst.name}: {worst.why}",
+            "board is flat, focus fixed and the lens model the right one; drop the worst image, "
+            f"{worst.name}: {worst.why}",
         )
     focal_sigma = np.inf
     if covariance is not None:
-        sigmas = np.sqrt(np.diag(covariance)[:2]) / [intrinsics.fx, intrinsics.fy]
-        focal_sigma = float(sigmas.max())
-    if focal_sigma > settings.bad_focal_sigma or spread_rad < settings.good_spread_rad / 4:
+        focal_sigma = float((np.sqrt(np.diag(covariance)[:2]) / [camera.fx, camera.fy]).max())
+    if (
+        covariance is None
+        or uncertainty is None
+        or focal_sigma > settings.bad_focal_sigma
+        or spread_rad < settings.good_spread_rad / 4
+    ):
         return CalibrationVerdict(
             "bad",
             "all views show the board at nearly one angle, which does not tell the focal length: "
             "tilt it by 20° to 45° to every side",
         )
+    seen_area = coverage(found.values())
     wanting = []
     if len(poses) < settings.good_views:
         wanting.append(f"{len(poses)} views, {settings.good_views} are better")
-    if share < settings.good_coverage:
+    if seen_area.share < settings.good_coverage:
         wanting.append(
-            f"the board was seen in {100 * share:.0f} % of the image only: bring it to its edges"
+            f"the board was seen in {100 * seen_area.share:.0f} % of the image only: bring it to "
+            "its edges"
         )
     if spread_rad < settings.good_spread_rad:
         wanting.append(f"it was tilted by {np.degrees(spread_rad):.0f}° only: tilt it more")
-    if focal_sigma > settings.max_focal_sigma:
-        wanting.append(f"the focal length is known to ± {100 * focal_sigma:.2f} % only")
+    arcmin_per_px = float(np.degrees(np.arctan(1 / camera.fx)) * 60)
+    limit_px = max(settings.max_projection_px, settings.max_projection_arcmin / arcmin_per_px)
+    if uncertainty.middle_px > limit_px:
+        wanting.append(
+            f"the direction of a pixel is known to ± {uncertainty.middle_px:.2f} px only "
+            f"({uncertainty.middle_px * arcmin_per_px:.1f}′)"
+        )
     if wanting:
+        largest = max(found.values(), key=lambda seen: len(seen.ids))
+        add = next_view(
+            camera,
+            solved_parameters(solved.lens),
+            covariance,
+            largest.points_m,
+            rms_px / np.sqrt(2),
+            seen_area.hits if seen_area.share < settings.good_coverage else None,
+        )
+        if add is not None:
+            wanting.append(f"next, the board {add.words}")
         return CalibrationVerdict("needs more views", "; ".join(wanting))
     return CalibrationVerdict(
         "good",
-        f"corners are {rms_px:.2f} px off in {len(poses)} views over {100 * share:.0f} % of the "
-        f"image; focal length ± {100 * focal_sigma:.2f} %",
+        f"corners are {rms_px:.2f} px off in {len(poses)} views over {100 * seen_area.share:.0f} % "
+        f"of the image; the direction of a pixel is known to ± {uncertainty.middle_px:.2f} px "
+        f"({uncertainty.middle_px * arcmin_per_px:.1f}′)",
     )

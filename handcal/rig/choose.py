@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from handcal.rig.board import BoardView
+from handcal.rig.views import moved
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +69,4 @@ class ViewSelector:
 
 def _moved_share(a: BoardView, b: BoardView) -> float:
     """Return the mean distance of the corners found in both, as a share of the image's width."""
-    _, of_a, of_b = np.intersect1d(a.ids, b.ids, assume_unique=True, return_indices=True)
-    if not len(of_a):
-        return np.inf
-    return float(np.linalg.norm(a.pixels[of_a] - b.pixels[of_b], axis=1).mean()) / b.size[0]
+    return moved(a, b) / b.size[0]

@@ -16,11 +16,12 @@ from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.errors import FileError, HandcalError
 from handcal.geometry import camera_matrix, is_rigid, rigid
 from handcal.io.files import read_json, read_limited, write_atomic, write_json
 from handcal.rig.camera import CameraCalibration
 from handcal.rig.check import check_intrinsics, identity_from_json, require
+from handcal.rig.lens import Camera, FisheyeIntrinsics, as_pinhole
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
@@ -46,7 +47,23 @@ def read_intrinsics(path: Path) -> Intrinsics:
         If the file cannot be read or has another format, a field is missing or implausible, or the
         lens model is not OpenCV's pinhole.
     """
-    return _read(path, _intrinsics_of_json, _intrinsics_of_yaml)
+    try:
+        return as_pinhole(read_camera(path), "the camera")
+    except FileError:
+        raise
+    except HandcalError as error:
+        raise FileError(f"{path}: {error}") from error
+
+
+def read_camera(path: Path) -> Camera:
+    """Read a camera's intrinsics, like `read_intrinsics`, or those of a fisheye from JSON.
+
+    Raises
+    ------
+    FileError
+        As `read_intrinsics`.
+    """
+    return _read(path, _camera_of_json, _intrinsics_of_yaml)
 
 
 def read_pose(path: Path) -> Float64:
@@ -89,8 +106,8 @@ def read_stereo(path: Path) -> StereoCalibration:
         return StereoCalibration(
             T_H_D=T_H_D,
             covariance=None if covariance is None else _numbers(covariance, "covariance", 2),
-            depth=_intrinsics(_object(values, "depth"), "depth"),
-            headset=_intrinsics(_object(values, "headset"), "headset"),
+            depth=_camera(_object(values, "depth"), "depth"),
+            headset=_camera(_object(values, "headset"), "headset"),
             rms_px=_number(values, "rms_px"),
             residuals_px={key: _number(residuals_px, key) for key in residuals_px},
             spread_rad=_number(values, "spread_rad"),
@@ -179,7 +196,7 @@ def camera_json(calibration: CameraCalibration) -> dict[str, Any]:
     """Return a camera's calibration as JSON values; `read_intrinsics` reads them."""
     return {
         "handcal_camera": JSON_VERSION,
-        **asdict(calibration.intrinsics),
+        **camera_values(calibration.intrinsics),
         "covariance": _listed(calibration.covariance),
         "rms_px": calibration.rms_px,
         "arcmin_per_px": calibration.arcmin_per_px,
@@ -197,8 +214,8 @@ def stereo_json(calibration: StereoCalibration) -> dict[str, Any]:
         "handcal_stereo": JSON_VERSION,
         "T_H_D": calibration.T_H_D.tolist(),
         "covariance": _listed(calibration.covariance),
-        "depth": asdict(calibration.depth),
-        "headset": asdict(calibration.headset),
+        "depth": camera_values(calibration.depth),
+        "headset": camera_values(calibration.headset),
         "rms_px": calibration.rms_px,
         "residuals_px": dict(calibration.residuals_px),
         "spread_rad": calibration.spread_rad,
@@ -207,6 +224,12 @@ def stereo_json(calibration: StereoCalibration) -> dict[str, Any]:
         "worst": asdict(calibration.worst),
         "verdict": asdict(calibration.verdict),
     }
+
+
+def camera_values(camera: Camera) -> dict[str, Any]:
+    """Return a camera as JSON values; a fisheye has ``"lens": "fisheye"``."""
+    is_fisheye = isinstance(camera, FisheyeIntrinsics)
+    return asdict(camera) | ({"lens": "fisheye"} if is_fisheye else {})
 
 
 def _listed(covariance: Float64 | None) -> list[list[float]] | None:
@@ -236,12 +259,12 @@ def _as_storage(data: bytes) -> bytes:
     return b"%YAML 1.2\n---\n" + re.sub(rb"(?m)^( *)- ", rb"\1  - ", data)
 
 
-def _intrinsics_of_json(values: dict[str, Any]) -> Intrinsics:
+def _camera_of_json(values: dict[str, Any]) -> Camera:
     _check_version(values, "handcal_camera")
-    return _intrinsics(values, "camera")
+    return _camera(values, "camera")
 
 
-def _intrinsics(values: dict[str, Any], name: str) -> Intrinsics:
+def _camera(values: dict[str, Any], name: str) -> Camera:
     width, height, fx, fy, cx, cy = (
         _number(values, key) for key in ("width", "height", "fx", "fy", "cx", "cy")
     )
@@ -249,7 +272,12 @@ def _intrinsics(values: dict[str, Any], name: str) -> Intrinsics:
     distortion = _numbers(values.get("distortion", []), "distortion", 1)
     intrinsics = Intrinsics(int(width), int(height), fx, fy, cx, cy, tuple(distortion.tolist()))
     check_intrinsics(name, intrinsics)
-    return intrinsics
+    lens = values.get("lens", "pinhole")
+    require(lens in ("pinhole", "fisheye"), f"{name}: the lens {lens} is not known")
+    if lens == "pinhole":
+        return intrinsics
+    require(len(distortion) == 4, f"{name}: a fisheye has 4 coefficients")
+    return FisheyeIntrinsics(**asdict(intrinsics))
 
 
 def _pose_of_json(values: dict[str, Any]) -> Float64:
@@ -303,7 +331,7 @@ def _numbers(values: object, name: str, dimensions: int) -> Float64:
     return array.astype(np.float64)
 
 
-def _intrinsics_of_yaml(root: Fields) -> Intrinsics:
+def _intrinsics_of_yaml(root: Fields) -> Camera:
     if root.has("distortion_model"):
         model = root.text("distortion_model")
         require(

@@ -10,7 +10,7 @@ import numpy as np
 
 from handcal.errors import HandcalError
 from handcal.rig.assemble import screen_of
-from handcal.rig.camera import CameraSettings, LensModel
+from handcal.rig.camera import CameraSettings, LensChoice
 from handcal.rig.display import (
     DisplayCalibration,
     DisplaySettings,
@@ -18,7 +18,7 @@ from handcal.rig.display import (
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.formats import read_identity, read_intrinsics, read_pose, read_stereo
+from handcal.rig.formats import read_camera, read_identity, read_intrinsics, read_pose, read_stereo
 from handcal.rig.grid import grid_on, on_display
 from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
@@ -52,7 +52,7 @@ class DisplayInputs:
 
 def calibrate_depth_camera(
     pairs: Sequence[tuple[BoardImage, BoardImage]],
-    lens: LensModel,
+    lens: LensChoice,
     depth_intrinsics: Path | None,
     headset_intrinsics: Path | None,
 ) -> StereoCalibration:
@@ -62,15 +62,15 @@ def calibrate_depth_camera(
     ----------
     pairs : sequence of (BoardImage, BoardImage)
         By the depth camera and by the headset's.
-    lens : LensModel
-        Distortion model of intrinsics that are solved.
+    lens : LensChoice
+        Lens model of intrinsics that are solved.
     depth_intrinsics, headset_intrinsics : Path or None
         Files; None to solve them from the images.
     """
     return calibrate_stereo(
         pairs,
-        intrinsics_in(depth_intrinsics),
-        intrinsics_in(headset_intrinsics),
+        None if depth_intrinsics is None else read_camera(depth_intrinsics),
+        None if headset_intrinsics is None else read_camera(headset_intrinsics),
         StereoSettings(camera=CameraSettings(lens=lens)),
     )
 

@@ -24,6 +24,10 @@ from handcal.types import Float64, Intrinsics, UInt8
 MAX_VIEWS = 500
 _CELLS = (8, 6)
 _STANDS_OUT = 1.5
+# If as many images in a row have one problem, it is presumed of the next: to find out takes longer.
+_EXPLAINED = 3
+_PRESUMED = "presumably as in the first images: "
+_LEAST_MOVED_SHARE = 0.03
 
 
 class ViewsError(HandcalError):
@@ -62,12 +66,15 @@ class WorstView:
     why: str
 
 
-def board_image(name: str, image: UInt8, board: Board) -> BoardImage:
-    """Look for the board in an image (H, W) or (H, W, 3)."""
+def board_image(name: str, image: UInt8, board: Board, presumed: str = "") -> BoardImage:
+    """Look for the board in an image (H, W) or (H, W, 3).
+
+    If it is not there, the reason is searched for, unless one is `presumed`.
+    """
     try:
-        return BoardImage(name, find_board(image, board))
+        return BoardImage(name, find_board(image, board, explain=not presumed))
     except BoardError as error:
-        return BoardImage(name, None, str(error))
+        return BoardImage(name, None, f"{_PRESUMED}{presumed}" if presumed else str(error))
 
 
 def image_files(paths: Iterable[Path]) -> list[Path]:
@@ -79,6 +86,7 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
         If there are none, more than `MAX_VIEWS`, or two of the same name.
     """
     files: list[Path] = []
+    paths = list(paths)
     for path in paths:
         try:
             inside = sorted(path.iterdir()) if path.is_dir() else [path]
@@ -86,7 +94,9 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
             raise FileError(f"cannot read {path}: {error.strerror or error}") from error
         files += [file for file in inside if file.suffix.lower() in IMAGE_SUFFIXES]
     if not files:
-        raise FileError("no PNG or JPEG images are there")
+        missing = [str(path) for path in paths if not path.exists()]
+        why = f" ({', '.join(missing[:3])} does not exist)" if missing else ""
+        raise FileError(f"no PNG or JPEG images in {', '.join(map(str, paths[:3]))}{why}")
     if len(files) > MAX_VIEWS:
         raise FileError(f"{len(files)} images are more than the {MAX_VIEWS} allowed")
     name, count = Counter(file.name for file in files).most_common(1)[0]
@@ -114,10 +124,17 @@ def read_views(
         progress.at(number / len(files), file.name)
         try:
             image = read_image(file, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-            views.append(board_image(file.name, image, board))
+            views.append(board_image(file.name, image, board, _presumed(views)))
         except (FileError, ValueError) as error:
             views.append(BoardImage(file.name, None, str(error)))
     return tuple(views)
+
+
+def _presumed(views: Sequence[BoardImage]) -> str:
+    """Return the reason that the first images have in common; empty if a board was found."""
+    reasons = {view.problem for view in views[:_EXPLAINED]}
+    is_common = len(views) >= _EXPLAINED and len(reasons) == 1 and not any(v.found for v in views)
+    return reasons.pop() if is_common else ""
 
 
 def drop(views: Iterable[BoardImage], names: Collection[str]) -> tuple[BoardImage, ...]:
@@ -146,14 +163,39 @@ def used(views: Iterable[BoardImage], at_least: int) -> dict[str, BoardView]:
     views = tuple(views)
     found = {view.name: view.found for view in views if view.found and not view.dropped}
     if len(found) < at_least:
-        problems = Counter(view.problem for view in views if view.problem)
-        mostly = f"; mostly: {problems.most_common(1)[0][0]}" if problems else ""
+        problems = Counter(view.problem.removeprefix(_PRESUMED) for view in views if view.problem)
+        mostly = ""
+        if problems:
+            (problem, count), *_ = problems.most_common(1)
+            names = [view.name for view in views if view.problem.removeprefix(_PRESUMED) == problem]
+            listed = ", ".join(names[:3]) + (" …" if count > 3 else "")
+            mostly = f"; mostly: {problem} ({listed})"
         raise ViewsError(
             f"the board was found in {len(found)} of {len(views)} images used, at least "
             f"{at_least} {'is' if at_least == 1 else 'are'} needed{mostly}"
         )
     one_size(found)
     return found
+
+
+def check_moved(found: Mapping[str, BoardView]) -> None:
+    """Raise ViewsError if the board is at nearly the same place in all views."""
+    first, *others = found.values()
+    moved_px = [moved(first, other) for other in others]
+    limit_px = _LEAST_MOVED_SHARE * first.size[0]
+    if moved_px and max(moved_px) < limit_px:
+        raise ViewsError(
+            f"the board hardly moved between the images, by {max(moved_px):.0f} px at most: show "
+            "it at other places, distances and angles"
+        )
+
+
+def moved(a: BoardView, b: BoardView) -> float:
+    """Return the mean distance in pixels of the corners found in both; infinite without any."""
+    _, of_a, of_b = np.intersect1d(a.ids, b.ids, assume_unique=True, return_indices=True)
+    if not len(of_a):
+        return np.inf
+    return float(np.linalg.norm(a.pixels[of_a] - b.pixels[of_b], axis=1).mean())
 
 
 def one_size(found: Mapping[str, BoardView]) -> tuple[int, int]:

@@ -29,7 +29,7 @@ def _views(count: int = 15, seed: int = 1, noise_px: float = NOISE_PX) -> tuple[
 def test_without_noise_the_camera_comes_back() -> None:
     result = calibrate_camera(_views(noise_px=0.0))
     np.testing.assert_allclose(
-        camera_matrix(result.intrinsics), camera_matrix(CAMERA), atol=0.01, rtol=1e-5
+        camera_matrix(result.pinhole), camera_matrix(CAMERA), atol=0.01, rtol=1e-5
     )
     np.testing.assert_allclose(result.intrinsics.distortion[:4], CAMERA.distortion[:4], atol=1e-3)
     assert result.rms_px < 1e-3

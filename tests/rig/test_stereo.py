@@ -160,6 +160,68 @@ def test_pairs_numbered_differently_are_named() -> None:
     assert "hardly two pairs agree" in verdict.reason
 
 
+def test_cameras_that_are_not_synchronised_are_named() -> None:
+    rng = np.random.default_rng(3)
+    pairs = []
+    for number, T_D_B in enumerate(_poses(12, 3)):
+        moved = T_D_B @ rigid(rng.normal(scale=0.01, size=3), rng.normal(scale=0.002, size=3))
+        pairs.append(
+            (
+                BoardImage(f"d{number}", board_view(BOARD, T_D_B, DEPTH, rng, 0.1)),
+                BoardImage(f"h{number}", board_view(BOARD, T_H_D @ moved, HEADSET, rng, 0.1)),
+            )
+        )
+    verdict = calibrate_stereo(pairs, DEPTH, HEADSET).verdict
+    assert verdict.name == "bad"
+    assert "the cameras are not synchronised" in verdict.reason
+
+
+def test_a_symmetric_board_that_flips_is_named() -> None:
+    board = Board(kind="checkerboard", squares=(9, 7))
+    rng = np.random.default_rng(4)
+    pairs = []
+    for number, T_D_B in enumerate(board_poses(board, DEPTH, 12, rng, others=((T_H_D, HEADSET),))):
+        first, second = (
+            board_view(board, T @ T_D_B, camera, rng, 0.1)
+            for T, camera in ((np.eye(4), DEPTH), (T_H_D, HEADSET))
+        )
+        if number in (2, 7):
+            second = dataclasses.replace(second, pixels=second.pixels[::-1])
+        pairs.append((BoardImage(f"d{number}", first), BoardImage(f"h{number}", second)))
+    verdict = calibrate_stereo(pairs, DEPTH, HEADSET).verdict
+    assert verdict.name == "bad"
+    assert "looks the same turned by 180°" in verdict.reason
+    assert "(as d2, d7)" in verdict.reason
+
+
+def test_a_board_that_hardly_moved_is_named() -> None:
+    rng = np.random.default_rng(5)
+    T_D_B = _poses(1, 5)[0]
+    pairs = []
+    for number in range(10):
+        T = T_D_B @ rigid(rng.normal(scale=0.005, size=3), rng.normal(scale=0.001, size=3))
+        pairs.append(
+            (
+                BoardImage(f"d{number}", board_view(BOARD, T, DEPTH, rng, 0.1)),
+                BoardImage(f"h{number}", board_view(BOARD, T_H_D @ T, HEADSET, rng, 0.1)),
+            )
+        )
+    with pytest.raises(ViewsError, match="the board hardly moved between the images"):
+        calibrate_stereo(pairs, DEPTH, HEADSET)
+
+
+def test_a_few_bad_corners_are_left_out() -> None:
+    pairs = list(_pairs())
+    seen = pairs[0][1].found
+    assert seen is not None
+    pixels = seen.pixels.copy()
+    pixels[[5, 20]] += [6.0, -4.0]
+    pairs[0] = (pairs[0][0], BoardImage("h0", dataclasses.replace(seen, pixels=pixels)))
+    result = calibrate_stereo(pairs, DEPTH, HEADSET)
+    assert result.left_out == 2
+    assert result.rms_px == pytest.approx(0.1 * np.sqrt(2), rel=0.1)
+
+
 def test_too_few_pairs_and_one_angle() -> None:
     with pytest.raises(ViewsError, match="in 2 of 2 pairs used, at least 3"):
         calibrate_stereo(_pairs(2), DEPTH, HEADSET)

@@ -148,8 +148,8 @@ def calibrate_from_photographs(
     """
     settings = settings or OfflineSettings()
     studio = _Studio(true, seed, settings)
-    viewpoint = calibrate_camera(studio.board_views(settings.viewpoint_camera)).intrinsics
-    headset = calibrate_camera(studio.board_views(settings.headset_camera)).intrinsics
+    viewpoint = calibrate_camera(studio.board_views(settings.viewpoint_camera)).pinhole
+    headset = calibrate_camera(studio.board_views(settings.headset_camera)).pinhole
     pairs = studio.pairs(true.depth_intrinsics, true.T_H_D)
     stereo = calibrate_stereo(pairs, true.depth_intrinsics, headset)
     rig = with_stereo(replace(true, name="Calibrated from photographs"), stereo, _MADE)

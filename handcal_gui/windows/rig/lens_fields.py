@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QComboBox
 
-from handcal.rig.camera import LensModel
+from handcal.rig.camera import LensChoice
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
-_LENSES: dict[LensModel, str] = {
+_LENSES: dict[LensChoice, str] = {
+    "auto": "The one that fits best",
     "none": "No distortion",
     "radial": "k1, k2",
     "full": "k1, k2, p1, p2, k3",
     "rational": "k1 to k6, p1, p2",
+    "fisheye": "Fisheye",
 }
 
 

@@ -12,7 +12,7 @@ from handcal.io.files import make_folder, read_json, write_json
 from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json
 from handcal.rig.board import Board
-from handcal.rig.camera import LensModel
+from handcal.rig.camera import LensChoice
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.steps import DisplayInputs
@@ -35,7 +35,7 @@ class StereoEntries:
     depth_to_color: str = ""
     """Files with the depth imager's intrinsics and its pose in the colour imager, if the images
     come from the colour imager."""
-    lens: LensModel = "full"
+    lens: LensChoice = "full"
     """Lens model for solved intrinsics."""
     dropped: tuple[str, ...] = ()
     """Excluded images, by the depth camera's file name."""
@@ -47,7 +47,7 @@ class ViewpointEntries:
 
     images: str = ""
     intrinsics: str = ""
-    lens: LensModel = "full"
+    lens: LensChoice = "full"
     dropped: tuple[str, ...] = ()
 
 

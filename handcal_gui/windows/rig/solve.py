@@ -12,6 +12,7 @@ from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
 from handcal.rig.formats import camera_json, read_intrinsics
+from handcal.rig.lens import Camera, first_pose
 from handcal.rig.steps import (
     calibrate_depth_camera,
     calibrate_eye_display,
@@ -21,9 +22,8 @@ from handcal.rig.steps import (
     pose_in,
 )
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.viewpoint import board_pose
 from handcal.rig.views import BoardImage, WorstView
-from handcal.types import Eye, Intrinsics, Rig
+from handcal.types import Eye, Rig
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
@@ -119,6 +119,7 @@ def solve_display(
     return solved, of_pose
 
 
-def _tilts(views: Sequence[BoardImage], camera: Intrinsics) -> dict[str, float]:
+def _tilts(views: Sequence[BoardImage], camera: Camera) -> dict[str, float]:
     found = {view.name: view.found for view in views if view.found}
-    return {name: tilt(board_pose(seen, camera), seen) for name, seen in found.items()}
+    poses = {name: first_pose(seen, camera) for name, seen in found.items()}
+    return {name: tilt(T, found[name]) for name, T in poses.items() if T is not None}

@@ -1,0 +1,79 @@
+"""Boards photographed by others, with other people's results."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handcal.geometry import rigid
+from handcal.rig.board import Board
+from handcal.rig.camera import CameraSettings, calibrate_camera
+from handcal.rig.lens import FisheyeIntrinsics
+from handcal.rig.stereo import StereoSettings, calibrate_stereo
+from handcal.rig.views import ViewsError, pair_views, read_views
+
+AUTO = StereoSettings(camera=CameraSettings(lens="auto"))
+
+
+@pytest.mark.campaign
+def test_a_wide_lens_has_the_published_pose(shared_data: Path) -> None:
+    folder = shared_data / "boards" / "wide_charuco"
+    board = Board(
+        squares=(31, 16),
+        square_m=0.04933,
+        marker_m=0.03846,
+        dictionary="DICT_4X4_1000",
+        legacy=True,
+    )
+    left, right = (
+        read_views(sorted(folder.glob(f"{side}_*.png")), board) for side in ("left", "right")
+    )
+    assert all(view.found for view in (*left, *right))
+    result = calibrate_stereo(pair_views(left, right), settings=AUTO)
+    published = json.loads((folder / "authors_results.json").read_text())
+    truth = rigid(np.array(published["rot"]), np.array(published["trans"]).ravel())
+    turn = Rotation.from_matrix(truth[:3, :3].T @ result.T_H_D[:3, :3]).magnitude()
+    off_m = np.linalg.norm(result.T_H_D[:3, 3] - truth[:3, 3])
+    assert off_m < 0.003 * np.linalg.norm(truth[:3, 3])
+    assert np.degrees(turn) < 0.1
+    # Plain OpenCV with the rational model, free intrinsics and the same corners: 0.309 px.
+    assert result.rms_px < 1.02 * 0.309
+    assert result.verdict.name == "good"
+
+
+@pytest.mark.campaign
+def test_a_fisheye_is_recognised(shared_data: Path) -> None:
+    folder = shared_data / "boards" / "fisheye_stereo_sourishg" / "imgs"
+    board = Board(kind="checkerboard", squares=(10, 7), square_m=0.02423)
+    left, right = (
+        read_views(sorted(folder.glob(f"{side}*.jpg")), board) for side in ("left", "right")
+    )
+    result = calibrate_stereo(pair_views(left, right), settings=AUTO)
+    assert isinstance(result.depth, FisheyeIntrinsics)
+    assert isinstance(result.headset, FisheyeIntrinsics)
+    # OpenCV's fisheye over 26 pairs: 0.59 px, (-111.0, -0.5, 4.3) mm.
+    assert result.rms_px < 0.59
+    assert np.linalg.norm(result.T_H_D[:3, 3]) == pytest.approx(0.111, rel=0.02)
+    assert "moved between the two exposures" in result.verdict.reason
+
+
+def test_the_lens_of_opencvs_sample_is_a_pinhole(shared_data: Path) -> None:
+    folder = shared_data / "boards" / "opencv_stereo"
+    board = Board(kind="checkerboard", squares=(10, 7))
+    views = read_views(sorted(folder.glob("left*.jpg")), board)
+    result = calibrate_camera(views, CameraSettings(lens="auto"))
+    storage = cv2.FileStorage(str(folder / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
+    published = storage.getNode("camera_matrix").mat()
+    assert abs(result.pinhole.fx / published[0, 0] - 1) < 0.01
+    assert result.verdict.name == "good"
+
+
+def test_a_wrong_number_of_squares_is_told_with_names(shared_data: Path) -> None:
+    folder = shared_data / "boards" / "opencv_stereo"
+    board = Board(kind="checkerboard", squares=(12, 9))
+    views = read_views(sorted(folder.glob("left*.jpg"))[:5], board)
+    with pytest.raises(ViewsError, match=r"of 10×7 squares is seen.*\(left01.jpg, left02.jpg"):
+        calibrate_camera(views)

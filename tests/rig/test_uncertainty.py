@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from handcal.geometry import image_points, rigid
+from handcal.rig.board import Board, corners_m
+from handcal.rig.camera import CameraCalibration, calibrate_camera
+from handcal.rig.lens import parameters, solved_parameters, to_plane
+from handcal.rig.uncertainty import next_view
+from handcal.rig.views import BoardImage
+from handcal.sim.boards import board_poses, board_view
+from handcal.types import Intrinsics
+
+BOARD = Board()
+CAMERA = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (-0.25, 0.08, 0.0008, -0.0005, -0.01))
+
+
+def _views(count: int, seed: int) -> list[BoardImage]:
+    rng = np.random.default_rng(seed)
+    poses = board_poses(BOARD, CAMERA, count, rng)
+    return [
+        BoardImage(f"{number}", board_view(BOARD, T, CAMERA, rng, 0.1))
+        for number, T in enumerate(poses)
+    ]
+
+
+def _projection_error_px(result: CameraCalibration) -> float:
+    """Return the median error of pixels on a grid, without what a rotation explains."""
+    pixels = np.stack(np.meshgrid(np.linspace(27, 612, 12), np.linspace(27, 452, 9)), -1)
+    pixels = pixels.reshape(-1, 2)
+    rays = np.column_stack([to_plane(pixels, CAMERA), np.ones(len(pixels))])
+    off = image_points(rays, result.pinhole) - pixels
+    turns = np.stack(
+        [
+            (image_points(rays @ rigid(1e-5 * axis)[:3, :3].T, CAMERA) - pixels).ravel()
+            for axis in np.eye(3)
+        ]
+    ).T
+    rest = off.ravel() - turns @ np.linalg.lstsq(turns, off.ravel(), rcond=None)[0]
+    return float(np.median(np.linalg.norm(rest.reshape(-1, 2), axis=1)))
+
+
+def test_the_uncertainty_is_as_the_errors_are() -> None:
+    ratios = []
+    for seed in range(8):
+        result = calibrate_camera(_views(12, seed))
+        assert result.uncertainty is not None
+        ratios.append(_projection_error_px(result) / result.uncertainty.middle_px)
+    assert 0.4 < np.mean(ratios) < 1.6
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_twenty_views_are_good(seed: int) -> None:
+    assert calibrate_camera(_views(20, seed)).verdict.name == "good"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_named_next_views_get_there(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    views = _views(7, seed)
+    result = calibrate_camera(views)
+    for number in range(5):
+        if result.verdict.name == "good":
+            break
+        assert "next, the board at the" in result.verdict.reason
+        covariance = result.covariance
+        assert covariance is not None
+        hits = result.coverage.hits if result.coverage.share < 0.6 else None
+        add = next_view(
+            result.intrinsics, solved_parameters("full"), covariance, corners_m(BOARD), 0.1, hits
+        )
+        assert add is not None
+        pose = rigid(add.pose[:3], add.pose[3:])
+        seen = board_view(BOARD, pose, CAMERA, rng, 0.1)
+        inside = ((seen.pixels > 0) & (seen.pixels < [639, 479])).all(axis=1)
+        views.append(BoardImage(f"next{number}", seen.only(inside)))
+        result = calibrate_camera(views)
+    assert result.verdict.name == "good"
+    assert len(parameters(result.intrinsics)) == 9
