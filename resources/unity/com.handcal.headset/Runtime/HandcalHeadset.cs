@@ -67,6 +67,8 @@ namespace Handcal
         /// <summary>The wearer whose calibration is drawn with; empty if there is none.</summary>
         public string Wearer { get { return drawn.Wearer; } }
 
+        public bool IsPaired { get { return pairing != null && pairing.IsPaired; } }
+
         public bool IsConnected { get { return link != null && link.IsConnected; } }
 
         /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>

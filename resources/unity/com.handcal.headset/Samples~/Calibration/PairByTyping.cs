@@ -1,13 +1,21 @@
 using Handcal;
 using UnityEngine;
 
-/// <summary>Asks for the PC's address and digits, or the text under its QR code.</summary>
+/// <summary>
+/// Opens the keyboard while the headset is not paired, for the PC's address and digits
+/// ("192.168.1.20:47800 12345678") or the text under its QR code.
+/// </summary>
 public sealed class PairByTyping : MonoBehaviour
 {
     public HandcalHeadset headset;
     TouchScreenKeyboard keyboard;
 
-    /// <summary>Opens the keyboard: call it from a button or a voice command.</summary>
+    void Start()
+    {
+        if (!headset.IsPaired) Ask();
+    }
+
+    /// <summary>Opens the keyboard, also to pair again: call it from a button.</summary>
     public void Ask()
     {
         keyboard = TouchScreenKeyboard.Open("");
@@ -16,7 +24,8 @@ public sealed class PairByTyping : MonoBehaviour
     void Update()
     {
         if (keyboard == null || keyboard.status != TouchScreenKeyboard.Status.Done) return;
-        if (headset.Pair(keyboard.text)) enabled = false;
+        string text = keyboard.text;
         keyboard = null;
+        if (!headset.Pair(text)) Ask();
     }
 }
