@@ -49,9 +49,10 @@ _SHARE = number(float, 0.0, 1.0)
     arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
     arg(
         "--plan",
-        choices=("paper",),
+        choices=("paper", "recommended"),
         default="paper",
-        help="alignments to make: as many as --alignments says, where the hand is",
+        help="alignments to make: as many as --alignments says, where the hand is; or those that "
+        "tell most, and a verification of each eye",
     ),
     arg(
         "--alignments",
@@ -62,9 +63,9 @@ _SHARE = number(float, 0.0, 1.0)
     ),
     arg(
         "--eyes",
-        choices=("both", "each"),
+        choices=("both", "each", "left", "right"),
         default="both",
-        help="align both eyes at once, or each eye alone",
+        help="align both eyes at once, or each eye alone; or the one eye that sees",
     ),
     arg("--wearer", default="", metavar="NAME", help="name or code of the wearer"),
     arg(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,13 @@ from handcal.errors import HandcalError
 from handcal.link.pairing import Pairings
 from handcal.progress import Progress
 from handcal.station.doctor import Health
+from handcal.station.plan import NextStep, PlanSettings, StepName
 from handcal.station.preflight import check_station
 from handcal.station.procedure import Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EYES, Eye
+from handcal.types import EYES, Eye, EyePlan, PlanName
 
 _DELIVERY_S = 5.0
 
@@ -30,11 +31,12 @@ class RunSettings:
     station: StationSettings = field(default_factory=StationSettings)
     wearer: str = ""
     """Name or code; stored in the session."""
-    plan: Literal["paper"] = "paper"
-    """Alignments to be made: `paper`, as many as follow, where the hand is."""
+    plan: PlanName = "paper"
     alignments: int = 1
-    """Number of alignments; of each eye, if `eyes` is ``"each"``."""
-    eyes: Literal["both", "each"] = "both"
+    """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
+    recommended plan decides by itself."""
+    eyes: EyePlan = "both"
+    """One eye for a wearer who sees with one."""
     patience_s: float = 60.0
     """Longest time for the wearer and the headset to do one step."""
 
@@ -69,8 +71,17 @@ def run_calibration(
     """
     pairings = pairings or Pairings(())
     _require_ready(settings.station, pairings)
-    with Station(settings.station, settings.wearer, pairings=pairings) as station:
-        _Run(station, settings, progress).follow_plan()
+    is_recommended = settings.plan == "recommended"
+    usable: tuple[Eye, ...] = (settings.eyes,) if settings.eyes in ("left", "right") else EYES
+    plan = PlanSettings(settings.plan, usable, is_automatic=is_recommended)
+    wanted = replace(settings.station, plan=plan)
+    with Station(wanted, settings.wearer, pairings=pairings) as station:
+        run = _Run(station, settings, progress)
+        run.wait(0.0, "Waiting for the headset", _is_connected, "no headset connected")
+        if is_recommended:
+            run.follow_recommended()
+        else:
+            run.follow_paper()
         snapshot = _deliver(station)
         station.finish()
         return _result(station, snapshot)
@@ -93,21 +104,40 @@ class _Run:
     settings: RunSettings
     progress: Progress
 
-    def follow_plan(self) -> None:
-        """Make every planned alignment; solve and apply after each."""
+    def follow_recommended(self) -> None:
+        """Let the station follow its plan to the end."""
+        share, step = 0.0, None
+        while step is None or step.name is not StepName.DONE:
+            done = step
+
+            def is_other(seen: Snapshot, done: NextStep | None = done) -> bool:
+                new = seen.procedure.next_step
+                return new is not None and (
+                    done is None or (new.name, new.eyes) != (done.name, done.eyes)
+                )
+
+            doing = "to begin" if done is None else done.text
+            what = "Following the plan" if done is None else f"{' and '.join(done.eyes)} {doing}"
+            snapshot = self.wait(share, what.strip(), is_other, f"the plan stopped at: {doing}")
+            step = snapshot.procedure.next_step
+            share += 0.1 * (0.95 - share)  # how many steps remain is not known
+        if self.station.calibration.results is None:
+            raise HandcalError(f"there is no result: {step.text}")
+
+    def follow_paper(self) -> None:
+        """Make every alignment; solve and apply after each."""
         settings, calibration = self.settings, self.station.calibration
-        each: tuple[tuple[Eye, ...], ...] = (
-            (EYES,) if settings.eyes == "both" else tuple((eye,) for eye in EYES)
-        )
-        plan = each * settings.alignments
-        waiting = "Waiting for the headset"
-        self._wait(0.0, waiting, lambda seen: seen.link.connected, "no headset connected")
+        each: Mapping[EyePlan, tuple[tuple[Eye, ...], ...]] = {
+            "both": (EYES,), "each": (("left",), ("right",)), "left": (("left",),),
+            "right": (("right",),),
+        }  # fmt: skip
+        plan = each[settings.eyes] * settings.alignments
         for number, eyes in enumerate(plan):
             which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
             label = f"Alignment {number + 1} of {len(plan)}, {which}"
             part = self.progress.part(number / len(plan), (number + 1) / len(plan))
             run = _Run(self.station, settings, part)
-            run._wait(
+            run.wait(
                 0.1,
                 f"{label}: waiting for a steady hand",
                 lambda seen: (
@@ -116,7 +146,7 @@ class _Run:
                 "the wearer did not hold the hand still",
             )
             calibration.make_cursor(eyes)
-            run._wait(
+            run.wait(
                 0.3,
                 f"{label}: the wearer aligns and confirms",
                 lambda seen: seen.procedure.state is State.ALIGNED,
@@ -125,17 +155,17 @@ class _Run:
             part.at(0.8, f"{label}: solving")
             calibration.solve()
             calibration.apply()
-            run._wait(
+            run.wait(
                 0.9,
                 f"{label}: waiting for the headset to apply it",
                 lambda seen: seen.procedure.state is State.APPLIED,
                 "the headset did not apply the result",
             )
 
-    def _wait(
+    def wait(
         self, share: float, what: str, until: Callable[[Snapshot], bool], complaint: str
-    ) -> None:
-        """Run the station until a condition holds.
+    ) -> Snapshot:
+        """Run the station until a condition holds, and return the snapshot in which it does.
 
         Raises HandcalError after the wearer's patience, or as soon as it cannot hold any more.
         """
@@ -149,11 +179,15 @@ class _Run:
             if snapshot.problem:
                 raise HandcalError(snapshot.problem)
             if until(snapshot):
-                return
+                return snapshot
         why = _reason(snapshot)
         raise HandcalError(
             f"{complaint} within {self.settings.patience_s:g} s{f': {why}' if why else ''}"
         )
+
+
+def _is_connected(snapshot: Snapshot) -> bool:
+    return snapshot.link.connected
 
 
 def _observed(snapshot: Snapshot, is_true: Callable[[Observation], bool]) -> bool:
@@ -183,6 +217,7 @@ def _result(station: Station, snapshot: Snapshot) -> dict[str, Any]:
     results, headset = calibration.results, station.headset
     return {
         "session": str(station.session.path),
+        "plan": station.plan.settings.name,
         "rig": station.rig.name,
         "camera": calibration.camera.model,
         "headset": None

@@ -121,6 +121,16 @@ def test_the_virtual_headset_is_calibrated(station: StationSettings) -> None:
     assert all(eye["projection_acked"] for eye in result["eyes"].values())
 
 
+def test_the_recommended_plan_leads_itself(station: StationSettings) -> None:
+    said: list[str] = []
+    settings = RunSettings(station, plan="recommended")
+    result = run_calibration(settings, Progress(lambda what, _: said.append(what)))
+    assert result["plan"] == "recommended"
+    assert result["alignments"] >= 1
+    assert all(eye["projection_acked"] for eye in result["eyes"].values())
+    assert len(set(said)) > 4
+
+
 def test_a_missing_headset_is_named_and_the_session_kept(
     station: StationSettings, recording: Path
 ) -> None:
