@@ -330,8 +330,8 @@ class Program(QObject):
         self._pairings = self._file.renew_pairing_key()
         self.start.set_pairing_key(self._pairings.open_key())
         self.window.banner.show_message(
-            "New pairing key created. Enter it in the headset; it takes effect at the next "
-            "calibration."
+            "New pairing key created. Enter it in the headset; all others are disconnected, and "
+            "the key is used from the next calibration on."
         )
 
     def _edit_preferences(self) -> None:

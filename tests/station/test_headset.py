@@ -136,7 +136,7 @@ def test_a_head_at_rest_or_a_hand_not_seen_tells_nothing() -> None:
     assert find_pose_delay(still, unknown, RIG.T_H_D) is None
 
 
-def test_a_delay_is_told_in_milliseconds() -> None:
+def test_a_delay_is_in_milliseconds() -> None:
     text = "poses are for 30 ± 1 ms {} than their stamps say"
     assert str(PoseDelay(0.03, 0.001)) == text.format("later")
     assert str(PoseDelay(-0.03, 0.001)) == text.format("earlier")
