@@ -194,7 +194,10 @@ class Plan:
         if faulty := [eye for eye in found if found[eye] in _FAULTY]:
             return results.verdicts[faulty[0]].reason
         is_judged = all(found.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
-        if is_judged and not (unverified and self.settings.verify) and self._next_check() is None:
+        is_verified = not (unverified and self.settings.verify)
+        # A stored calibration that its check does not refuse is kept.
+        is_kept = not self._calibration.alignments or self._next_check() is None
+        if is_judged and is_verified and is_kept:
             return "every eye has its verdict"
         return None
 
