@@ -34,6 +34,9 @@ METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open
 """The last needs the extra ``3d``; studies leave it out unless it is requested."""
 VerdictName: TypeAlias = Literal["accept", "repeat", "keep", "implausible", "contradicted"]
 
+LOOK_AROUND = "Look slowly to the left and to the right, and back."
+"""Prompt for the wearer while the camera's delay is not known."""
+
 EYE_DISTANCES_M = 0.045, 0.085
 """Eye distances of adults, with room to spare (Gordon et al. 2014, ANSUR II: 52 to 78 mm)."""
 

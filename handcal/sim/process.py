@@ -37,8 +37,9 @@ class VirtualHeadset(Closable):
         Seed of the wearer.
     loss, reorder : float
         Share of the datagrams lost, and reordered, in each direction.
-    is_stale : bool
-        Fault: it keeps drawing with the projections of the wearer before.
+    is_stale, loses_start : bool
+        Faults: it keeps drawing with the projections of the wearer before; the first projections
+        never arrive.
     eye_distance_m : float or None
         Eye distance that it reports; None: it measures none.
     """
@@ -55,6 +56,7 @@ class VirtualHeadset(Closable):
         loss: float = 0.0,
         reorder: float = 0.0,
         is_stale: bool = False,
+        loses_start: bool = False,
         eye_distance_m: float | None = None,
     ) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
@@ -70,6 +72,7 @@ class VirtualHeadset(Closable):
         command = [*program_command(), "headset"]
         command += [str(part) for option in options.items() for part in option]
         command += ["--stale"] if is_stale else []
+        command += ["--lose-start"] if loses_start else []
         if eye_distance_m is not None:
             command += ["--eye-distance-mm", str(1e3 * eye_distance_m)]
         self._process = subprocess.Popen(  # noqa: S603 (our own program)

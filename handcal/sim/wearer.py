@@ -23,7 +23,7 @@ from handcal.sim.placement import (
     overlay_hand,
     view_through,
 )
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.types import EYES, LOOK_AROUND, Eye, Float64, Rig
 
 _Phase: TypeAlias = Literal["raised", "reaching", "awaiting"]
 
@@ -73,6 +73,9 @@ class WearerSettings:
     """Amplitudes of slow sway."""
     tremor_m: float = 0.0001
     """Amplitude of the hand's tremor, 8 to 12 Hz."""
+    look_rad: float = 0.06
+    look_period_s: float = 2.0
+    """Amplitude and period of the head's movement when asked to look around."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,6 +209,8 @@ class Wearer:
         self._head_sway = _Sway(rng, settings.head_sway_m, settings.head_sway_rad, (0.05, 0.25))
         self._hand_sway = _Sway(rng, settings.hand_sway_m, settings.hand_sway_rad, (0.2, 0.5))
         self._tremor = _Sway(rng, settings.tremor_m, 0.0, (8.0, 12.0))
+        self._looks = 0.0
+        self._stepped_s = 0.0
         self._T_W_H0 = rigid(rng.normal(0.0, 0.05, 3), rng.normal(0.0, 0.05, 3))
         self._phase: _Phase = "raised"
         self._T_W_raised = self._choose_place()
@@ -226,7 +231,7 @@ class Wearer:
             Its times must not decrease between steps.
         """
         t_s = view.t_s
-        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s)
+        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s) @ self._look(view)
         if self._move is None:
             self._move = _Move(self._T_W_hand, t_s, 2.0 * self._settings.movement_s)
         self._notice(view, self._move)
@@ -236,6 +241,15 @@ class Wearer:
         self._T_W_hand = self._move.pose(t_s, goal)
         T_W_hand = self._T_W_hand @ self._hand_sway.pose(t_s) @ self._tremor.pose(t_s)
         return WearerAction(T_W_H, T_W_hand, confirm)
+
+    def _look(self, view: DisplayView) -> Float64:
+        """Turn the head from side to side while asked to; begin and end slowly."""
+        settings = self._settings
+        most = (view.t_s - self._stepped_s) / (0.25 * settings.look_period_s)
+        self._stepped_s = view.t_s
+        self._looks += float(np.clip((view.prompt == LOOK_AROUND) - self._looks, -most, most))
+        phase = 2.0 * np.pi * view.t_s / settings.look_period_s
+        return rigid([0.0, self._looks * settings.look_rad * np.sin(phase), 0.0])
 
     def _notice(self, view: DisplayView, move: _Move) -> None:
         """Start aligning with a new cursor, and relax after the alignment."""

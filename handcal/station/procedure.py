@@ -43,11 +43,13 @@ from handcal.register.shape import ShapeChange, change_text
 from handcal.session.facts import AlignmentFacts, CameraUsed
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
+from handcal.station.delay import DelayMeter, DelaySettings
 from handcal.station.evidence import Contradiction, Evidence
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.hold import merge_hold
 from handcal.types import (
     EYES,
+    LOOK_AROUND,
     Alignment,
     CameraIdentity,
     Eye,
@@ -88,7 +90,8 @@ class CalibrationSettings:
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     camera_latency_s: float = 0.03
-    """Shortest time from a frame's exposure to its arrival."""
+    """Shortest time from a frame's exposure to its arrival, until it is measured."""
+    delay: DelaySettings = field(default_factory=DelaySettings)
     match_tolerance_s: float = 0.15
     """Largest time between t_b and the frame of an alignment."""
     steady_s: float = 0.4
@@ -196,6 +199,8 @@ class Calibration:
         self._session = session
         self._settings = settings or CalibrationSettings()
         self._clock = FrameClock(self._settings.camera_latency_s)
+        self._delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, self._settings.delay)
+        self._looks_around = False
         self._finder = make_finder(self._settings.segment)
         self._hands = RecentHands(
             link.pose_at_host_ns, rig.T_H_D, self._settings.steady_s, self._settings.steady_m
@@ -260,7 +265,13 @@ class Calibration:
         self._frame = frame
         problem = ""
         cloud: HandCloud | None = None
-        contradiction = self.evidence.see(frame, self.camera)
+        if self._delay.see(frame):
+            self._hands.clear()  # they were placed by an assumed delay
+        contradiction = (
+            self.evidence.see(frame, self.camera)
+            or self.evidence.see_delay(self._delay.delay_s, self._settings.delay.limit_s)
+            or self.evidence.see_delivery(self._is_lost())
+        )
         try:
             if contradiction is None:
                 cloud = self._finder.find(frame)
@@ -272,7 +283,8 @@ class Calibration:
         segment_ms = 1e3 * (time.perf_counter() - started_s)
         hand, not_placed = self._hands.add(cloud, t_host_ns)
         problem = "" if hand else problem or not_placed
-        is_steady = self._hands.steady() is not None
+        is_steady = self._hands.steady() is not None and not self._delay.is_needed
+        self._ask_to_look_around()
         observation = Observation(
             self.state,
             hand,
@@ -306,6 +318,11 @@ class Calibration:
         hand = self._hands.steady()
         if hand is None:
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
+        if self._delay.is_needed:
+            raise ProcedureError(
+                "the delay of the camera's pictures is not known yet; let the wearer look slowly "
+                "to the left and to the right, before a background with texture"
+            )
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
         try:
@@ -657,6 +674,24 @@ class Calibration:
             is_over_limit=is_over_limit,
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
+
+    def _is_lost(self) -> bool:
+        """Return True if the headset is connected and has not acknowledged its projections."""
+        is_failed = any(message.state is Delivery.FAILED for message in self._sent.values())
+        return is_failed and self._link.connected
+
+    def _ask_to_look_around(self) -> None:
+        """Have the wearer move the head as long as the camera's delay is needed for a cursor."""
+        is_needed = (
+            self._delay.is_needed
+            and self.state is not State.ALIGN
+            and self._hands.steady() is not None
+        )
+        is_over = not self._delay.is_needed or self.state is State.ALIGN
+        if is_needed if not self._looks_around else is_over:
+            self._looks_around = is_needed
+            if self.state is not State.ALIGN:
+                self._link.send_prompt(LOOK_AROUND if is_needed else "", EYES)
 
     def _has_changed(self, shape: ShapeChange | None) -> bool:
         return shape is not None and shape.rms_m > self._settings.guard.shape_limit_m
