@@ -296,6 +296,9 @@ class Alignment:
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
     """each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration."""
+    time_sigma_m: float = 0.0
+    """Standard deviation of the hand's place because the times of frames and confirmation are not
+    exact."""
 
     __repr__ = brief
 

@@ -252,7 +252,8 @@ def _observe(
         weight = np.linalg.solve(total, normals[eye]) @ R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
         H[:, eye_slice(eye)] = weight
         seen_m += weight @ shift.shift_m
-    return Observation(H, seen_m, np.mean(registrations, axis=0), np.mean(wearers, axis=0))
+    registration = np.mean(registrations, axis=0) + alignment.time_sigma_m**2 * np.eye(3)
+    return Observation(H, seen_m, registration, np.mean(wearers, axis=0))
 
 
 def _is_shown(points_E_m: Float64, display: EyeDisplay, drawn_shift_m: Float64) -> Bool:

@@ -10,7 +10,7 @@ general approach to spatiotemporal calibration in multisensor systems", IEEE T-R
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from handcal.camera.clock import FrameClock
 from handcal.errors import PoseError, PosePendingError
 from handcal.geometry import invert
 from handcal.station.background import Background, follow, make_background
+from handcal.station.hands import PlacedHand
 from handcal.types import Float64, Frame
 
 _KEY_NS = 5_000_000_000
@@ -31,22 +32,26 @@ _USED_FRAMES = 60
 _FEWEST_FRAMES = 12
 _STEP_NS = 10_000_000
 """Step of the table of poses."""
-_HALF = 15
+_HALF = 8
 _SMOOTH = np.convolve(np.ones(_HALF), np.ones(_HALF)) / _HALF**2
-"""Weights of a mean over ± 150 ms, which lowers the noise of the poses. It is symmetric, so it
-moves no time. With less the noise counts as movement, and σ is too small."""
+"""Weights of a mean over ± 80 ms, which lowers the noise of the poses. It is symmetric, so it moves
+no time."""
 _REACH_NS = _HALF * _STEP_NS
 _LARGEST_S = 0.3
 _COARSE_S, _FINE_S = 0.02, 0.01
 _FINE = 4
 """The cost is a parabola in the time, as far as this many fine steps."""
+_LEAST_RATE_RAD_S = 0.012
+"""Least change of the head's rate, rms. The noise of smoothed poses looks like 0.002 rad/s; where
+it is not small beside the movement, σ would be too small."""
 _EVERY_NS, _EVERY_KNOWN_NS = 400_000_000, 5_000_000_000
 """Time between two measurements."""
 _EVERY_FRAME_KNOWN = 3
 _LONGEST_NS = 2_000_000_000
 """A frame that arrives later than this, or before its exposure, is of another clock."""
-_STILL_RAD, _STILL_M = 0.0005, 0.0005
-"""A head that moved less is in the same place at all times."""
+_CARRY_NS = 50_000_000
+_STILL_RAD, _STILL_M = 0.0002, 0.0002
+"""A head whose place varies less, rms, is in the same place at all times."""
 
 _Int64 = NDArray[np.int64]
 
@@ -57,8 +62,12 @@ class DelaySettings:
 
     sigma_s: float = 0.008
     """The delay is known if its standard deviation is at most this."""
-    limit_s: float = 0.12
+    limit_s: float = 0.13
     """Largest time from the exposure to the earliest arrival."""
+    assumed_sigma_s: float = 0.03
+    """Standard deviation of a delay that is not measured."""
+    moved_limit_m: float = 0.0015
+    """Largest standard deviation of a hand's place because of the times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +113,7 @@ class DelayMeter:
         self._poses: deque[tuple[int, Float64]] = deque()
         self._next_pose_ns = self._next_ns = self._newest_ns = self._frames = 0
         self.is_needed = False
+        self._sigma_s = settings.assumed_sigma_s
 
     @property
     def delay_s(self) -> float | None:
@@ -121,6 +131,7 @@ class DelayMeter:
         if not is_same_clock or frame.t_camera_ns < self._newest_ns:
             self._backgrounds.clear()
             self._clock.measured_ns = None
+            self._sigma_s = self._settings.assumed_sigma_s
         if frame.t_camera_ns == self._newest_ns:
             return False
         self._newest_ns = frame.t_camera_ns
@@ -137,9 +148,42 @@ class DelayMeter:
         )
         if found is not None and found.sigma_s <= self._settings.sigma_s:
             self._clock.measured_ns = found.offset_ns
+            self._sigma_s = found.sigma_s
             self._next_ns = frame.t_host_ns + _EVERY_KNOWN_NS
         self.is_needed = self._clock.measured_ns is None and not _is_still(poses)
         return not is_known and self._clock.measured_ns is not None
+
+    def time_sigma_m(
+        self, hands: Sequence[PlacedHand], confirmed_ns: int, speed_m_s: float
+    ) -> float:
+        """Return the standard deviation of the last hand's place relative to the first.
+
+        The head moves by its speed times the uncertainty of the delay, at each of them; the hand by
+        its speed times the age of the match.
+
+        Parameters
+        ----------
+        hands : sequence of PlacedHand
+            The cursor, and the hand taken for the confirmation.
+        confirmed_ns : int
+            Host time of the confirmation.
+        speed_m_s : float
+            Of that hand in the world.
+        """
+        age_s = 1e-9 * abs(hands[-1].t_host_ns - confirmed_ns)
+        moved_m = [self._sigma_s * self._carried_m_s(hand) for hand in hands]
+        return float(np.linalg.norm([*moved_m, age_s * speed_m_s]))
+
+    def _carried_m_s(self, hand: PlacedHand) -> float:
+        """Return the speed at which the head carries what is at the hand's place; 0 if unknown."""
+        around_ns = (hand.t_host_ns - _CARRY_NS, hand.t_host_ns + _CARRY_NS)
+        try:
+            before, after = (self._pose_at_host_ns(t_ns) for t_ns in around_ns)
+        except PoseError:
+            return 0.0
+        at_H = invert(before)[:3] @ [*hand.middle_W_m, 1.0]
+        moved_m = (after - before)[:3] @ [*at_H, 1.0]
+        return float(np.linalg.norm(moved_m)) / (2e-9 * _CARRY_NS)
 
     def _follow(self, frame: Frame) -> None:
         backgrounds = self._backgrounds
@@ -192,8 +236,8 @@ def _movement(poses: Float64) -> Float64:
 def _is_still(poses: Float64) -> bool:
     if len(poses) < 2 * _HALF:
         return True
-    span = np.ptp(_movement(poses)[_HALF:-_HALF], axis=0)
-    return bool((span[:3] < _STILL_RAD).all() and (span[3:] < _STILL_M).all())
+    spread = _movement(poses)[_HALF:-_HALF].std(axis=0)
+    return bool((spread[:3] < _STILL_RAD).all() and (spread[3:] < _STILL_M).all())
 
 
 def measure_offset(
@@ -238,7 +282,8 @@ def measure_offset(
     cost = np.square(residuals).sum(axis=(1, 2))
     a, b, c = np.polyfit(steps_s, cost, 2)
     freedom = residuals[0].size - 2 * len(used) - 1
-    if a <= 0.0 or abs(b / (2.0 * a)) > _FINE * _FINE_S or freedom < _FEWEST_FRAMES:
+    is_moved = a > residuals.shape[1] * _LEAST_RATE_RAD_S**2
+    if not is_moved or abs(b / (2.0 * a)) > _FINE * _FINE_S or freedom < _FEWEST_FRAMES:
         return None
     variance = max(float(c - b * b / (4.0 * a)), 1e-12) / freedom
     best = residuals[cost.argmin()]

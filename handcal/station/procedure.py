@@ -742,6 +742,14 @@ class Calibration:
                 "shape changed",
             )
             return
+        time_sigma_m = self._delay.time_sigma_m(
+            (self._cursor, hand), confirmation.t_host_ns, self._hands.speed_m_s(hand)
+        )
+        if time_sigma_m > self._settings.delay.moved_limit_m:
+            self._refuse(
+                "Your hand or your head moved too fast. Hold both still and confirm again.", "moved"
+            )
+            return
         alignment = Alignment(
             cursor_m=self._cursor.points_W_m,
             hand_m=hand.points_W_m,
@@ -753,6 +761,7 @@ class Calibration:
             t_a_ns=self._cursor.cloud.t_camera_ns,
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(self._shift_m),
+            time_sigma_m=time_sigma_m,
         )
         self.evidence.drawn_as_sent()
         facts = AlignmentFacts(
