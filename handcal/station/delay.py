@@ -90,12 +90,6 @@ class DelayMeter:
     T_H_D : (4, 4) float64
         From the depth camera to the headset.
     settings : DelaySettings
-
-    Attributes
-    ----------
-    is_needed : bool
-        False if the delay is known, if the head has hardly moved so that it has no effect, or if
-        the camera gives no colour, in which the background is followed.
     """
 
     def __init__(
@@ -112,8 +106,17 @@ class DelayMeter:
         self._backgrounds: deque[Background] = deque()
         self._poses: deque[tuple[int, Float64]] = deque()
         self._next_pose_ns = self._next_ns = self._newest_ns = self._frames = 0
-        self.is_needed = False
+        self._has_color = self._is_still = False
         self._sigma_s = settings.assumed_sigma_s
+
+    @property
+    def is_needed(self) -> bool:
+        """True if the delay has an effect and is not known.
+
+        A head that hardly moves is in the same place at all times. Without colour, in which the
+        background is followed, the delay stays assumed.
+        """
+        return self._has_color and self._clock.measured_ns is None and not self._is_still
 
     @property
     def delay_s(self) -> float | None:
@@ -125,6 +128,7 @@ class DelayMeter:
         """Look at a frame that the clock knows; return True if the delay has just become known."""
         if frame.color is None:
             return False
+        self._has_color = True
         measured_ns = self._clock.measured_ns
         late_ns = frame.t_host_ns - frame.t_camera_ns - (measured_ns or 0)
         is_same_clock = measured_ns is None or 0 <= late_ns < _LONGEST_NS
@@ -132,6 +136,7 @@ class DelayMeter:
             self._backgrounds.clear()
             self._clock.measured_ns = None
             self._sigma_s = self._settings.assumed_sigma_s
+            self._next_ns, self._is_still = 0, False
         if frame.t_camera_ns == self._newest_ns:
             return False
         self._newest_ns = frame.t_camera_ns
@@ -150,7 +155,7 @@ class DelayMeter:
             self._clock.measured_ns = found.offset_ns
             self._sigma_s = found.sigma_s
             self._next_ns = frame.t_host_ns + _EVERY_KNOWN_NS
-        self.is_needed = self._clock.measured_ns is None and not _is_still(poses)
+        self._is_still = _is_still(poses)
         return not is_known and self._clock.measured_ns is not None
 
     def time_sigma_m(
@@ -234,8 +239,8 @@ def _movement(poses: Float64) -> Float64:
 
 
 def _is_still(poses: Float64) -> bool:
-    if len(poses) < 2 * _HALF:
-        return True
+    if len(poses) < 4 * _HALF:
+        return False
     spread = _movement(poses)[_HALF:-_HALF].std(axis=0)
     return bool((spread[:3] < _STILL_RAD).all() and (spread[3:] < _STILL_M).all())
 

@@ -30,6 +30,7 @@ from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.station.delay import DelaySettings
 from handcal.station.evidence import FROZEN_FRAMES
 from handcal.station.procedure import (
     Calibration,
@@ -60,7 +61,10 @@ CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 RIG = replace(example_rig(), depth_intrinsics=CAMERA)
 SENSOR = SensorSettings()
 LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
-SETTINGS = CalibrationSettings(camera_latency_s=0.0)
+# The stage's times are exact, so a hand may be followed while it moves.
+SETTINGS = CalibrationSettings(
+    camera_latency_s=0.0, delay=DelaySettings(assumed_sigma_s=0.0, moved_limit_m=0.01)
+)
 PERIOD_NS = 80_000_000
 HEADSET_AHEAD_NS = 5_000_000_000
 CAMERA_AHEAD_NS = 7_000_000_000
@@ -413,6 +417,21 @@ def test_the_frame_nearest_the_confirmation_is_taken_at_its_own_pose(stage: Stag
         expected_W_m - still_W_m,
         atol=1e-3,
     )
+
+
+def test_a_hand_that_moves_when_it_is_confirmed_is_refused(
+    server: HeadsetServer, client: HeadsetClient, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 10 cm/s the hand of a frame a third of a period away is 3 mm off."""
+    monkeypatch.setattr(f"{__name__}.SETTINGS", CalibrationSettings(camera_latency_s=0.0))
+    stage = Stage(server, client, session)
+    stage.make_cursor()
+    for i in range(5):
+        stage.see(rigid([-0.2, 0.0, 0.0], [0.008 * i, 0.0, 0.5]))
+    stage.press(stage.t_ns + PERIOD_NS // 3)
+    stage.see(rigid([-0.2, 0.0, 0.0], [0.04, 0.0, 0.5]))
+    assert stage.state() is State.ALIGN
+    assert "moved too fast" in stage.calibration.refusal
 
 
 def visible_m(T_W_hand: Float64) -> Float64:
