@@ -146,7 +146,7 @@ class DelayMeter:
             self._follow(frame)
         if frame.t_host_ns < self._next_ns:
             return False
-        self._next_ns = frame.t_host_ns + _EVERY_NS
+        self._next_ns = frame.t_host_ns + (_EVERY_KNOWN_NS if is_known else _EVERY_NS)
         times_ns, poses = self._read_poses()
         found = measure_offset(
             self._backgrounds, times_ns, poses, self._T_H_D, self._clock.earliest_ns

@@ -131,6 +131,8 @@ class Observation:
     """Durations of these stages."""
     contradiction: Contradiction | None = None
     """Evidence that forbids to use this frame."""
+    needs_delay: bool = False
+    """True if no cursor can be made before the wearer has looked around (`DelayMeter`)."""
 
 
 class Calibration:
@@ -293,6 +295,7 @@ class Calibration:
             cloud,
             segment_ms=segment_ms,
             contradiction=contradiction,
+            needs_delay=self._delay.is_needed,
         )
         if self.state is State.ALIGN:
             observation = self._guide(observation)

@@ -209,10 +209,13 @@ class Wizard:
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
         seen = snapshot.observation
         is_steady = seen is not None and seen.is_steady
+        held = Precondition("Hand held still", is_steady)
+        if seen is not None and seen.needs_delay:
+            held = Precondition("The wearer has looked slowly to the left and to the right", False)
         return WizardView(
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
-            (_hand_check(snapshot), Precondition("Hand held still", is_steady)),
+            (_hand_check(snapshot), held),
             ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady),
             (ButtonSpec(Action.BACK, "&Back"),),
         )
