@@ -30,6 +30,7 @@ class FrameClock:
     def __init__(self, latency_s: float) -> None:
         self._latency_ns = round(1e9 * latency_s)
         self._delays_ns: deque[int] = deque(maxlen=_WINDOW)
+        self._exposed_ns: deque[int] = deque(maxlen=_WINDOW)
         self._newest_ns = 0
         self.measured_ns: int | None = None
 
@@ -38,12 +39,20 @@ class FrameClock:
         """Earliest arrival of the last frames, on the host's clock, minus the camera's time."""
         return min(self._delays_ns)
 
+    @property
+    def period_s(self) -> float:
+        """Mean time between the last frames, at most 300."""
+        first_ns, count = self._exposed_ns[0], len(self._exposed_ns)
+        return 1e-9 * (self._newest_ns - first_ns) / max(1, count - 1)
+
     def exposure_ns(self, frame: Frame) -> int:
         """Return the time of a frame's exposure on the host's monotonic clock."""
         if frame.t_camera_ns < self._newest_ns:
             self._delays_ns.clear()
+            self._exposed_ns.clear()
             self.measured_ns = None
         self._newest_ns = frame.t_camera_ns
+        self._exposed_ns.append(frame.t_camera_ns)
         self._delays_ns.append(frame.t_host_ns - frame.t_camera_ns)
         if self.measured_ns is not None:
             return frame.t_camera_ns + self.measured_ns

@@ -62,8 +62,10 @@ class DelaySettings:
 
     sigma_s: float = 0.008
     """The delay is known if its standard deviation is at most this."""
-    limit_s: float = 0.13
-    """Largest time from the exposure to the earliest arrival."""
+    limit_s: float = 0.12
+    limit_frames: float = 0.15
+    """Largest time from the exposure to the earliest arrival: the sum of both. A busy computer,
+    with few frames a second, is late by a share of the time between two frames."""
     assumed_sigma_s: float = 0.03
     """Standard deviation of a delay that is not measured."""
     moved_limit_m: float = 0.0015
@@ -123,6 +125,11 @@ class DelayMeter:
         """Time from the exposure to the earliest arrival; None if it is not known."""
         measured_ns = self._clock.measured_ns
         return None if measured_ns is None else 1e-9 * (self._clock.earliest_ns - measured_ns)
+
+    @property
+    def largest_delay_s(self) -> float:
+        """Largest delay of a camera that is not late."""
+        return self._settings.limit_s + self._settings.limit_frames * self._clock.period_s
 
     def see(self, frame: Frame) -> bool:
         """Look at a frame that the clock knows; return True if the delay has just become known."""

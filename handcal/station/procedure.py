@@ -271,7 +271,7 @@ class Calibration:
             self._hands.clear()  # they were placed by an assumed delay
         contradiction = (
             self.evidence.see(frame, self.camera)
-            or self.evidence.see_delay(self._delay.delay_s, self._settings.delay.limit_s)
+            or self.evidence.see_delay(self._delay.delay_s, self._delay.largest_delay_s)
             or self.evidence.see_delivery(self._is_lost())
         )
         try:
