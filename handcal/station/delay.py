@@ -25,11 +25,11 @@ from handcal.station.hands import PlacedHand
 from handcal.types import Float64, Frame
 
 _KEY_NS = 5_000_000_000
-"""A key frame serves for this time at the most."""
+"""A key frame serves for this time, or longer on a busy computer, until it has enough frames."""
 _KEPT_FRAMES = 450
 _USED_FRAMES = 60
 """Most frames of one key frame that are used for a measurement, evenly spread."""
-_FEWEST_FRAMES = 12
+_FEWEST_FRAMES = 8
 _STEP_NS = 10_000_000
 """Step of the table of poses."""
 _HALF = 8
@@ -199,7 +199,11 @@ class DelayMeter:
 
     def _follow(self, frame: Frame) -> None:
         backgrounds = self._backgrounds
-        is_old = bool(backgrounds) and frame.t_camera_ns - backgrounds[-1].times_ns[0] > _KEY_NS
+        is_old = (
+            bool(backgrounds)
+            and frame.t_camera_ns - backgrounds[-1].times_ns[0] > _KEY_NS
+            and len(backgrounds[-1].times_ns) > 2 * _FEWEST_FRAMES
+        )
         if not backgrounds or is_old or not follow(backgrounds[-1], frame):
             made = make_background(frame) if self._has_poses(frame) else None
             if made is not None:
