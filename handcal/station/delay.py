@@ -47,6 +47,7 @@ it is not small beside the movement, σ would be too small."""
 _EVERY_NS, _EVERY_KNOWN_NS = 400_000_000, 5_000_000_000
 """Time between two measurements."""
 _EVERY_FRAME_KNOWN = 3
+_SLOW_S = 0.3
 _LONGEST_NS = 2_000_000_000
 """A frame that arrives later than this, or before its exposure, is of another clock."""
 _CARRY_NS = 50_000_000
@@ -65,7 +66,8 @@ class DelaySettings:
     limit_s: float = 0.12
     limit_frames: float = 0.15
     """Largest time from the exposure to the earliest arrival: the sum of both. A busy computer,
-    with few frames a second, is late by a share of the time between two frames."""
+    with few frames a second, is late by a share of the time between two frames, at most 0.3 s of
+    which counts."""
     assumed_sigma_s: float = 0.03
     """Standard deviation of a delay that is not measured."""
     moved_limit_m: float = 0.0015
@@ -129,7 +131,8 @@ class DelayMeter:
     @property
     def largest_delay_s(self) -> float:
         """Largest delay of a camera that is not late."""
-        return self._settings.limit_s + self._settings.limit_frames * self._clock.period_s
+        period_s = min(self._clock.period_s, _SLOW_S)
+        return self._settings.limit_s + self._settings.limit_frames * period_s
 
     def see(self, frame: Frame) -> bool:
         """Look at a frame that the clock knows; return True if the delay has just become known."""

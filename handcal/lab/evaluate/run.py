@@ -72,7 +72,7 @@ class UserTestRun:
 class SegmentationRun:
     """The figures of a test of the segmentation, and its report."""
 
-    figures: Mapping[str, Any]
+    figures: dict[str, Any]
     """As `evaluation` gives them."""
     report: Report
     files: tuple[Path, ...]
