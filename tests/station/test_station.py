@@ -261,7 +261,6 @@ def test_a_resumed_session_keeps_the_prior_it_began_with(
     [
         ("other-camera", "choose the rig file"),
         ("frozen-camera", "unplug the camera"),
-        ("late-camera", "ms after their exposure"),
         ("lost-start", "restart its app"),
     ],
 )
