@@ -35,6 +35,9 @@ METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open
 """The last needs the extra ``3d``; studies leave it out unless it is requested."""
 VerdictName: TypeAlias = Literal["accept", "repeat", "keep", "implausible", "contradicted"]
 
+LOOK_AROUND = "Look slowly to the left and to the right, and back."
+"""Prompt for the wearer while the camera's delay is not known."""
+
 EYE_DISTANCES_M = 0.045, 0.085
 """Eye distances of adults, with room to spare (Gordon et al. 2014, ANSUR II: 52 to 78 mm)."""
 
@@ -294,6 +297,9 @@ class Alignment:
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
     """each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration."""
+    time_sigma_m: float = 0.0
+    """Standard deviation of the hand's place because the times of frames and confirmation are not
+    exact."""
 
     __repr__ = brief
 

@@ -12,6 +12,7 @@ from handcal.lab.settings import (
     CubeTestSettings,
     MethodComparisonSettings,
     NoiseStudySettings,
+    SegmentationTestSettings,
     UserTestSettings,
 )
 
@@ -63,6 +64,9 @@ class EvaluationEntries:
     )
     cube: CubeEntries = field(default_factory=lambda: CubeEntries(output=_folder("cube")))
     users: UserEntries = field(default_factory=UserEntries)
+    segmentation: SegmentationTestSettings = field(
+        default_factory=lambda: SegmentationTestSettings(output=_folder("segmentation"))
+    )
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -38,6 +38,8 @@ _DELIVERY_S = 5.0
 _PATIENCE_S = 60.0
 _RULER_SIGMA_M = 0.001
 _RULER, _SLIP = 1, 2  # their random numbers are not the wearer's
+_LASTING_S = 4.0
+"""Passing evidence, such as a late camera on a busy computer, counts if it lasts this long."""
 _PATIENCE_STEPS = 300
 """Minimum number of station steps before giving up, so that a slow computer gets more time."""
 
@@ -172,11 +174,11 @@ class ContradictedError(HandcalError):
         self.contradiction = contradiction
 
 
-def _require_no_contradiction(calibration: Calibration, seen: Observation) -> None:
-    """Raise ContradictedError if no alignment can be taken, now or at all."""
+def _require_no_contradiction(calibration: Calibration, passing: Contradiction | None) -> None:
+    """Raise ContradictedError if evidence, passing or not, lets no alignment be taken."""
     found = [*calibration.evidence.contradictions]
-    if seen.contradiction is not None:
-        found.append(seen.contradiction)
+    if passing is not None:
+        found.append(passing)
     if found and not calibration.alignments:
         raise ContradictedError(found[0])
 
@@ -269,7 +271,8 @@ class _Watch:
 
     def until(self, is_reached: Callable[[Snapshot, Observation], bool], complaint: str) -> None:
         """Step until something is reached; HandcalError after a while or for a problem."""
-        deadline_s = time.monotonic() + _PATIENCE_S
+        fine_s = time.monotonic()
+        deadline_s = fine_s + _PATIENCE_S
         steps = 0
         while time.monotonic() < deadline_s or steps < _PATIENCE_STEPS:
             steps += 1
@@ -282,7 +285,10 @@ class _Watch:
                 self.seen.append(observation)
                 if self.began_s is None and observation.hand is not None:
                     self.began_s = time.monotonic()
-                _require_no_contradiction(self.station.calibration, observation)
+                passing, now_s = observation.contradiction, time.monotonic()
+                fine_s = now_s if passing is None else fine_s
+                lasts = now_s - fine_s > _LASTING_S
+                _require_no_contradiction(self.station.calibration, passing if lasts else None)
                 if is_reached(snapshot, observation):
                     self.ended_s = time.monotonic()
                     return

@@ -107,6 +107,7 @@ def detector(arguments: argparse.Namespace) -> None:
         help="hand to segment: where the detector sees one, or the nearest object by depth alone",
     ),
     arg("--sheet", type=Path, metavar="FILE", help="PNG with all frames, masks and numbers"),
+    arg("--output", type=Path, metavar="FOLDER", help="folder for a report (default: none)"),
     json=True,
 )
 def segmentation(arguments: argparse.Namespace) -> None:
@@ -115,10 +116,13 @@ def segmentation(arguments: argparse.Namespace) -> None:
     from handcal.lab.settings import SegmentationTestSettings
 
     settings = SegmentationTestSettings(
-        str(arguments.folder), arguments.roi, str(arguments.sheet or "")
+        str(arguments.folder),
+        arguments.roi,
+        str(arguments.sheet or ""),
+        str(arguments.output or ""),
     )
     with show_progress() as progress:
-        result = run_segmentation_test(settings, progress)
+        result = run_segmentation_test(settings, progress).figures
     save(arguments.json, result)
     shown_table = table(
         "frame", "IoU", "kept, %", "beyond wrist, mm", "area ±, %", "centroid ±, mm"

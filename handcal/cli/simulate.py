@@ -210,6 +210,11 @@ def _say_contradictions(result: dict[str, Any]) -> None:
         help="stop after this time (default: run until terminated)",
     ),
     arg(
+        "--lose-start",
+        action="store_true",
+        help="fault: the first projections never arrive",
+    ),
+    arg(
         "--stale",
         action="store_true",
         help="fault: keep drawing with the projections of the wearer before",
@@ -260,6 +265,7 @@ def headset(arguments: argparse.Namespace) -> None:
         clock_offset_s=arguments.clock_offset_ms / 1e3,
         duration_s=arguments.duration_s,
         is_stale=arguments.stale,
+        loses_start=arguments.lose_start,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
         side=arguments.hand,
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),

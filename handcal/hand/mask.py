@@ -24,6 +24,8 @@ from handcal.types import Bool, Frame, UInt8
 
 # Share of the hand's outline that may touch the image border.
 _BORDER_CONTACT_M = 0.01
+# An arm shows at most this area beside its hand: 0.1 m times 0.5 m (see the survey in locate.py).
+_ARM_AREA_M2 = 0.05
 # Share of a part's contour on the coarse hand.
 _PART_MIN = 0.4
 _HAND, _MAY_BE_HAND, _MAY_BE_ARM = np.uint8(1), np.uint8(2), np.uint8(4)
@@ -71,6 +73,11 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     outline, filled = outlined
     surface = within & (filled > 0)
     if _border_contact_px(surface, view) * pitch_m > _BORDER_CONTACT_M:
+        if np.count_nonzero(located.arm) * (pitch_m * located.view.step_px) ** 2 > _ARM_AREA_M2:
+            raise HandError(
+                "arm and body cannot be told apart in the depth image; hold the arm clear of the "
+                "body and of other things"
+            )
         raise HandError("hand cut by the image border; move it toward the middle")
     cut = on_border(surface) | goes_on(surface, solid & ~surface, view.depth, jump)
     return HandMask(view, surface, filled, outline, cut, pitch_m)

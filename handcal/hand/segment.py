@@ -125,7 +125,8 @@ def _colors(frame: Frame, points_m: Float32, pixels: Pixels) -> UInt8 | None:
         return None
     if camera == frame.depth_intrinsics and (np.eye(4) == frame.T_C_D).all():
         rows, columns = pixels
-        return frame.color[rows, columns]
+        # Two times faster than with two indices.
+        return frame.color.reshape(-1, 3).take(rows * camera.width + columns, axis=0)
     seen_at = image_points(transform(frame.T_C_D, points_m), camera)
     columns, rows = np.rint(seen_at).astype(int).T
     seen = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)

@@ -115,6 +115,8 @@ class SegmentationTestSettings:
     roi: Roi = "detector"
     sheet: str = ""
     """PNG for a contact sheet of the frames; empty for none."""
+    output: str = ""
+    """Folder for the report; empty for none."""
 
 
 def output_folder(text: str) -> Path:

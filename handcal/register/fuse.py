@@ -236,18 +236,26 @@ def eye_position_m(display: EyeDisplay, shift_m: Float64) -> Float64:
     return np.asarray(transform(invert(display.T_V_H), eye_V[None])[0])
 
 
-def _with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | None) -> EyePrior:
-    """Return the prior with a measured eye distance, which is nearly linear in φ."""
-    if eye_distance is None:
-        return prior
-    left_m, right_m = (eye_position_m(rig.eyes[eye], prior.mean_m[eye_slice(eye)]) for eye in EYES)
+def observe_eye_distance(rig: Rig, eye_distance: EyeDistance, near_m: Float64) -> Observed:
+    """Return a measured eye distance as an observation of [φ_left; φ_right], linear near `near_m`.
+
+    H is (1, 6), the distance seen (1,), and its covariance (1, 1).
+    """
+    left_m, right_m = (eye_position_m(rig.eyes[eye], near_m[eye_slice(eye)]) for eye in EYES)
     between_m = right_m - left_m
     distance_m = float(np.linalg.norm(between_m))
     H = np.zeros((1, 6))
     for eye, sign in zip(EYES, (-1.0, 1.0), strict=True):
         H[0, eye_slice(eye)] = sign * rig.eyes[eye].T_V_H[:3, :3] @ between_m / distance_m
-    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ prior.mean_m
-    observed = H, seen_m, np.array([[eye_distance.sigma_m**2]])
+    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ near_m
+    return H, seen_m, np.array([[eye_distance.sigma_m**2]])
+
+
+def _with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | None) -> EyePrior:
+    """Return the prior with a measured eye distance, if there is one."""
+    if eye_distance is None:
+        return prior
+    observed = observe_eye_distance(rig, eye_distance, prior.mean_m)
     return EyePrior(*posterior(prior, [observed]), prior.sessions)
 
 
@@ -295,7 +303,8 @@ def _observe(
         R_A_E = R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
         registrations.append(R_A_E @ shift.covariance_m2 @ R_A_E.T)
         seen_m += H[:, eye_slice(eye)] @ shift.shift_m
-    return Observation(H, seen_m, np.mean(registrations, axis=0), wearer_m2)
+    registration_m2 = np.mean(registrations, axis=0) + alignment.time_sigma_m**2 * np.eye(3)
+    return Observation(H, seen_m, registration_m2, wearer_m2)
 
 
 def seen_by(

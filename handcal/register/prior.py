@@ -21,7 +21,7 @@ from handcal.types import Float64
 
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""
-# H (3, 6), the displacement seen (3,), and its covariance (3, 3).
+# H (n, 6), what was seen (n,), and its covariance (n, n): a displacement, n = 3, or a distance.
 Observed: TypeAlias = tuple[Float64, Float64, Float64]
 
 _DEFAULT_WEIGHT = 4.0
@@ -130,7 +130,8 @@ def learn_prior(
     Parameters
     ----------
     sessions : sequence of sequence of (H, seen, covariance)
-        The observations of each session's alignments, as in `Fused.observed`.
+        The observations of each session's alignments, as in `Fused.observed`, and of the wearer's
+        eye distance, if it was measured.
     settings : PriorSettings
         Of the default prior, which takes part as a few sessions.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -40,6 +41,8 @@ class SyntheticSettings:
     sensor: SensorSettings = field(default_factory=SensorSettings)
     freeze_after_s: float = np.inf
     """Fault: from this time on every frame repeats the last picture, with running time stamps."""
+    late_s: float = 0.0
+    """Fault: every frame arrives this much later."""
     focal_scale: float = 1.0
     """Fault: another camera, whose focal length is that of `depth_intrinsics` times this."""
     depth_bias_m: float = 0.0
@@ -49,6 +52,7 @@ class SyntheticSettings:
 CAMERA_FAULTS: Mapping[str, SyntheticSettings] = {
     "frozen-camera": SyntheticSettings(freeze_after_s=1.5),
     "other-camera": SyntheticSettings(focal_scale=1.04),
+    "late-camera": SyntheticSettings(late_s=0.12),
     "depth-bias": SyntheticSettings(depth_bias_m=0.02),
 }
 """Settings of a camera with a fault, by its name."""
@@ -94,6 +98,7 @@ class SyntheticCamera(Closable):
         self._scene = scene
         self._opened_s: float | None = None
         self._frozen: Frame | None = None
+        self._under_way: deque[Frame] = deque()
         self._rng = np.random.default_rng(seed)
         self._index = 0
         self._next_s = time.monotonic()
@@ -113,6 +118,13 @@ class SyntheticCamera(Closable):
         """
         if not self._is_open:
             raise CameraError("the simulated camera is closed; open it again")
+        while True:
+            self._under_way.append(self._expose(self._wait_for_scene(timeout_s)))
+            now_ns = time.monotonic_ns()
+            if now_ns >= self._under_way[0].t_host_ns + 1e9 * self._settings.late_s:
+                return replace(self._under_way.popleft(), t_host_ns=now_ns)
+
+    def _wait_for_scene(self, timeout_s: float) -> SceneState:
         deadline_s = time.monotonic() + timeout_s
         state = None
         while state is None:
@@ -127,7 +139,7 @@ class SyntheticCamera(Closable):
             if state is None:
                 time.sleep(np.clip(self._next_s - now_s, _POLL_S, deadline_s - now_s + _POLL_S))
         self._next_s = max(self._next_s + 1.0 / self._settings.rate_hz, time.monotonic())
-        return self._expose(state)
+        return state
 
     def _expose(self, state: SceneState) -> Frame:
         settings, world = self._settings, self._world

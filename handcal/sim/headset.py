@@ -16,6 +16,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,8 +24,9 @@ from handcal.display import projection_matrix
 from handcal.errors import LinkError
 from handcal.geometry import rigid
 from handcal.link.client import HeadsetClient, HeadsetState
+from handcal.link.endpoint import Channel
 from handcal.link.impair import UNIMPAIRED, Impairment
-from handcal.link.wire import VERSION, hkdf
+from handcal.link.wire import VERSION, Packet, Slot, hkdf
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
@@ -67,6 +69,8 @@ class HeadsetSettings:
     name: str = "Virtual headset"
     is_stale: bool = False
     """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
+    loses_start: bool = False
+    """Fault: the first projections never arrive."""
     eye_distance_m: float | None = None
     """Eye distance that it reports; None: it measures none."""
     side: Side | None = None
@@ -107,7 +111,7 @@ def run_headset(
     port = settings.scene_port
     end_s = start_s + settings.duration_s if settings.duration_s is not None else np.inf
     with (
-        HeadsetClient(
+        (_StartLost if settings.loses_start else HeadsetClient)(
             (settings.host, settings.port),
             pairing_key,
             _identity(settings, pairing_key, rig),
@@ -140,6 +144,19 @@ def run_headset(
                 )
             next_s = max(next_s + 1.0 / settings.rate_hz, now_s)
             time.sleep(next_s - now_s)
+
+
+class _StartLost(HeadsetClient):
+    """Never receives the first projections."""
+
+    _lost: ClassVar[dict[Slot, int]] = {}
+
+    def _accept(self, channel: Channel, packet: Packet) -> None:
+        if packet.slot in (Slot.PROJECTION_LEFT, Slot.PROJECTION_RIGHT):
+            self._lost.setdefault(packet.slot, packet.message_id)
+            if self._lost[packet.slot] == packet.message_id:
+                return
+        super()._accept(channel, packet)
 
 
 def _as_before(state: HeadsetState, rig: Rig) -> HeadsetState:

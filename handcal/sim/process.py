@@ -38,8 +38,9 @@ class VirtualHeadset(Closable):
         Seed of the wearer.
     loss, reorder : float
         Share of the datagrams lost, and reordered, in each direction.
-    is_stale : bool
-        Fault: it keeps drawing with the projections of the wearer before.
+    is_stale, loses_start : bool
+        Faults: it keeps drawing with the projections of the wearer before; the first projections
+        never arrive.
     side : {"left", "right"}, optional
     slip_m : (3,) tuple of float
     eye_distance_m : float or None
@@ -58,6 +59,7 @@ class VirtualHeadset(Closable):
         loss: float = 0.0,
         reorder: float = 0.0,
         is_stale: bool = False,
+        loses_start: bool = False,
         eye_distance_m: float | None = None,
         side: Side | None = None,
         slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -75,6 +77,7 @@ class VirtualHeadset(Closable):
         command = [*program_command(), "headset"]
         command += [str(part) for option in options.items() for part in option]
         command += ["--stale"] if is_stale else []
+        command += ["--lose-start"] if loses_start else []
         if eye_distance_m is not None:
             command += ["--eye-distance-mm", str(1e3 * eye_distance_m)]
         command += ["--hand", side] if side else []

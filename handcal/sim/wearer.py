@@ -25,7 +25,7 @@ from handcal.sim.placement import (
     view_through,
 )
 from handcal.sim.verifying import Check, SeenDifference, see_difference
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.types import EYES, LOOK_AROUND, Eye, Float64, Rig
 
 _Phase: TypeAlias = Literal["raised", "reaching", "awaiting", "verifying"]
 
@@ -88,6 +88,9 @@ class WearerSettings:
     look_s: float = 0.6
     press_s: float = 0.12
     """Times of a look at the outline, and of one press of a key."""
+    look_rad: float = 0.06
+    look_period_s: float = 2.0
+    """Amplitude and period of the head's movement when asked to look around."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,6 +232,8 @@ class Wearer:
         self._head_sway = _Sway(rng, settings.head_sway_m, settings.head_sway_rad, (0.05, 0.25))
         self._hand_sway = _Sway(rng, settings.hand_sway_m, settings.hand_sway_rad, (0.2, 0.5))
         self._tremor = _Sway(rng, settings.tremor_m, 0.0, (8.0, 12.0))
+        self._looks = 0.0
+        self._stepped_s = 0.0
         self._T_W_H0 = rigid(rng.normal(0.0, 0.05, 3), rng.normal(0.0, 0.05, 3))
         self._phase: _Phase = "raised"
         self._T_W_raised = self._choose_place()
@@ -250,7 +255,7 @@ class Wearer:
             Its times must not decrease between steps.
         """
         t_s = view.t_s
-        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s)
+        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s) @ self._look(view)
         if self._move is None:
             self._move = _Move(self._T_W_hand, t_s, 2.0 * self._settings.movement_s)
         self._notice(view, self._move)
@@ -263,6 +268,15 @@ class Wearer:
             return WearerAction(T_W_H, T_W_hand, confirm)
         nudge, fits = self._look(self._check, view, T_W_H, T_W_hand)
         return WearerAction(T_W_H, T_W_hand, confirm, nudge, fits)
+
+    def _look(self, view: DisplayView) -> Float64:
+        """Turn the head from side to side while asked to; begin and end slowly."""
+        settings = self._settings
+        most = (view.t_s - self._stepped_s) / (0.25 * settings.look_period_s)
+        self._stepped_s = view.t_s
+        self._looks += float(np.clip((view.prompt == LOOK_AROUND) - self._looks, -most, most))
+        phase = 2.0 * np.pi * view.t_s / settings.look_period_s
+        return rigid([0.0, self._looks * settings.look_rad * np.sin(phase), 0.0])
 
     def _notice(self, view: DisplayView, move: _Move) -> None:
         """Start aligning with a new cursor, and relax after the alignment."""

@@ -14,6 +14,7 @@ from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text
 from handcal.session.facts import AlignmentFacts
+from handcal.station.delay import DelayMeter
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.hold import merge_hold
 from handcal.station.states import CalibrationSettings, Observation
@@ -121,6 +122,7 @@ class Aligning:
         confirmation: Confirmation,
         hands: RecentHands,
         link: HeadsetServer,
+        delay: DelayMeter,
         drawn_shift_m: Mapping[Eye, Float64],
     ) -> Accepted | Refused | None:
         """Accept or refuse a confirmation; None while the pose of its time is not yet known."""
@@ -142,6 +144,13 @@ class Aligning:
             return Refused(f"{error}. Align and confirm again.", "no hand")
         if refused := self._refuse(hand, rotation_W, shape):
             return refused
+        hands_used = self.cursor, hand
+        speed_m_s = hands.speed_m_s(hand)
+        time_sigma_m = delay.time_sigma_m(hands_used, confirmation.t_host_ns, speed_m_s)
+        if time_sigma_m > self._settings.delay.moved_limit_m:
+            return Refused(
+                "Your hand or your head moved too fast. Hold both still and confirm again.", "moved"
+            )
         alignment = Alignment(
             cursor_m=self.cursor.points_W_m,
             hand_m=hand.points_W_m,
@@ -153,6 +162,7 @@ class Aligning:
             t_a_ns=self.cursor.cloud.t_camera_ns,
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(drawn_shift_m),
+            time_sigma_m=time_sigma_m,
         )
         facts = AlignmentFacts(
             match_age_s=1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns),

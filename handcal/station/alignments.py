@@ -20,13 +20,24 @@ from handcal.register.results import SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
 from handcal.station.aligning import KEEP_PROMPT, Accepted, Aligning, Refused, align_prompt
+from handcal.station.delay import DelayMeter
 from handcal.station.drawing import Drawing
 from handcal.station.evidence import Contradiction, Evidence
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.hold import merge_hold
 from handcal.station.states import CalibrationSettings, Observation, ProcedureError, State
 from handcal.station.store import Store
-from handcal.types import EYES, Alignment, CameraIdentity, Eye, Float64, Frame, HandCloud, Rig
+from handcal.types import (
+    EYES,
+    LOOK_AROUND,
+    Alignment,
+    CameraIdentity,
+    Eye,
+    Float64,
+    Frame,
+    HandCloud,
+    Rig,
+)
 
 
 class AlignmentSteps:
@@ -53,6 +64,8 @@ class AlignmentSteps:
         self._link = link
         self._settings = settings
         self._clock = FrameClock(settings.camera_latency_s)
+        self._delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, settings.delay)
+        self._looks_around = False
         self._finder = make_finder(settings.segment)
         self._hands = RecentHands(
             link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
@@ -130,7 +143,13 @@ class AlignmentSteps:
         self._frame = frame
         problem = ""
         cloud: HandCloud | None = None
-        contradiction = self.evidence.see(frame, self.camera)
+        if self._delay.see(frame):
+            self._hands.clear()  # they were placed by an assumed delay
+        contradiction = (
+            self.evidence.see(frame, self.camera)
+            or self.evidence.see_delay(self._delay.delay_s, self._delay.largest_delay_s)
+            or self.evidence.see_delivery(self._drawing.is_lost and self._link.connected)
+        )
         try:
             if contradiction is None:
                 cloud = self._finder.find(frame)
@@ -142,7 +161,8 @@ class AlignmentSteps:
         segment_ms = 1e3 * (time.perf_counter() - started_s)
         hand, not_placed = self._hands.add(cloud, t_host_ns)
         problem = "" if hand else problem or not_placed
-        is_steady = self._hands.steady() is not None
+        is_steady = self._hands.steady() is not None and not self._delay.is_needed
+        self._ask_to_look_around()
         observation = Observation(
             self.state,
             hand,
@@ -151,6 +171,7 @@ class AlignmentSteps:
             cloud,
             segment_ms=segment_ms,
             contradiction=contradiction,
+            needs_delay=self._delay.is_needed,
         )
         if self._aligning is not None and self.state is State.ALIGN:
             observation = self._guide(observation, self._aligning)
@@ -181,6 +202,11 @@ class AlignmentSteps:
         hand = self.raised if displacement_W_m is not None and self.raised else self.steady_hand
         if hand is None:
             raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
+        if self._delay.is_needed:
+            raise ProcedureError(
+                "the delay of the camera's pictures is not known yet; let the wearer look slowly "
+                "to the left and to the right, before a background with texture"
+            )
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
         try:
@@ -237,6 +263,17 @@ class AlignmentSteps:
         """Write data that could not be written before; FileError if they still cannot be."""
         self._store.write_waiting()
 
+    def _ask_to_look_around(self) -> None:
+        """Have the wearer move the head as long as the camera's delay is needed for a cursor."""
+        is_before_cursor = self.state in (State.SHOW_HAND, State.APPLIED)
+        is_needed = self._delay.is_needed and is_before_cursor
+        # Not before the hand is up; then until the delay is known, also while the hand moves.
+        is_asked = is_needed and (self._looks_around or self._hands.steady() is not None)
+        if is_asked != self._looks_around:
+            self._looks_around = is_asked
+            if is_before_cursor:
+                self._link.send_prompt(LOOK_AROUND if is_asked else "", EYES)
+
     def _guide(self, observation: Observation, aligning: Aligning) -> Observation:
         """Show the live hand with its rotation, and handle a confirmation."""
         if observation.hand is not None:
@@ -254,7 +291,7 @@ class AlignmentSteps:
     def _judge(self, confirmation: Confirmation, aligning: Aligning) -> None:
         """Accept or refuse a confirmation."""
         drawn_m = self._drawing.shift_m
-        judged = aligning.judge(confirmation, self._hands, self._link, drawn_m)
+        judged = aligning.judge(confirmation, self._hands, self._link, self._delay, drawn_m)
         if judged is None:
             return
         aligning.confirmation = None

@@ -49,6 +49,11 @@ class Drawing:
         return any(message.state is Delivery.PENDING for message in self._sent.values())
 
     @property
+    def is_lost(self) -> bool:
+        """True if a newest projection was given up."""
+        return any(message.state is Delivery.FAILED for message in self._sent.values())
+
+    @property
     def acked(self) -> dict[Eye, bool]:
         """True for each eye whose newest projection the headset has acknowledged."""
         return {eye: message.state is Delivery.ACKED for eye, message in self._sent.items()}

@@ -91,6 +91,25 @@ class Evidence:
             "the camera's picture does not change; unplug the camera and plug it in again",
         )
 
+    def see_delay(self, delay_s: float | None, limit_s: float) -> Contradiction | None:
+        """Return what forbids to use frames that arrive this long after their exposure."""
+        if delay_s is None or delay_s <= limit_s:
+            return None
+        return Contradiction(
+            "late-camera",
+            f"the camera's pictures arrive {1e3 * delay_s:.0f} ms after their exposure, more than "
+            f"{1e3 * limit_s:.0f} ms; end other programs, and connect the camera directly",
+        )
+
+    def see_delivery(self, is_lost: bool) -> Contradiction | None:
+        """Return what forbids to use frames while a connected headset draws nobody knows what."""
+        if not is_lost:
+            return None
+        return Contradiction(
+            "lost-start",
+            "the headset does not acknowledge the projections sent to it; restart its app",
+        )
+
     def drawn_otherwise(self, problem: str) -> None:
         """Note that a confirmation was refused because the headset drew something else."""
         self._drawn_otherwise += 1

@@ -4,4 +4,12 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-Fault: TypeAlias = Literal["", "stale-headset", "frozen-camera", "other-camera", "depth-bias"]
+Fault: TypeAlias = Literal[
+    "",
+    "stale-headset",
+    "lost-start",
+    "frozen-camera",
+    "other-camera",
+    "late-camera",
+    "depth-bias",
+]

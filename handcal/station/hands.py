@@ -17,6 +17,8 @@ _KEEP_S = 1.0
 _HOLD_M = 0.0015
 """Frames in which the hand is this near belong to one hold: not one that still moves, nor one that
 is cut elsewhere."""
+_SPEED_S = 0.1
+"""Time over which a speed is measured: it must exceed the noise of the hand's place."""
 _MEDIAN_STRIDE = 8
 """Every eighth point is enough for the median; all of them take half a millisecond."""
 
@@ -146,6 +148,19 @@ class RecentHands:
         if not near:
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
+
+    def speed_m_s(self, hand: PlacedHand) -> float:
+        """Return the hand's speed in the world at a placed hand; 0 if there is no other in time."""
+        apart_s = [1e-9 * abs(one.t_host_ns - hand.t_host_ns) for one in self._placed]
+        others = [
+            (abs(s - _SPEED_S), s, one)
+            for s, one in zip(apart_s, self._placed, strict=True)
+            if 0.0 < s <= 3.0 * _SPEED_S
+        ]
+        if not others:
+            return 0.0
+        _, s, other = min(others, key=lambda one: one[0])
+        return float(np.linalg.norm(other.middle_W_m - hand.middle_W_m)) / s
 
     def clear(self) -> None:
         """Forget all hands."""

@@ -11,11 +11,13 @@ import numpy as np
 
 from handcal.errors import FileError
 from handcal.progress import Progress
+from handcal.register.fuse import observe_eye_distance
 from handcal.register.prior import LearnedPrior, Observed, PriorSettings, learn_prior
 from handcal.rig.rig_file import read_rig
+from handcal.session.facts import read_facts
 from handcal.session.journal import Event, read_journal
 from handcal.session.state import SessionEvent
-from handcal.types import EYES, Float64, Rig
+from handcal.types import EYES, EyeDistance, Float64, Rig
 
 MAX_SESSIONS = 300
 """Only the newest sessions count: a headset's fit and a lab's wearers change."""
@@ -62,11 +64,10 @@ def run_learn_prior(
     sessions: list[list[Observed]] = []
     left_out: dict[str, int] = {}
     wearers: set[str] = set()
-    numbers = rig_numbers(rig)
     for number, journal in enumerate(journals):
         progress.at(number / len(journals), f"Reading session {number + 1} of {len(journals)}")
         try:
-            observed, wearer = _read_session(journal, numbers)
+            observed, wearer = _read_session(journal, rig)
             if wearer and wearer in wearers:
                 raise _NotUsableError("earlier sessions of the same wearer")
         except _NotUsableError as reason:
@@ -88,11 +89,11 @@ def _modified_s(path: Path) -> float:
         return 0.0
 
 
-def _read_session(journal: Path, numbers: list[list[float]]) -> tuple[list[Observed], str]:
-    """Return the observations of a session and its wearer."""
+def _read_session(journal: Path, rig: Rig) -> tuple[list[Observed], str]:
+    """Return the observations of a session, with a measured eye distance, and its wearer."""
     try:
         events = read_journal(journal).events
-        is_same_rig = rig_numbers(read_rig(journal.with_name("rig.yaml"))) == numbers
+        is_same_rig = rig_numbers(read_rig(journal.with_name("rig.yaml"))) == rig_numbers(rig)
     except FileError:
         raise _NotUsableError("not readable") from None
     if not is_same_rig:
@@ -107,7 +108,10 @@ def _read_session(journal: Path, numbers: list[list[float]]) -> tuple[list[Obser
     if "contradicted" in verdicts or "implausible" in verdicts:
         raise _NotUsableError("contradicted or implausible")
     wearer = events[0].data.get("wearer", "")
-    return _observations(results.get("observed")), wearer if isinstance(wearer, str) else ""
+    observed = _observations(results.get("observed"))
+    if (eye_distance := _eye_distance(results.get("measured_eye_distance"))) is not None:
+        observed.append(observe_eye_distance(rig, eye_distance, np.zeros(6)))
+    return observed, wearer if isinstance(wearer, str) else ""
 
 
 def rig_numbers(rig: Rig) -> list[list[float]]:
@@ -136,6 +140,16 @@ _CHANGE_ALIGNMENTS = {
     SessionEvent.ALIGNMENT_DELETED,
     SessionEvent.ALIGNMENT_RESTORED,
 }
+
+
+def _eye_distance(stored: object) -> EyeDistance | None:
+    """Return an eye distance from JSON, if there is one; `_NotUsableError` if it is damaged."""
+    if stored is None:
+        return None
+    try:
+        return read_facts(EyeDistance, stored)
+    except ValueError:
+        raise _NotUsableError("not readable") from None
 
 
 def _observations(stored: object) -> list[Observed]:

@@ -9,6 +9,7 @@ from handcal.errors import HandcalError
 from handcal.hand.settings import SegmentSettings
 from handcal.register.guard import GuardSettings
 from handcal.register.results import SolveSettings
+from handcal.station.delay import DelaySettings
 from handcal.station.evidence import Contradiction
 from handcal.station.hands import PlacedHand
 from handcal.types import Float64, HandCloud
@@ -41,7 +42,8 @@ class CalibrationSettings:
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     camera_latency_s: float = 0.03
-    """Shortest time from a frame's exposure to its arrival."""
+    """Shortest time from a frame's exposure to its arrival, until it is measured."""
+    delay: DelaySettings = field(default_factory=DelaySettings)
     match_tolerance_s: float = 0.15
     """Largest time between t_b and the frame of an alignment."""
     steady_s: float = 0.4
@@ -81,3 +83,5 @@ class Observation:
     """Durations of these stages."""
     contradiction: Contradiction | None = None
     """Evidence that forbids to use this frame."""
+    needs_delay: bool = False
+    """True if no cursor can be made before the wearer has looked around (`DelayMeter`)."""

@@ -369,6 +369,7 @@ class Station(Closable):
             loss=self.settings.loss,
             reorder=self.settings.reorder,
             is_stale=self.settings.fault == "stale-headset",
+            loses_start=self.settings.fault == "lost-start",
             eye_distance_m=self.settings.eye_distance_m,
             side=self.settings.side,
             slip_m=self.settings.slip_m,

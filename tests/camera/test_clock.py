@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -37,6 +38,21 @@ def test_a_quicker_frame_corrects_the_estimate() -> None:
     assert clock.exposure_ns(frame(1_000, 9_000)) == 9_000
     assert clock.exposure_ns(frame(2_000, 5_000)) == 5_000
     assert clock.exposure_ns(frame(3_000, 9_000)) == 6_000
+
+
+def test_the_rate_is_that_of_the_exposures() -> None:
+    clock = FrameClock(0.0)
+    for i in range(400):
+        clock.exposure_ns(frame(i * PERIOD_NS, 10**12 + i * PERIOD_NS + i % 7))
+    assert clock.period_s == pytest.approx(1e-9 * PERIOD_NS)
+
+
+def test_a_measured_offset_replaces_the_assumption_until_the_camera_restarts() -> None:
+    clock = FrameClock(0.03)
+    assert clock.exposure_ns(frame(1_000_000_000, 2_000_000_000)) == 1_970_000_000
+    clock.measured_ns = 900_000_000
+    assert clock.exposure_ns(frame(1_100_000_000, 2_100_000_000)) == 2_000_000_000
+    assert clock.exposure_ns(frame(500_000_000, 3_000_000_000)) == 2_970_000_000
 
 
 def test_drift_is_followed() -> None:

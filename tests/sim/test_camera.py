@@ -55,6 +55,16 @@ def test_frames_come_at_the_cameras_rate_with_both_clocks(world: World) -> None:
     assert latency_s.min() < 0.05  # the least, as the clock takes it
 
 
+def test_frames_of_a_late_camera_arrive_later_in_their_order(world: World) -> None:
+    settings = SyntheticSettings(late_s=0.12)
+    with SyntheticCamera(world, _now, depth_intrinsics=SMALL, settings=settings) as camera:
+        frames = [camera.read() for _ in range(4)]
+    assert [frame.index for frame in frames] == [0, 1, 2, 3]
+    host_s = np.array([frame.t_host_ns for frame in frames]) * 1e-9
+    camera_s = np.array([frame.t_camera_ns for frame in frames]) * 1e-9
+    assert (host_s - (camera_s - 123.456) / (1 + 20e-6) > 0.12).all()
+
+
 def test_frame_shows_the_hand_at_its_depth(world: World) -> None:
     with _camera(world) as camera:
         frame = camera.read()

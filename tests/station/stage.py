@@ -21,6 +21,7 @@ from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.station.delay import DelaySettings
 from handcal.station.procedure import (
     Calibration,
     CalibrationSettings,
@@ -44,7 +45,10 @@ CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 RIG = replace(example_rig(), depth_intrinsics=CAMERA)
 SENSOR = SensorSettings()
 LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
-SETTINGS = CalibrationSettings(camera_latency_s=0.0)
+# The stage's times are exact, so a hand may be followed while it moves.
+SETTINGS = CalibrationSettings(
+    camera_latency_s=0.0, delay=DelaySettings(assumed_sigma_s=0.0, moved_limit_m=0.01)
+)
 PERIOD_NS = 80_000_000
 HEADSET_AHEAD_NS = 5_000_000_000
 CAMERA_AHEAD_NS = 7_000_000_000

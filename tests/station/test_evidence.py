@@ -94,3 +94,14 @@ def test_a_headset_may_draw_otherwise_once() -> None:
 def test_evidence_found_before_an_interruption_counts() -> None:
     earlier = Contradiction("other-camera", "the camera is not the rig's")
     assert _names(Evidence(RIG, [earlier])) == ["other-camera"]
+
+
+def test_a_late_camera_forbids_frames_while_it_is_known_to_be_late() -> None:
+    evidence = Evidence(RIG)
+    assert evidence.see_delay(None, 0.12) is None
+    assert evidence.see_delay(0.12, 0.12) is None
+    found = evidence.see_delay(0.16, 0.12)
+    assert found is not None
+    assert found.name == "late-camera"
+    assert "160 ms" in found.text
+    assert evidence.contradictions == ()

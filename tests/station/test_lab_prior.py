@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from handcal.progress import Progress
+from handcal.register.fuse import eye_position_m
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.station.lab_prior import run_learn_prior
-from handcal.types import Alignment, Rig
+from handcal.types import EYES, Alignment, EyeDistance, Rig
 
 RIG = example_rig()
 SETTINGS = PriorSettings()
@@ -36,8 +37,15 @@ def _session(
     wearer: str = "",
     contradictions: tuple[str, ...] = (),
     is_finished: bool = True,
+    eye_distance: EyeDistance | None = None,
 ) -> None:
-    results = solve_session([alignment], RIG, SolveSettings(), contradictions=contradictions)
+    results = solve_session(
+        [alignment],
+        RIG,
+        SolveSettings(),
+        contradictions=contradictions,
+        eye_distance=eye_distance,
+    )
     with Session.create(folder, rig, {}, name, wearer) as session:
         session.save_alignment(alignment)
         session.save_results(json.loads(json.dumps(results_json(results))))
@@ -89,6 +97,19 @@ def test_enough_sessions_make_a_prior(tmp_path: Path, alignment: Alignment) -> N
     # All wearers here have the same eyes: the lab knows better than the default where they are.
     lab, default = eye_prior(PriorSettings(learned=found.learned)), eye_prior(SETTINGS)
     assert np.trace(lab.covariance_m2) < 0.7 * np.trace(default.covariance_m2)
+
+
+def test_measured_eye_distances_are_learned_from(tmp_path: Path, alignment: Alignment) -> None:
+    """One alignment with both eyes open hardly sees the eye distance; a ruler does."""
+    left_m, right_m = (eye_position_m(RIG.eyes[eye], np.zeros(3)) for eye in EYES)
+    rig_m = float(np.linalg.norm(right_m - left_m))
+    for number in range(2 * MIN_SESSIONS):
+        measured = EyeDistance(rig_m + 0.003)
+        _session(tmp_path, f"{number}", alignment, wearer=f"P{number}", eye_distance=measured)
+    found = run_learn_prior(tmp_path, RIG, SETTINGS)
+    assert found.learned is not None
+    mean_m = np.reshape(found.learned.mean_m, (2, 3))
+    assert mean_m[1, 0] - mean_m[0, 0] == pytest.approx(0.003, abs=0.0006)
 
 
 def test_results_without_observations_do_not_count(tmp_path: Path, alignment: Alignment) -> None:

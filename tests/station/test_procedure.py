@@ -250,6 +250,21 @@ def test_the_frame_nearest_the_confirmation_is_taken_at_its_own_pose(stage: Stag
     )
 
 
+def test_a_hand_that_moves_when_it_is_confirmed_is_refused(
+    server: HeadsetServer, client: HeadsetClient, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 10 cm/s the hand of a frame a third of a period away is 3 mm off."""
+    monkeypatch.setattr(f"{__name__}.SETTINGS", CalibrationSettings(camera_latency_s=0.0))
+    stage = Stage(server, client, session)
+    stage.make_cursor()
+    for i in range(5):
+        stage.see(rigid([-0.2, 0.0, 0.0], [0.008 * i, 0.0, 0.5]))
+    stage.press(stage.t_ns + PERIOD_NS // 3)
+    stage.see(rigid([-0.2, 0.0, 0.0], [0.04, 0.0, 0.5]))
+    assert stage.state() is State.ALIGN
+    assert "moved too fast" in stage.calibration.refusal
+
+
 def visible_m(T_W_hand: Float64) -> Float64:
     return transform(T_W_hand, world().hand.vertices_m)
 

@@ -258,12 +258,16 @@ def test_a_resumed_session_keeps_the_prior_it_began_with(
 
 @pytest.mark.parametrize(
     ("fault", "advice"),
-    [("other-camera", "choose the rig file"), ("frozen-camera", "unplug the camera")],
+    [
+        ("other-camera", "choose the rig file"),
+        ("frozen-camera", "unplug the camera"),
+        ("lost-start", "restart its app"),
+    ],
 )
 def test_evidence_is_reported_before_anything_is_solved(
     settings: StationSettings, fault: Fault, advice: str
 ) -> None:
     with Station(replace(settings, fault=fault)) as station:
-        found = step_until(station, "evidence", lambda seen: bool(seen.contradiction), 20.0)
+        found = step_until(station, "evidence", lambda seen: bool(seen.contradiction), PATIENCE_S)
     assert advice in found.contradiction
     assert not found.problem

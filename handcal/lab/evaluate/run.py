@@ -19,6 +19,7 @@ from handcal.lab.evaluate.cube_summary import ErrorSummary, cube_summary
 from handcal.lab.evaluate.cube_test import CubeTest, judge_captures
 from handcal.lab.evaluate.masked_frames import read_masked_frames, read_masked_names
 from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
+from handcal.lab.evaluate.segmentation_report import segmentation_report
 from handcal.lab.evaluate.segmentation_sheet import contact_sheet, tile
 from handcal.lab.evaluate.user_test import UserTestResult, evaluate_user_test, read_user_test
 from handcal.lab.evaluate.user_test_report import user_test_report
@@ -41,7 +42,7 @@ from handcal.sim.cube_captures import CaptureSettings, write_captures
 from handcal.types import Rig
 
 # Shares of the time.
-_READING, _RENDERING = 0.7, 0.49
+_READING, _RENDERING, _SEGMENTING = 0.7, 0.49, 0.95
 _MOST_REASONS = 3
 
 
@@ -65,6 +66,17 @@ class UserTestRun:
     report: Report
     files: tuple[Path, ...]
     """The report as PDF and as HTML."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SegmentationRun:
+    """The figures of a test of the segmentation, and its report."""
+
+    figures: dict[str, Any]
+    """As `evaluation` gives them."""
+    report: Report
+    files: tuple[Path, ...]
+    """The report as PDF and as HTML, if it was written."""
 
 
 def run_cube_test(settings: CubeTestSettings, progress: Progress = Progress()) -> CubeTestResult:
@@ -125,17 +137,18 @@ def run_user_test(settings: UserTestSettings, progress: Progress = Progress()) -
 
 def run_segmentation_test(
     settings: SegmentationTestSettings, progress: Progress = Progress()
-) -> dict[str, Any]:
-    """Segment the hand in a folder of frames with true masks; return `evaluation`'s figures.
+) -> SegmentationRun:
+    """Segment the hand in a folder of frames with true masks.
 
-    Writes the contact sheet, if one is wanted.
+    Writes the report and the contact sheet, if they are wanted.
 
     Raises
     ------
     CancelledError
     FileError
-        If a file cannot be used or written.
+        If a file cannot be used or written, or the report would go into a study's folder.
     """
+    output = free_of_studies(output_folder(settings.output)) if settings.output else None
     sheet = Path(settings.sheet).expanduser() if settings.sheet else None
     if sheet is not None:  # before the long work, whose result would be lost
         require_suffix(sheet, ".png")
@@ -147,12 +160,18 @@ def run_segmentation_test(
     for shot in read_masked_frames(folder, described):
         row, mask = evaluate_frame(shot, lambda one: make_finder(segmenting).find(one), segmenting)
         rows.append(row)
-        if sheet is not None:
-            tiles.append(tile(shot, mask, row))
-        progress.at(len(rows) / len(described), "Segmenting hands")
+        tiles.append(tile(shot, mask, row))
+        progress.at(_SEGMENTING * len(rows) / len(described), "Segmenting hands")
     if sheet is not None:
         write_png(sheet, contact_sheet(tiles))
-    return evaluation(rows)
+    figures = evaluation(rows)
+    report = segmentation_report(figures, tiles)
+    files = (
+        ()
+        if output is None
+        else write_report(output, report, progress.part(_SEGMENTING, 1.0, "Writing the report"))
+    )
+    return SegmentationRun(figures, report, files)
 
 
 def cube_and_grid(settings: CubeTestSettings, folder: Path) -> tuple[Cube, Grid]:

@@ -243,10 +243,14 @@ class Wizard:
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
+        seen = snapshot.observation
+        held = _still_check(snapshot)
+        if seen is not None and seen.needs_delay:
+            held = Precondition("The wearer has looked slowly to the left and to the right", False)
         return WizardView(
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
-            (_hand_check(snapshot), _still_check(snapshot)),
+            (_hand_check(snapshot), held),
             ButtonSpec(Action.MAKE_CURSOR, "Make cursor", _is_steady(snapshot)),
             (ButtonSpec(Action.BACK, "&Back"),),
             runs_after_s=_STILL_S,

@@ -1,4 +1,4 @@
-"""Specifications of the four evaluations in the window."""
+"""Specifications of the evaluations in the window."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
 from handcal.lab.evaluate.cube_folder import find_captures
-from handcal.lab.evaluate.run import run_cube_test, run_user_test
+from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
+from handcal.lab.settings import SegmentationTestSettings
 from handcal.lab.study.studies import (
     method_cases,
     noise_cases,
@@ -69,6 +70,13 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             _users_form,
         ),
+        "segmentation": EvaluationSpec(
+            "Segmentation",
+            "How well does the segmented hand agree with true masks of your own camera's frames, "
+            "and how stable is it? About a second a frame.",
+            FileEvaluation(_missing_frames, run_segmentation_test),
+            _segmentation_form,
+        ),
     }
 
 
@@ -84,6 +92,10 @@ def _missing_captures(entries: CubeEntries) -> str:
 
 def _missing_sessions(entries: UserEntries) -> str:
     return "" if entries.sessions else "choose a session, or a folder of sessions"
+
+
+def _missing_frames(entries: SegmentationTestSettings) -> str:
+    return "" if entries.folder else "choose a folder of frames with true masks"
 
 
 def _noise_form() -> EntriesForm:
@@ -141,6 +153,19 @@ def _users_form() -> EntriesForm:
     sessions = PathField("Sessions", "folder")
     sessions.setToolTip("Folder of one session, or a folder that contains sessions.")
     return EntriesForm({"sessions": ("Sessions", sessions), **_output()})
+
+
+def _segmentation_form() -> EntriesForm:
+    folder = PathField("Frames", "folder")
+    folder.setToolTip("NAME_color.png, NAME_depth.png and NAME_handmask.png, and a meta.json.")
+    ways = {"detector": "Where the detector sees one", "depth": "Nearest object, by depth alone"}
+    return EntriesForm(
+        {
+            "folder": ("Frames", folder),
+            "roi": ("Hand", choice("roi", "Hand", ways)),
+            **_output(),
+        }
+    )
 
 
 def _study_fields() -> dict[str, tuple[str, QWidget]]:

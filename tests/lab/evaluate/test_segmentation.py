@@ -163,6 +163,7 @@ def test_a_folder_is_judged_by_the_command(
 ) -> None:
     figures, sheet = tmp_path / "out" / "figures.json", tmp_path / "out" / "sheet.png"
     options = ["--roi", "depth", "--json", str(figures), "--sheet", str(sheet)]
+    options += ["--output", str(tmp_path / "out")]
     monkeypatch.setattr("sys.argv", ["handcal", "evaluate", "segmentation", str(folder), *options])
     main()
     result = json.loads(figures.read_text())
@@ -170,6 +171,7 @@ def test_a_folder_is_judged_by_the_command(
     assert (result["frames"], result["refused"], result["iou_min"]) == (2, 1, 1.0)
     assert [row["name"] for row in result["rows"]] == ["9", "10"]
     assert read_image(sheet, cv2.IMREAD_COLOR).shape == (320, 4 * 320, 3)
+    assert {path.name for path in sheet.parent.glob("report.*")} == {"report.pdf", "report.html"}
     assert "9: no hand-sized object" in capsys.readouterr().out
 
 

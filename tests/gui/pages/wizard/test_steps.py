@@ -147,6 +147,10 @@ def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
     wizard = Wizard()
     reach(wizard, start, Step.MAKE_CURSOR)
     assert start.observation is not None
+    waiting = replace(start.observation, is_steady=False, needs_delay=True)
+    asked = wizard.view(replace(start, observation=waiting)).checks[-1]
+    assert "looked" in asked.text
+    assert not asked.holds
     restless = replace(start, observation=replace(start.observation, is_steady=False))
     assert not wizard.view(restless).main.is_enabled
     assert wizard.view(start).main.is_enabled

@@ -10,7 +10,11 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
 from handcal.lab.evaluate.cube_folder import CapturePlan
-from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
+from handcal.lab.settings import (
+    MethodComparisonSettings,
+    NoiseStudySettings,
+    SegmentationTestSettings,
+)
 from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
 from handcal.lab.study.noise import QUICK_NOISE
 from handcal.lab.study.studies import run_method_comparison, run_noise_study
@@ -30,6 +34,7 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
             alignments=3,
         ),
         UserEntries("/sessions", "/u"),
+        SegmentationTestSettings("/frames", "depth", output="/s"),
     )
     for name, spec in make_specs().items():
         form = spec.form()
@@ -64,6 +69,16 @@ def test_without_sessions_there_is_no_user_test(tmp_path: Path) -> None:
     readiness = evaluation.readiness(UserEntries("", str(tmp_path)))
     assert not readiness.can_run
     assert "folder of sessions" in readiness.finding.found
+
+
+def test_frames_are_chosen_before_the_segmentation_is_tested(tmp_path: Path) -> None:
+    evaluation = make_specs()["segmentation"].evaluation
+    entries = SegmentationTestSettings("", output=str(tmp_path / "results"))
+    assert not evaluation.readiness(entries).can_run
+    entries = replace(entries, folder=str(tmp_path / "none"))
+    assert evaluation.readiness(entries).can_run
+    with pytest.raises(FileError, match=r"meta\.json"):
+        evaluation.run(entries, Progress())
 
 
 def test_a_cube_test_is_run_once_there_are_captures_to_look_at(tmp_path: Path) -> None:
