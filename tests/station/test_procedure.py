@@ -254,7 +254,7 @@ def test_a_hand_that_moves_when_it_is_confirmed_is_refused(
     server: HeadsetServer, client: HeadsetClient, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 10 cm/s the hand of a frame a third of a period away is 3 mm off."""
-    monkeypatch.setattr(f"{__name__}.SETTINGS", CalibrationSettings(camera_latency_s=0.0))
+    monkeypatch.setattr("tests.station.stage.SETTINGS", CalibrationSettings(camera_latency_s=0.0))
     stage = Stage(server, client, session)
     stage.make_cursor()
     for i in range(5):
