@@ -192,17 +192,17 @@ def procedures(arguments: argparse.Namespace) -> None:
     )
     rows = _unless_interrupted(partial(run_procedure_study, settings))
     save(arguments.json, {"rows": [asdict(row) for row in rows]})
-    shown = table(
-        *("plan", "variant", "errors ×", "before", "after", "95 %", "time"),
-        *("worse", "accepted", "accepted and worse"),
-    )
+    shown = table("", "before", "after", "95 %", "time", "worse", "accepted", "both")
     for row in rows:
         shown.add_row(
-            *(row.plan, row.variant, f"{row.scale:g}"),
+            f"{row.plan}, {row.variant}, errors × {row.scale:g}",
             *(f"{row.before_arcmin:.1f}′", f"{row.after_arcmin:.2f}′"),
             *(f"{row.after_p95_arcmin:.1f}′", f"{row.seconds:.1f} s"),
             *map(_percent, (row.worse_share, row.accepted_share, row.accepted_worse_share)),
         )
+    console.print(
+        "Errors without the calibration, with it, and its 95th percentile; shares of eyes."
+    )
     console.print(shown)
 
 
