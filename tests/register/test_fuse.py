@@ -1,4 +1,5 @@
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,15 @@ from handcal.register.surface import describe_surface
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
 from handcal.sim.placement import overlay_hand, view_through
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64
+from handcal.types import (
+    EYES,
+    Alignment,
+    Eye,
+    EyeDistance,
+    EyeShift,
+    Float64,
+    Verification,
+)
 
 RIG = example_rig()
 SETTINGS = FuseSettings()
@@ -93,6 +102,50 @@ def test_estimates_are_unbiased_and_their_covariance_honest(alignments: list[Ali
     assert (np.abs(np.mean(errors_m, axis=0)) < 4 * spread_m).all()
     # Disagreement by chance widens the covariance of several a little.
     assert 2.0 < np.mean(squares) < 3.6
+
+
+def _check(rng: np.random.Generator, true_m: Float64) -> Verification:
+    """A check by a wearer whose error is 2′ across and 0.5 % in size, times 4/3 in φ."""
+    across_m = 4 / 3 * DEPTH_M * np.radians(2 / 60)
+    sigma_m = np.array([across_m, across_m, 4 / 3 * DEPTH_M * 0.005])
+    x, y, z = (true_m + rng.normal(0.0, sigma_m)).tolist()
+    return Verification((0.0, 0.0, 0.0), (0.0, 0.0), (x, y, z), 0.0, (0.0, 0.0, DEPTH_M))
+
+
+@pytest.mark.parametrize("checks", [1, 2])
+def test_checks_alone_give_estimates_with_honest_covariances(checks: int) -> None:
+    rng = np.random.default_rng(0)
+    errors_m, squares = [], []
+    for _ in range(150):
+        drawn_m = rng.multivariate_normal(np.zeros(6), _prior_m2())
+        verified: dict[Eye, Verification] = {}
+        for eye, true_m in zip(EYES, (drawn_m[:3], drawn_m[3:]), strict=True):
+            for _ in range(checks):
+                verified[eye] = _check(rng, true_m).after(verified.get(eye))
+        fused = fuse_alignments([], RIG, USUAL, verified=verified)
+        for eye, true_m in zip(EYES, (drawn_m[:3], drawn_m[3:]), strict=True):
+            error_m = fused.shifts[eye].shift_m - true_m
+            errors_m.append(error_m)
+            squares.append(error_m @ np.linalg.solve(fused.shifts[eye].covariance_m2, error_m))
+    assert (np.abs(np.mean(errors_m, axis=0)) < 4 * np.std(errors_m, axis=0) / np.sqrt(150)).all()
+    assert 2.5 < np.mean(squares) < 3.5
+    assert not fused.unverified
+
+
+def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None:
+    rng = np.random.default_rng(1)
+    true_m = np.array([0.003, -0.002, 0.004])
+    solved = [(ONE["left"], {"left": _shift(true_m)})]
+    check = _check(rng, true_m)
+    alone, checked, nowhere = (
+        fuse_alignments(solved, RIG, USUAL, verified=verified)
+        for verified in ({}, {"left": check}, {"left": replace(check, hand_E_m=None)})
+    )
+    sigma_m = [np.linalg.norm(one.shifts["left"].sigma_m) for one in (alone, checked, nowhere)]
+    assert sigma_m[1] < 0.8 * sigma_m[0]
+    assert sigma_m[2] == sigma_m[0]
+    foreseen_m2 = alone.foreseen_m2([], list(alone.unverified.values()))[:3, :3]
+    np.testing.assert_allclose(foreseen_m2, checked.shifts["left"].covariance_m2, rtol=0.02)
 
 
 def test_one_alignment_with_one_eye_is_the_estimate_with_the_prior() -> None:

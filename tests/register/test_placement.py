@@ -61,14 +61,16 @@ def test_each_eye_in_turn_then_both_and_what_is_missing_first() -> None:
     assert planned_eyes("paper", [EYES]) == EYES
 
 
-@pytest.mark.parametrize("nearest_m", [0.38, 0.45, 0.50])
+@pytest.mark.parametrize("nearest_m", [0.38, 0.44, 0.50])
 @pytest.mark.parametrize("raised_m", [0.47, 0.55])
 def test_the_cursor_is_as_near_as_the_camera_measures(nearest_m: float, raised_m: float) -> None:
     planned = _next(settings=PlacementSettings(nearest_m=nearest_m), depth_m=raised_m)
     assert planned is not None
     points_m, _ = _raised(raised_m)
     cursor_D_m = transform(invert(T_W_H @ RIG.T_H_D), points_m + planned.displacement_W_m)
-    assert cursor_D_m[:, 2].min() == pytest.approx(nearest_m, abs=2e-3)
+    assert cursor_D_m[:, 2].min() > nearest_m - 2e-3
+    if nearest_m >= 0.44:  # nearer, the displays may show too little of the hand
+        assert cursor_D_m[:, 2].min() == pytest.approx(nearest_m, abs=2e-3)
 
 
 def test_the_cursor_is_on_the_display() -> None:

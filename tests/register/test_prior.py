@@ -11,6 +11,7 @@ from handcal.register.prior import (
     eye_prior,
     learn_prior,
     posterior,
+    widened,
 )
 from handcal.types import Float64
 
@@ -88,6 +89,17 @@ def test_a_learned_prior_is_a_setting_that_can_be_stored() -> None:
     settings = PriorSettings(learned=learn_prior([_session(rng, EACH) for _ in range(12)]))
     stored = json.loads(json.dumps(settings_json(settings)))
     assert read_settings(PriorSettings, stored) == settings
+
+
+def test_a_moved_headset_is_uncertain_in_common_and_keeps_the_eyes_apart() -> None:
+    known_m2 = 1e-8 * np.eye(6)
+    prior = eye_prior(PriorSettings(learned=widened(np.arange(6.0), known_m2, (0.002, 0.001, 0.0))))
+    np.testing.assert_array_equal(prior.mean_m, np.arange(6.0))
+    apart = np.hstack([np.eye(3), -np.eye(3)])
+    np.testing.assert_allclose(apart @ prior.covariance_m2 @ apart.T, 2e-8 * np.eye(3), atol=1e-20)
+    np.testing.assert_allclose(
+        np.diag(prior.covariance_m2) - 1e-8, [4e-6, 1e-6, 0.0] * 2, atol=1e-18
+    )
 
 
 @pytest.mark.parametrize(

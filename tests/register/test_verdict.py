@@ -8,14 +8,16 @@ import pytest
 from handcal.register.fuse import Fused, Observation, eye_slice
 from handcal.register.prior import eye_prior
 from handcal.register.verdict import (
+    Advice,
     VerdictSettings,
     advise,
     eye_benefit,
     eye_distance_m,
     judge,
+    measured_arcmin,
 )
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
-from handcal.types import Eye, EyeShift, Verdict
+from handcal.types import Eye, EyeShift, Verdict, Verification
 
 RIG = example_rig()
 SETTINGS = VerdictSettings()
@@ -140,6 +142,42 @@ def test_advice_is_the_fewest_alignments_that_are_enough() -> None:
     assert not hopeless.meets_target
     verdict = _judge_fused(fused, replace(SETTINGS, target_arcmin=0.1))["left"]
     assert verdict.reason.endswith("enter the eye distance, or verify each eye")
+
+
+def test_advice_counts_the_plans_own_next_steps() -> None:
+    uncertain = replace(GOOD, covariance_m2=np.diag([0.002, 0.002, 0.004]) ** 2)
+    fused = _fused({"left": uncertain, "right": uncertain})
+    ahead: list[tuple[Eye, ...]] = [("right",), ("left",), ("left", "right")] * 2
+    advice = advise(RIG, fused, "left", SETTINGS, ahead)
+    assert advice.eyes == ()
+    of_left, of_right = (
+        advise(RIG, fused, "left", SETTINGS, [one]) for one in (("left",), ("right",))
+    )
+    assert of_left.after_arcmin < of_right.after_arcmin
+    told = judge(RIG, fused, {"left": advice, "right": advice}, SETTINGS)["left"].reason
+    assert told.endswith(f"expected after {advice.alignments} more alignments")
+    check = Observation(np.eye(3, 6), np.zeros(3), np.zeros((3, 3)), 1e-8 * np.eye(3))
+    verifiable = replace(fused, unverified={"left": check})
+    advice = advise(RIG, verifiable, "left", SETTINGS, ahead)
+    assert (advice.alignments, advice.verify, advice.is_accepted) == (0, True, True)
+    told = judge(RIG, verifiable, {"left": advice, "right": advice}, SETTINGS)["left"].reason
+    assert told.endswith("expected after verifying each eye")
+
+
+def test_a_verdict_tells_the_error_that_the_check_found() -> None:
+    fused = _fused({"left": GOOD})
+    check = Verification((0.002, -0.001, 0.003), (0.0, 0.0), (0.002, -0.001, 0.003))
+    moved = replace(check, before_m=(0.006, -0.001, 0.003)).after(None)
+    unmoved_arcmin, now_arcmin = measured_arcmin(RIG, fused, "left", check)
+    before_arcmin, _ = measured_arcmin(RIG, fused, "left", check.after(moved))
+    assert unmoved_arcmin == now_arcmin
+    # 4 mm to the side, seen at 0.4 to 0.6 m on a display at 2 m.
+    expected_arcmin = 60 * np.degrees(np.mean([0.004 * (1 / z - 0.5) for z in (0.4, 0.5, 0.6)]))
+    assert before_arcmin == pytest.approx(expected_arcmin, rel=0.05)
+    advice: dict[Eye, Advice] = {"left": advise(RIG, fused, "left", SETTINGS)}
+    measured: dict[Eye, tuple[float, float]] = {"left": (before_arcmin, now_arcmin)}
+    told = judge(RIG, fused, advice, SETTINGS, measured=measured)["left"].reason
+    assert told.startswith(f"the check found an error of {before_arcmin:.1f}′ and corrected it; ")
 
 
 def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> None:
