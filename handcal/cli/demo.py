@@ -8,7 +8,7 @@ measure the error of the result.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -128,6 +128,7 @@ def run_demo(
     with Station(station_settings, "Simulated wearer", former=former) as station:
         if settings.eye_distance == "ruler":
             station.calibration.set_eye_distance(measured)
+        begun_m = dict(station.calibration.applied_shift_m)
         progress.at(0.0, "Connecting to the virtual headset")
         try:
             if _is_automatic(settings):
@@ -145,7 +146,7 @@ def run_demo(
         "alignments": len(calibration.alignments),
         "plan": settings.plan,
         "seconds": watch.seconds,
-        **_judge(calibration, station, settings),
+        **_judge(calibration, station, settings, begun_m),
         "guard": {
             "rejected": calibration.refused,
             "accepted_deg": max(
@@ -352,7 +353,12 @@ def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -
     return watch
 
 
-def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -> dict[str, Any]:
+def _judge(
+    calibration: Calibration,
+    station: Station,
+    settings: DemoSettings,
+    begun_m: Mapping[Eye, Float64],
+) -> dict[str, Any]:
     """Compare the result with the wearer's true eyes."""
     assert calibration.results is not None
     results, rig, worn_rig = calibration.results, station.rig, station.worn_rig
@@ -386,6 +392,7 @@ def _judge(calibration: Calibration, station: Station, settings: DemoSettings) -
         },
         "reprojection_arcmin": {
             "before": reprojection_arcmin(rig, nothing_m, eyes_m, worn_rig),
+            "begun": reprojection_arcmin(rig, begun_m, eyes_m, worn_rig),
             "after": reprojection_arcmin(rig, solved_m, eyes_m, worn_rig),
             "drawn": reprojection_arcmin(rig, drawn_m, eyes_m, worn_rig),
         },

@@ -126,7 +126,7 @@ def demo(arguments: argparse.Namespace) -> None:
         rig = _rig_path(arguments.rig)
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
     save(arguments.json, result)
-    if result["alignments"] == 0:
+    if "reprojection_arcmin" not in result:
         _say_contradictions(result)
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "error, mm", "verdict")
     for eye, found in result["eyes"].items():

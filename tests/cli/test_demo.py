@@ -75,7 +75,7 @@ def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
         assert eye["reason"]
         off_mm = np.subtract(eye["shift_mm"], eye["true_shift_mm"])
         assert eye["error_mm"] == pytest.approx(np.linalg.norm(off_mm))
-    assert set(result["reprojection_arcmin"]) == {"before", "after", "drawn"}
+    assert set(result["reprojection_arcmin"]) == {"before", "begun", "after", "drawn"}
     assert result["plan"] == "paper"
     assert result["seconds"] > 0.0
     assert set(result["guard"]) == {"rejected", "accepted_deg"}
@@ -240,3 +240,33 @@ def test_a_fault_is_named_and_never_accepted(fault: str, tmp_path: Path) -> None
     for eye in result["eyes"].values():
         assert (eye["verdict"], eye["evidence"]) == ("contradicted", [fault])
         assert eye["reason"] in run.stdout.replace("\n", " ")
+
+
+@pytest.mark.slow
+def test_the_recommended_plan_leads_itself_and_serves_a_wearer_who_comes_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two real runs: the plan to its end, then the same wearer with a headset that has slipped."""
+
+    def demo(name: str, *options: str) -> dict[str, Any]:
+        output, file = tmp_path / name, tmp_path / f"{name}.json"
+        files = ["--output", str(output), "--json", str(file)]
+        plan = ["--seed", "12", "--plan", "recommended", *options]
+        monkeypatch.setattr(sys, "argv", ["handcal", "demo", *plan, *files])
+        main()
+        found: dict[str, Any] = json.loads(file.read_text())
+        return found
+
+    first = demo("first")
+    assert first["alignments"] >= 2
+    assert all(one["verified"] for one in first["eyes"].values())
+    error = first["reprojection_arcmin"]
+    assert error["after"] < error["before"]
+    facts = Session.open(Path(first["session"])).facts
+    assert facts.plan == "recommended"
+    assert set(facts.verified) == set(EYES)
+    again = demo("again", "--from", first["session"], "--slipped")
+    error = again["reprojection_arcmin"]
+    assert error["begun"] != pytest.approx(error["before"])
+    assert error["after"] < error["begun"]
+    assert Session.open(Path(again["session"])).facts.former == Path(first["session"]).name

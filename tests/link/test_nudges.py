@@ -84,7 +84,12 @@ def test_nudges_and_their_request_get_through_a_bad_network(
             last = client.nudge(time.monotonic_ns(), state, NudgeSum(right), fits=right == 5)
         client.wait_acked(last, 5.0)
         heard: list[Nudge] = []
-        eventually(lambda: heard.extend(server.nudges()) or (heard and heard[-1].fits))
+
+        def hears(fits: bool, right: float) -> bool:
+            heard.extend(server.nudges())
+            return bool(heard) and heard[-1].fits == fits and heard[-1].moved == NudgeSum(right)
+
+        eventually(lambda: hears(True, 5.0))
         assert [one.moved.right_arcmin for one in heard] == sorted(
             one.moved.right_arcmin for one in heard
         )
@@ -94,7 +99,7 @@ def test_nudges_and_their_request_get_through_a_bad_network(
         # What was drawn before the newest projection is found out.
         server.send_projection(Projection("left", 2.0 * np.ones((3, 4)), 1268, 720))
         client.wait_acked(client.nudge(time.monotonic_ns(), state, NudgeSum(6.0)), 5.0)
-        eventually(lambda: heard.extend(server.nudges()) or heard[-1].moved.right_arcmin == 6.0)
+        eventually(lambda: hears(False, 6.0))
         assert "other projections" in heard[-1].problem
         server.send_verify(None)
         eventually(lambda: client.state().verify is None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -108,13 +110,17 @@ def run(check: Check, error: SeenDifference, seconds: float = 30.0) -> tuple[Nud
             error.down_arcmin - drawn_moved.down_arcmin,
             error.size - drawn_moved.size,
         )
-        nudge, fits = check.step(float(t_s), np.full(1, float(changes)), lambda seen=left: seen)
+        nudge, fits = check.step(float(t_s), np.full(1, float(changes)), partial(_same, left))
         if nudge is not None and nudge != moved:
             moved = nudge
             due.append((t_s + 0.05, nudge))
         if fits:
             return moved, float(t_s)
     raise AssertionError("the wearer was never content")
+
+
+def _same(seen: SeenDifference) -> SeenDifference:
+    return seen
 
 
 def test_the_wearer_moves_the_drawing_until_it_fits_within_a_step() -> None:

@@ -12,7 +12,7 @@ from handcal.errors import FileError
 from handcal.session.session import Session
 from handcal.station.former import SLIP_M, read_former
 from handcal.station.procedure import Calibration, ProcedureError, State
-from handcal.types import EYES, Verdict
+from handcal.types import EYES, Eye, Float64, Verdict
 from tests.helpers import eventually
 from tests.station.stage import RIG, SETTINGS, Stage, events
 
@@ -52,7 +52,10 @@ def test_a_session_of_another_rig_or_without_an_alignment_is_refused(
 
 
 def test_the_headset_begins_with_the_former_shift(stage: Stage) -> None:
-    former_m = {"left": np.array([0.001, 0.0, 0.002]), "right": np.array([-0.001, 0.0, 0.0])}
+    former_m: dict[Eye, Float64] = {
+        "left": np.array([0.001, 0.0, 0.002]),
+        "right": np.array([-0.001, 0.0, 0.0]),
+    }
     stage.calibration = Calibration(RIG, stage.server, None, SETTINGS, former_m=former_m)
     eventually(lambda: stage.calibration.is_applied)
     for eye in EYES:

@@ -111,6 +111,7 @@ def test_one_raise_serves_all_alignments_left_right_and_both(
         ("right",),
         ("left", "right"),
     ]
+    assert raised is not None
     # Nearer than the raised hand, as near as the camera can see.
     T_E_W = view_of_eye(RIG.eyes["left"], planned.stage.calibration.T_W_H(raised))
     depths_m = [transform(T_E_W, one.points_W_m)[:, 2].mean() for one in (raised, cursors[0])]
