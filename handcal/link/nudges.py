@@ -29,7 +29,7 @@ class VerifyRequest:
     eye: Eye
     step_arcmin: float = 1.0
     step_size: float = 0.002
-    """What one press of a key adds to a nudge."""
+    """Added to a nudge by one press of a key."""
 
 
 @dataclass(frozen=True, slots=True)

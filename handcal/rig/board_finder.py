@@ -44,7 +44,8 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
         why = explain_missing(gray, board, find_corners) if explain else "no board is seen"
         raise BoardError(why)
     fits = _is_regular(ids, pixels, board)
-    if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS:
+    is_skipping = board.kind == "checkerboard" and not _alternates(gray, pixels, board)
+    if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS or is_skipping:
         raise BoardError(
             "the squares do not lie as on this board: check the number of squares and markers"
         )
@@ -97,12 +98,16 @@ def _upright(gray: UInt8, grid: Float64) -> Float64:
 
 def _uprightness(gray: UInt8, grid: Float64) -> tuple[bool, float]:
     """Return whether the first square is black, as printed, and the component of x to the right."""
-    middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
-    row, column = np.indices(middles.shape[:2])
-    shades = shades_at(gray, middles)
-    is_black = (row + column) % 2 == 0
+    shades, is_black = _middle_shades(gray, grid)
     first_is_black = bool(shades[is_black].mean() < shades[~is_black].mean())
     return first_is_black, float(grid[0, -1, 0] - grid[0, 0, 0])
+
+
+def _middle_shades(gray: UInt8, grid: Float64) -> tuple[Float64, NDArray[np.bool_]]:
+    """Return the shades in the middles of a grid's squares, and which should be black."""
+    middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
+    row, column = np.indices(middles.shape[:2])
+    return shades_at(gray, middles), (row + column) % 2 == 0
 
 
 def _is_regular(ids: Int64, pixels: Float64, board: Board) -> NDArray[np.bool_]:
@@ -124,6 +129,20 @@ def _is_regular(ids: Int64, pixels: Float64, board: Board) -> NDArray[np.bool_]:
     middle = np.nanmedian(np.stack(predicted)[:, known], axis=0)
     off_px[known] = np.linalg.norm(middle - pixels[known], axis=1)
     return np.asarray(off_px < _STRAY_SQUARES * np.median(_spacings_px(pixels)))
+
+
+def _alternates(gray: UInt8, pixels: Float64, board: Board) -> bool:
+    """Return whether neighbouring squares of a whole grid differ.
+
+    They do not on a grid that skips every other corner, as found on a board with more squares: the
+    middles of its cells lie on edges.
+    """
+    columns, rows = board.inner
+    shades, is_black = _middle_shades(gray, pixels.reshape(rows, columns, 2))
+    x, y, width, height = cv2.boundingRect(pixels.astype(np.float32))
+    dark, light = np.percentile(gray[max(y, 0) : y + height, max(x, 0) : x + width], (10, 90))
+    contrast = abs(shades[is_black].mean() - shades[~is_black].mean())
+    return bool(contrast > 0.5 * (light - dark))
 
 
 def _goes_on(gray: UInt8, pixels: Float64, board: Board) -> bool:

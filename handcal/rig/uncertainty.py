@@ -66,7 +66,7 @@ class NextView:
     pose: Float64
     """(6,); of the board in the camera's frame: rotation vector, m."""
     uncertainty: float
-    """What is left of the uncertainty with this view."""
+    """Share of the uncertainty that remains with this view."""
 
 
 def projection_uncertainty(

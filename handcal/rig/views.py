@@ -119,7 +119,7 @@ def read_views(
     progress : Progress
         Reports each file's name.
     """
-    views = []
+    views: list[BoardImage] = []
     for number, file in enumerate(files):
         progress.at(number / len(files), file.name)
         try:

@@ -21,7 +21,7 @@ from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, Eye, Float64, Rig
 
 SLIP_M = (0.002, 0.0015, 0.003)
-"""How differently a headset sits when the same wearer puts it on again, standard deviation along
+"""Change of a headset's fit when the same wearer puts it on again, standard deviation along
 E's axes. As much as the simulated wearers differ; of a real headset it is not known."""
 
 
@@ -32,7 +32,7 @@ class Former:
     shift_m: Mapping[Eye, Float64] = field(default_factory=dict)
     """each (3,); φ that the headset rendered with last, solved or set by hand."""
     prior: LearnedPrior | None = None
-    """Where the eyes are, after the headset was moved; None if there is no stored session."""
+    """Prior of the eyes after the headset was moved; None if there is no stored session."""
 
 
 def read_former(path: Path, rig: Rig) -> Former:

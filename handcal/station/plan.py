@@ -34,7 +34,7 @@ class PlanSettings:
 
 
 class StepName(StrEnum):
-    """What a plan needs next."""
+    """Next need of a plan."""
 
     RAISE = "raise"
     """The hand must be raised and held still."""

@@ -42,7 +42,7 @@ class Procedure:
     """True if the headset has acknowledged it."""
     plan: PlanName = "paper"
     next_step: NextStep | None = None
-    """What the plan needs next; None before the first frame."""
+    """Next need of the plan; None before the first frame."""
     verifying: VerifyingView | None = None
     """The verification that goes on, in the state `verify`."""
     verifications: Mapping[Eye, Verification] = field(default_factory=dict)

@@ -154,3 +154,12 @@ def test_part_of_a_larger_checkerboard_is_not_taken_for_the_board(shared_data: P
     image = read_image(file, cv2.IMREAD_GRAYSCALE)
     with pytest.raises(BoardError, match="goes on: it has more squares than 8×7"):
         find_board(image, Board(kind="checkerboard", squares=(8, 7)))
+
+
+@pytest.mark.parametrize("name", ["left01", "left04", "left12"])
+def test_a_grid_that_skips_corners_is_not_taken_for_the_board(shared_data: Path, name: str) -> None:
+    image = read_image(
+        shared_data / "boards" / "opencv_stereo" / f"{name}.jpg", cv2.IMREAD_GRAYSCALE
+    )
+    with pytest.raises(BoardError):
+        find_board(image, Board(kind="checkerboard", squares=(9, 6)), explain=False)

@@ -71,7 +71,7 @@ def test_the_lens_of_opencvs_sample_is_a_pinhole(shared_data: Path) -> None:
     assert result.verdict.name == "good"
 
 
-def test_a_wrong_number_of_squares_is_told_with_names(shared_data: Path) -> None:
+def test_a_wrong_number_of_squares_is_reported_with_names(shared_data: Path) -> None:
     folder = shared_data / "boards" / "opencv_stereo"
     board = Board(kind="checkerboard", squares=(12, 9))
     views = read_views(sorted(folder.glob("left*.jpg"))[:5], board)

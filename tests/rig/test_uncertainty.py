@@ -71,7 +71,7 @@ def test_named_next_views_get_there(seed: int) -> None:
         assert add is not None
         pose = rigid(add.pose[:3], add.pose[3:])
         seen = board_view(BOARD, pose, CAMERA, rng, 0.1)
-        inside = ((seen.pixels > 0) & (seen.pixels < [639, 479])).all(axis=1)
+        inside = np.flatnonzero(((seen.pixels > 0) & (seen.pixels < [639, 479])).all(axis=1))
         views.append(BoardImage(f"next{number}", seen.only(inside)))
         result = calibrate_camera(views)
     assert result.verdict.name == "good"

@@ -60,7 +60,7 @@ def fits(stage: Stage, moved: NudgeSum = STILL) -> None:
     stage.calibration.wait_applied()
 
 
-def test_the_headset_is_told_to_verify_one_eye_and_shown_the_outline(stage: Stage) -> None:
+def test_the_headset_verifies_one_eye_and_shows_the_outline(stage: Stage) -> None:
     begin(stage, "right")
     assert stage.state() is State.VERIFY
     stage.see()

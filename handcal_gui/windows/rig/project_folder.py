@@ -35,7 +35,7 @@ class StereoEntries:
     depth_to_color: str = ""
     """Files with the depth imager's intrinsics and its pose in the colour imager, if the images
     come from the colour imager."""
-    lens: LensChoice = "full"
+    lens: LensChoice = "auto"
     """Lens model for solved intrinsics."""
     dropped: tuple[str, ...] = ()
     """Excluded images, by the depth camera's file name."""
@@ -47,7 +47,7 @@ class ViewpointEntries:
 
     images: str = ""
     intrinsics: str = ""
-    lens: LensChoice = "full"
+    lens: LensChoice = "auto"
     dropped: tuple[str, ...] = ()
 
 
