@@ -255,7 +255,7 @@ class Wearer:
             Its times must not decrease between steps.
         """
         t_s = view.t_s
-        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s) @ self._look(view)
+        T_W_H = self._T_W_H0 @ self._head_sway.pose(t_s) @ self._look_around(view)
         if self._move is None:
             self._move = _Move(self._T_W_hand, t_s, 2.0 * self._settings.movement_s)
         self._notice(view, self._move)
@@ -269,7 +269,7 @@ class Wearer:
         nudge, fits = self._look(self._check, view, T_W_H, T_W_hand)
         return WearerAction(T_W_H, T_W_hand, confirm, nudge, fits)
 
-    def _look(self, view: DisplayView) -> Float64:
+    def _look_around(self, view: DisplayView) -> Float64:
         """Turn the head from side to side while asked to; begin and end slowly."""
         settings = self._settings
         most = (view.t_s - self._stepped_s) / (0.25 * settings.look_period_s)
