@@ -135,11 +135,13 @@ def test_checks_alone_give_estimates_with_honest_covariances(checks: int) -> Non
 def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None:
     rng = np.random.default_rng(1)
     true_m = np.array([0.003, -0.002, 0.004])
-    solved = [(ONE["left"], {"left": _shift(true_m)})]
+    seen: dict[Eye, EyeShift] = {"left": _shift(true_m)}
     check = _check(rng, true_m)
+    checks: list[dict[Eye, Verification]] = [
+        {}, {"left": check}, {"left": replace(check, hand_E_m=None)},
+    ]  # fmt: skip
     alone, checked, nowhere = (
-        fuse_alignments(solved, RIG, USUAL, verified=verified)
-        for verified in ({}, {"left": check}, {"left": replace(check, hand_E_m=None)})
+        fuse_alignments([(ONE["left"], seen)], RIG, USUAL, verified=verified) for verified in checks
     )
     sigma_m = [np.linalg.norm(one.shifts["left"].sigma_m) for one in (alone, checked, nowhere)]
     assert sigma_m[1] < 0.8 * sigma_m[0]

@@ -20,7 +20,10 @@ SOLVE = SolveSettings()
 USUAL = PlacementSettings()
 DRAWN = {eye: np.zeros(3) for eye in EYES}
 T_W_H = rigid([0.2, -0.4, 0.1], [0.3, 1.2, -0.5])
-TRUE_M = {"left": np.array([0.003, -0.002, 0.004]), "right": np.array([0.004, -0.002, 0.003])}
+TRUE_M: dict[Eye, Float64] = {
+    "left": np.array([0.003, -0.002, 0.004]),
+    "right": np.array([0.004, -0.002, 0.003]),
+}
 
 
 def _raised(depth_m: float = 0.51) -> tuple[Float64, np.ndarray]:
@@ -121,12 +124,12 @@ def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
     assert next_check(sure, {}) == "left"
     assert next_check(sure, {"left": check}) == "right"
     assert next_check(sure, {"left": check}, usable_eyes=("left",)) is None
-    both = {"left": check, "right": check}
+    both: dict[Eye, Verification] = {"left": check, "right": check}
     assert next_check(sure, both) is None
     assert next_check(unsure, both) == "left"
-    again = both | {"left": check.after(check)}
+    again: dict[Eye, Verification] = both | {"left": check.after(check)}
     assert next_check(unsure, again) == "right"
-    assert next_check(unsure, again | {"right": check.after(check)}) is None
+    assert next_check(unsure, dict.fromkeys(EYES, check.after(check))) is None
 
 
 def _all_named(results: Results, name: VerdictName) -> Results:

@@ -253,7 +253,9 @@ def _verify(
     moved_arcmin = np.sign(moved_px) * arcmin_from_px(display, np.abs(moved_px)) + error_arcmin
     size = growth - 1.0 + error_size
     hand_E_m = points_E_m[kept].mean(axis=0)
-    after_m = nudged_shift_m(display, drawn_m, hand_E_m, *moved_arcmin, size)
+    after_m = nudged_shift_m(
+        display, drawn_m, hand_E_m, float(moved_arcmin[0]), float(moved_arcmin[1]), size
+    )
     return Verification(
         before_m=_three(drawn_m),
         nudge_arcmin=(float(moved_arcmin[0]), float(moved_arcmin[1])),

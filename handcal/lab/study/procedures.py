@@ -1,4 +1,4 @@
-"""The study of procedures: what a wearer reaches by a plan, in what time, and what the verdict says.
+"""The study of procedures: the error that a plan leaves, its time, and the verdicts on it.
 
 Every plan leads the same simulated wearers, with errors of the same distribution. Those of one plan
 do not depend on the other plans.

@@ -93,10 +93,13 @@ def test_what_has_no_verdict_has_no_share() -> None:
     assert found.expected_over_actual is None
 
 
-@pytest.mark.parametrize("wrong", [{"plans": ("spaam-3",)}, {"variants": ("fast",)}])
-def test_unknown_plans_and_variants_are_refused(wrong: dict[str, tuple[str, ...]]) -> None:
+@pytest.mark.parametrize(
+    "wrong",
+    [ProcedureStudySettings(plans=("spaam-3",)), ProcedureStudySettings(variants=("fast",))],
+)
+def test_unknown_plans_and_variants_are_refused(wrong: ProcedureStudySettings) -> None:
     with pytest.raises(HandcalError, match="unknown"):
-        procedure_cases(ProcedureStudySettings(**wrong))
+        procedure_cases(wrong)
 
 
 def test_the_command_writes_a_row_of_each_plan_and_scale(
