@@ -10,7 +10,7 @@ x right, y down, z forward.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from html import escape
 from types import MappingProxyType
 from typing import Any, Literal, Protocol, TypeAlias
@@ -411,6 +411,14 @@ class Verification:
     """Relative growth of the drawing by the wearer."""
     hand_E_m: tuple[float, float, float] | None = None
     """Centre of the hand then, in the eye's E; None if unknown: the check is then not fused."""
+    earlier: tuple[Verification, ...] = ()
+    """Checks of the same eye before this one, oldest first; each is fused as well."""
+
+    def after(self, former: Verification | None) -> Verification:
+        """Return this check with a former one, if there is one, among the earlier checks."""
+        if former is None:
+            return self
+        return replace(self, earlier=(*former.earlier, replace(former, earlier=())))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

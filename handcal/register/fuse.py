@@ -91,10 +91,15 @@ class Fused:
     """The displacement measured by each alignment."""
     wearer_scale: float
     """Expected error of the wearer's overlays, in those of a usual wearer."""
-    verified: Mapping[Eye, Observation] = field(default_factory=dict)
-    """The φ found by each eye's verification."""
+    verified: Mapping[Eye, tuple[Observation, ...]] = field(default_factory=dict)
+    """The φ found by each eye's verifications."""
     unverified: Mapping[Eye, Observation] = field(default_factory=dict)
     """The verification to expect of each solved eye that was not verified; its φ is zero."""
+
+    @property
+    def all_observed(self) -> tuple[Observation, ...]:
+        """The observations of the alignments, then those of the verifications."""
+        return (*self.observed, *(one for found in self.verified.values() for one in found))
 
     def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
         """Return the covariance (6, 6) to expect after more alignments with some eyes open."""
@@ -108,9 +113,8 @@ class Fused:
         The alignments, each with some eyes open, are taken to be as precise as those so far on
         average; without any, as the verifications.
         """
-        verified = [one.at(self.wearer_scale) for one in self.verified.values()]
-        aligned = [one.at(self.wearer_scale) for one in self.observed]
-        known = [*aligned, *verified]
+        known = [one.at(self.wearer_scale) for one in self.all_observed]
+        aligned, verified = known[: len(self.observed)], known[len(self.observed) :]
         noise_m2 = np.mean([covariance_m2 for _, _, covariance_m2 in aligned or verified], axis=0)
         for eyes in upcoming:
             H = np.zeros((3, 6))
@@ -176,16 +180,20 @@ def fuse_alignments(
     HandError
         If all points of a cursor lie at cut edges.
     """
-    checks = {
-        eye: verified_observation(rig, eye, one.after_m, one.hand_E_m, settings)
-        for eye, one in verified.items()
-        if one.hand_E_m is not None
+    found_checks = {
+        eye: tuple(
+            verified_observation(rig, eye, one.after_m, one.hand_E_m, settings)
+            for one in (*newest.earlier, newest)
+            if one.hand_E_m is not None
+        )
+        for eye, newest in verified.items()
     }
+    checks = {eye: found for eye, found in found_checks.items() if found}
     if not solved and not checks:
         raise ValueError("at least one alignment is needed")
     observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
     prior = _with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
-    known = (*observed, *checks.values())
+    known = (*observed, *(one for found in checks.values() for one in found))
     weights = _scale_weights(prior, known, settings)
     found = [posterior(prior, [o.at(scale) for o in known]) for scale in settings.wearer_scales]
     estimate_m = sum(weight * mean_m for weight, (mean_m, _) in zip(weights, found, strict=True))

@@ -3,7 +3,8 @@
 The wearer raises the hand once. Every cursor is that hand, moved: to where, by the posterior's
 covariance, an alignment lowers the expected error of both eyes most. The same slip of the wearer
 moves φ less the nearer the hand is, so this is as near as the camera can measure, and where the
-displays show enough of the hand.
+displays show enough of the hand. The cursor is drawn from one view of the camera, so the hand also
+stays near the camera's line of sight to it.
 """
 
 from __future__ import annotations
@@ -22,32 +23,37 @@ from handcal.register.prior import EyePrior, eye_prior, posterior
 from handcal.register.results import Results, SolveSettings
 from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
-from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig
+from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
 
 _OUTLINE_FROM_POINTS = 1500
-# Of a registration, where none was made yet: small beside the wearer's own error.
+# Error of a registration, and its growth with the angle by which the camera sees the moved hand
+# from another side: its outline is then other points, on a rim of about this radius.
 _REGISTRATION_SIGMA_M = 3e-4
+_RIM_M = 0.010
 
 
 @dataclass(frozen=True, slots=True)
 class PlacementSettings:
     """Places of cursors, and the number of alignments."""
 
-    nearest_m: float = 0.45
-    """Least distance of the hand from the camera, along its axis: a D415 measures nothing nearer
-    at 1280x720 unless a disparity shift is set."""
+    nearest_m: float = 0.44
+    """Least distance of the hand from the camera, along its axis: at 1280x720 a D415, with 1005 px,
+    55 mm and 126 disparities, measures nothing nearer unless a disparity shift is set."""
     farthest_m: float = 0.75
     """Largest such distance."""
     aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
-    """Places to choose from, to the right of the middle of the displays that are used."""
+    """Places to choose from, to the right of the camera's line of sight to the raised hand."""
     depths_m: tuple[float, ...] = (0.0, 0.04, 0.08)
     """Places to choose from, beyond the nearest."""
     shown_share: float = 0.6
     """Least share of the hand's outline within each display that is used."""
-    fewest: int = 3
+    fewest: int = 2
     """Alignments of the recommended plan before the eyes are verified."""
-    most: int = 10
+    most: int = 6
     """Alignments after which no other is planned."""
+    checks: int = 2
+    """Largest number of verifications of one eye: the second is for an eye that the first does not
+    lead to *accept*. People see two outlines coincide better than they hold a hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +85,8 @@ def next_alignment(
     """Return a plan's next alignment, or None if none is needed now or the most were made.
 
     Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
-    in turn, each cursor where it tells most. None is needed once every eye is accepted, or is
-    expected to be after its verification.
+    in turn, each cursor where it tells most. None is needed before each eye is verified
+    (`next_check`), nor once every eye is accepted or keeps its offline calibration.
 
     Parameters
     ----------
@@ -110,7 +116,7 @@ def next_alignment(
         If nearly all points of the hand lie at cut edges.
     """
     fewest = settings.fewest if plan == "recommended" else 1
-    is_enough = results is not None and _is_enough(results, usable_eyes)
+    is_enough = results is not None and _is_enough(plan, results, usable_eyes)
     if len(done) >= settings.most or (len(done) >= fewest and is_enough):
         return None
     eyes = planned_eyes(plan, done, usable_eyes)
@@ -123,9 +129,7 @@ def next_alignment(
     if not places:
         return Planned(eyes, np.zeros(3), "no other place is on the displays and in camera range")
     errors = [
-        _expected_arcmin(
-            raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, results, solve
-        )
+        _expected_arcmin(raised_m, outline_m, place, rig, eyes, drawn_shift_m, results, solve)
         for place in places
     ]
     best = int(np.argmin(errors))
@@ -137,13 +141,37 @@ def next_alignment(
     )
 
 
-def _is_enough(results: Results, usable_eyes: Sequence[Eye]) -> bool:
-    """Return whether every eye is accepted or kept, or expected to be accepted once verified."""
-    return set(results.verdicts) >= set(usable_eyes) and all(
-        verdict.name != "repeat"
-        or (eye in results.advice and results.advice[eye].is_accepted_once_verified)
-        for eye, verdict in results.verdicts.items()
-    )
+def next_check(
+    results: Results | None,
+    verified: Mapping[Eye, Verification],
+    *,
+    usable_eyes: tuple[Eye, ...] = EYES,
+    settings: PlacementSettings = PlacementSettings(),
+) -> Eye | None:
+    """Return the eye to verify next in the recommended plan, or None if none is to be.
+
+    Each eye once, then each eye again that is not accepted. To be asked when `next_alignment` plans
+    nothing, and again after each check.
+    """
+    if results is None:
+        return None
+    counts = {eye: len(one.earlier) + 1 for eye, one in verified.items()}
+    wanted = [
+        eye
+        for eye in usable_eyes
+        if eye in results.verdicts
+        and counts.get(eye, 0) < settings.checks
+        and (eye not in counts or results.verdicts[eye].name in ("repeat", "keep"))
+    ]
+    return min(wanted, key=lambda eye: counts.get(eye, 0), default=None)
+
+
+def _is_enough(plan: PlanName, results: Results, usable_eyes: Sequence[Eye]) -> bool:
+    """Return whether no alignment is needed now: every eye is accepted or kept, or not verified."""
+    if not set(results.verdicts) >= set(usable_eyes):
+        return False
+    may_verify = plan == "recommended" and not set(results.fused.verified) >= set(usable_eyes)
+    return may_verify or all(one.name != "repeat" for one in results.verdicts.values())
 
 
 def _places(
@@ -156,22 +184,18 @@ def _places(
 ) -> list[Float64]:
     """Return displacements of the raised hand, in H, to places that displays and camera allow.
 
-    The hand stays at its height on the displays: it moves along the line of sight of the eyes'
-    middle, and aside.
+    The hand moves along the camera's line of sight, so that the camera sees the same side of it,
+    and a little aside.
     """
-    viewpoints_m = [invert(view_of_eye(rig.eyes[eye], np.eye(4)))[:3, 3] for eye in eyes]
-    middle_m = np.mean(viewpoints_m, axis=0)
-    centre_m = raised_m.mean(axis=0)
-    line_m = centre_m - middle_m
+    camera_m = rig.T_H_D[:3, 3]
+    line_m = raised_m.mean(axis=0) - camera_m
     depth_m = transform(invert(rig.T_H_D), raised_m)[:, 2].min()
     # Movement along the line of sight changes the depth before the camera at this rate.
     rate = float((rig.T_H_D[:3, :3].T @ line_m)[2])
     places = []
     for aside_m, beyond_m in product(settings.aside_m, settings.depths_m):
         ratio = 1.0 + (settings.nearest_m + beyond_m - depth_m) / rate
-        goal_m = middle_m + ratio * line_m
-        goal_m[0] = middle_m[0] + aside_m
-        place = goal_m - centre_m
+        place = (ratio - 1.0) * line_m + [aside_m, 0.0, 0.0]
         if _is_visible(raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, settings):
             places.append(place)
     return places
@@ -205,25 +229,31 @@ def _is_visible(
 
 
 def _expected_arcmin(
-    hand_m: Float64,
+    raised_m: Float64,
     outline_m: Float64,
+    place: Float64,
     rig: Rig,
     eyes: Sequence[Eye],
     drawn_shift_m: Mapping[Eye, Float64],
     results: Results | None,
     solve: SolveSettings,
 ) -> float:
-    """Return the error to expect on the mean of both eyes after an alignment at a place."""
+    """Return the error to expect on the mean of both eyes after an alignment at a displacement."""
     T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
-    H, wearer_m2 = seen_by(hand_m, outline_m, T_E_H, drawn_shift_m, eyes, rig, solve.fuse)
+    H, wearer_m2 = seen_by(
+        raised_m + place, outline_m + place, T_E_H, drawn_shift_m, eyes, rig, solve.fuse
+    )
     prior: EyePrior = eye_prior(solve.fuse.prior)
     known: list[Observation] = []
     scale = 1.0
-    registration_m2 = _REGISTRATION_SIGMA_M**2 * np.eye(3)
+    line_m = raised_m.mean(axis=0) - rig.T_H_D[:3, 3]
+    before, now = (ray / np.linalg.norm(ray) for ray in (line_m, line_m + place))
+    turned_rad = float(np.linalg.norm(now - before))
+    registration_m2 = (_REGISTRATION_SIGMA_M**2 + (_RIM_M * turned_rad) ** 2) * np.eye(3)
     if results is not None:
         fused = results.fused
         prior, scale = fused.prior, fused.wearer_scale
-        known = [*fused.observed, *fused.verified.values()]
+        known = list(fused.all_observed)
     known.append(Observation(H, np.zeros(3), registration_m2, wearer_m2))
     _, covariance_m2 = posterior(prior, [one.at(scale) for one in known])
     return float(

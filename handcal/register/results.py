@@ -265,7 +265,7 @@ def results_json(results: Results) -> dict[str, Any]:
                     strict=True,
                 )
             )
-            for one in (*results.fused.observed, *results.fused.verified.values())
+            for one in results.fused.all_observed
         ],
         "alignments": [
             {eye: _shift_json(shift) for eye, shift in shifts.items()}

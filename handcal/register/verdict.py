@@ -59,11 +59,6 @@ class Advice:
     verify: bool = False
     """True if each solved eye is to be verified after the alignments."""
 
-    @property
-    def is_accepted_once_verified(self) -> bool:
-        """True if a verification of each eye, without another alignment, is enough."""
-        return self.is_accepted and self.verify and self.alignments == 0
-
 
 def planned_eyes(
     plan: PlanName, done: Sequence[tuple[Eye, ...]], usable: tuple[Eye, ...] = EYES
@@ -101,9 +96,10 @@ def eye_benefit(rig: Rig, fused: Fused, eye: Eye) -> Benefit:
 def measured_arcmin(
     rig: Rig, fused: Fused, eye: Eye, verification: Verification
 ) -> tuple[float, float]:
-    """Return an eye's error before its verification and now, from all that is known since."""
+    """Return an eye's error before its first verification and now, from all that is known."""
     display, shift = rig.eyes[eye], fused.shifts[eye]
-    before_m = shift.shift_m - verification.before_m
+    first = (*verification.earlier, verification)[0]
+    before_m = shift.shift_m - first.before_m
     errors_m = before_m, np.zeros(3)
     before, now = (expected_arcmin(display, one_m, shift.covariance_m2) for one_m in errors_m)
     return before, now

@@ -25,12 +25,14 @@ VARIANTS: tuple[Variant, ...] = get_args(Variant)
 
 SITTING_SHARE = 0.5
 """Share of the variance of a drifting person's overlay that is the same for a whole sitting."""
-DRIFT_SIGMA_M = 0.0007
-"""Standard deviation, along each axis, of a hand held still for a second (Leap recording)."""
+DRIFT_SIGMA_M = 0.0008
+"""Standard deviation, along each axis, of a hand held still for a second: 0.9, 0.9 and 0.4 mm in
+the Leap recording."""
 LATE_S = 0.3
 """Mean delay of a late press after the hand was right, exponential."""
-LEAVING_M_S = 0.0058
-"""Standard deviation of the velocity along each axis of a hand meanwhile (laser recordings)."""
+LEAVING_M_S = 0.0084
+"""Standard deviation of the velocity along each axis of a hand meanwhile: 2.5 mm in 0.3 s in the
+laser recordings, whose arms were stretched and not supported."""
 _OFTEN, _FAR_OFF = 0.1, 3.0
 _SAME_AT_M = 0.56
 
@@ -42,7 +44,9 @@ class Sitting:
     variant: Variant
     settings: WearerSettings
     bias: PlacementError
-    """The part of every error that stays the same."""
+    """The part of every error of an overlay that stays the same."""
+    perceived_bias: Float64
+    """(3,); the same of a verification, right, down and size, in standard deviations."""
 
 
 def begin_sitting(
@@ -57,7 +61,12 @@ def begin_sitting(
     )
     bias = draw_placement_error(rng, scaled)
     share = SITTING_SHARE if variant == "drift" else 0.0
-    return Sitting(variant, scaled, _times(np.sqrt(share), replace(bias, rotation_rad=np.zeros(3))))
+    return Sitting(
+        variant,
+        scaled,
+        _times(np.sqrt(share), replace(bias, rotation_rad=np.zeros(3))),
+        np.sqrt(share) * rng.normal(size=3),
+    )
 
 
 def draw_error(
@@ -118,7 +127,11 @@ def draw_perception(
     scale = sitting.settings.lateral_sigma_arcmin / usual.lateral_sigma_arcmin
     if sitting.variant == "heavy-tails" and rng.random() < _OFTEN:
         scale *= _FAR_OFF
-    return scale * lateral_arcmin * rng.normal(size=2), scale * size * float(rng.normal())
+    own = rng.normal(size=3)
+    if sitting.variant == "drift":
+        own *= np.sqrt(1.0 - SITTING_SHARE)
+    right, down, larger = scale * (own + sitting.perceived_bias)
+    return lateral_arcmin * np.array([right, down]), size * float(larger)
 
 
 def _times(factor: float, error: PlacementError) -> PlacementError:

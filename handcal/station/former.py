@@ -53,8 +53,8 @@ def read_former(path: Path, rig: Rig) -> Former:
     if faulty:
         raise FileError(f"{path} is no calibration to begin with: {faulty[0].reason}")
     fused = results.fused
-    known = [*fused.observed, *fused.verified.values()]
-    mean_m, covariance_m2 = posterior(fused.prior, [one.at(fused.wearer_scale) for one in known])
+    known = [one.at(fused.wearer_scale) for one in fused.all_observed]
+    mean_m, covariance_m2 = posterior(fused.prior, known)
     shift_m = {eye: np.zeros(3) for eye in EYES} | dict(record.applied_shift_m)
     return Former(shift_m, widened(mean_m, covariance_m2, SLIP_M))
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from handcal.errors import HandError
-from handcal.register.placement import PlacementSettings, Planned, next_alignment
+from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_check
 from handcal.register.verdict import planned_eyes
 from handcal.station.procedure import Calibration
 from handcal.station.states import Observation, ProcedureError, State
@@ -113,8 +113,8 @@ class Plan:
         planned = self._planned()
         if planned is not None:
             return NextStep(StepName.CURSOR, planned.eyes, planned.reason, planned)
-        if unverified and self.settings.verify:
-            return self._with_hand(StepName.VERIFY, unverified[:1], is_steady)
+        if (eye := self._next_check()) is not None:
+            return self._with_hand(StepName.VERIFY, (eye,), is_steady)
         return NextStep(StepName.DONE, (), self._takes())
 
     def advance(self, observation: Observation) -> NextStep:
@@ -194,9 +194,23 @@ class Plan:
         if faulty := [eye for eye in found if found[eye] in _FAULTY]:
             return results.verdicts[faulty[0]].reason
         is_judged = all(found.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
-        if is_judged and not (unverified and self.settings.verify):
+        is_verified = not (unverified and self.settings.verify)
+        # A stored calibration that its check does not refuse is kept.
+        is_kept = not self._calibration.alignments or self._next_check() is None
+        if is_judged and is_verified and is_kept:
             return "every eye has its verdict"
         return None
+
+    def _next_check(self) -> Eye | None:
+        """Return the eye to verify next, if no alignment comes first."""
+        if not self.settings.verify:
+            return None
+        return next_check(
+            self._calibration.results,
+            self._calibration.verifications,
+            usable_eyes=self.settings.usable_eyes,
+            settings=self.settings.placement,
+        )
 
     def _takes(self) -> str:
         """Return what it would take to be accepted."""

@@ -372,7 +372,8 @@ class Calibration(VerificationSteps):
 
     def _use_verification(self) -> None:
         self.solve()
-        self.apply(keeps_hand=True)
+        # The other eye follows at once.
+        self.apply(keeps_hand=any(eye not in self.verifications for eye in self._usable_eyes))
 
     def _take_headsets_eye_distance(self) -> None:
         """Use the headset's newest eye distance unless one was typed."""

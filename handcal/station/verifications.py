@@ -11,7 +11,6 @@ from handcal.geometry import transform
 from handcal.link.nudges import VerifyRequest
 from handcal.link.server import HeadsetServer, Nudge
 from handcal.session.session import Session, SessionRecord
-from handcal.station.aligning import KEEP_PROMPT
 from handcal.station.alignments import AlignmentSteps
 from handcal.station.hands import PlacedHand
 from handcal.station.hold import merge_hold
@@ -224,6 +223,7 @@ class VerificationSteps(AlignmentSteps, ABC):
         """Store and fuse a verification, and send what it leads to."""
         hand = merge_hold(self._hands.held_at(hand), hand)
         found = verifying.result(hand_centre_E_m(self.rig, verifying.eye, hand))
+        found = found.after(self.verifications.get(verifying.eye))
         self.verifications[verifying.eye] = found
         self._end_verifying(verifying.shift_m)
         self._store.write_later(lambda session: session.save_facts(verified={verifying.eye: found}))
@@ -237,4 +237,4 @@ class VerificationSteps(AlignmentSteps, ABC):
         self._drawing.shift_m[verifying.eye] = shift_m
         self._drawing.send({verifying.eye: shift_m})
         self._link.send_verify(None)
-        self._link.send_prompt(KEEP_PROMPT, EYES)
+        self._link.send_prompt("", EYES)

@@ -75,7 +75,9 @@ def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
         assert eye["reason"]
         off_mm = np.subtract(eye["shift_mm"], eye["true_shift_mm"])
         assert eye["error_mm"] == pytest.approx(np.linalg.norm(off_mm))
-    assert set(result["reprojection_arcmin"]) == {"before", "after"}
+    assert set(result["reprojection_arcmin"]) == {"before", "after", "drawn"}
+    assert result["plan"] == "paper"
+    assert result["seconds"] > 0.0
     assert set(result["guard"]) == {"rejected", "accepted_deg"}
     assert set(result["link"]) == {"sent", "lost", "acked", "projection_acked"}
     assert result["link"]["projection_acked"] == {"left": True, "right": True}

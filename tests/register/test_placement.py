@@ -7,13 +7,13 @@ import pytest
 from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import invert, project, rigid, transform
 from handcal.lab.study.trials import study_hand
-from handcal.register.placement import PlacementSettings, Planned, next_alignment
+from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_check
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.register.verdict import planned_eyes
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Alignment, Eye, Float64, PlanName
+from handcal.types import EYES, Alignment, Eye, Float64, PlanName, VerdictName, Verification
 
 RIG = example_rig()
 SOLVE = SolveSettings()
@@ -101,7 +101,32 @@ def test_the_plan_ends_when_nothing_more_is_needed_or_the_most_were_made() -> No
     assert all(one.name == "accept" for one in many.verdicts.values())
     assert _next(eyes, many) is None
     # As many are wanted before the eyes are verified, however good the result is.
-    assert _next(eyes, many, PlacementSettings(fewest=7)) is not None
-    refused = {eye: replace(one, name="repeat") for eye, one in many.verdicts.items()}
-    assert _next(eyes, replace(many, verdicts=refused)) is not None
-    assert _next(eyes, replace(many, verdicts=refused), PlacementSettings(most=6)) is None
+    assert _next(eyes, many, PlacementSettings(fewest=7, most=10)) is not None
+    # An eye that is not accepted is verified first; more alignments come after that.
+    refused = _all_named(many, "repeat")
+    assert _next(eyes, refused, PlacementSettings(most=10)) is None
+    unverifiable = replace(refused, fused=replace(many.fused, verified=dict.fromkeys(EYES, ())))
+    assert _next(eyes, unverifiable, PlacementSettings(most=10)) is not None
+    assert _next(eyes, unverifiable, PlacementSettings(most=6)) is None
+
+
+def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
+    rng = np.random.default_rng(4)
+    solved = _solved([overlay_by_eye(rng, study_hand(3), RIG, TRUE_M, 800)])
+    check = Verification((0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0))
+    unsure, sure = _all_named(solved, "repeat"), _all_named(solved, "accept")
+    assert next_check(None, {}) is None
+    assert next_check(sure, {}) == "left"
+    assert next_check(sure, {"left": check}) == "right"
+    assert next_check(sure, {"left": check}, usable_eyes=("left",)) is None
+    both = {"left": check, "right": check}
+    assert next_check(sure, both) is None
+    assert next_check(unsure, both) == "left"
+    again = both | {"left": check.after(check)}
+    assert next_check(unsure, again) == "right"
+    assert next_check(unsure, again | {"right": check.after(check)}) is None
+
+
+def _all_named(results: Results, name: VerdictName) -> Results:
+    verdicts = {eye: replace(one, name=name) for eye, one in results.verdicts.items()}
+    return replace(results, verdicts=verdicts)

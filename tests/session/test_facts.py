@@ -59,7 +59,9 @@ def test_each_fact_comes_back_alone(tmp_path: Path, name: str) -> None:
 
 
 def test_a_fact_replaces_an_earlier_one_and_each_eye_its_own(tmp_path: Path) -> None:
-    right = Verification((0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0))
+    zero = 0.0, 0.0, 0.0
+    once = Verification(zero, (0.0, 0.0), zero, 0.01, (0.0, 0.1, 0.5))
+    right = Verification(zero, (1.0, 0.0), zero).after(once)
     with Session.create(tmp_path, example_rig(), {}) as session:
         session.save_facts(**FACTS)
         session.save_facts(plan="both", verified={"right": right}, headset=None)

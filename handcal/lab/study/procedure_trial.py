@@ -14,7 +14,7 @@ from handcal.lab.study.wearers import StudyWearer
 from handcal.register.fuse import FuseSettings
 from handcal.register.guard import GuardSettings
 from handcal.register.nudge import nudged_shift_m
-from handcal.register.placement import PlacementSettings, next_alignment
+from handcal.register.placement import PlacementSettings, next_alignment, next_check
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import Results, SolveSettings, conclude
 from handcal.register.solve import solve_alignment
@@ -64,8 +64,6 @@ class ProcedureModel:
     those with 1.33 times these."""
     verify_s: float = 4.0
     """The wearer's time for the verification of one eye; an assumption."""
-    nearest_m: float = PlacementSettings().nearest_m
-    """As in `PlacementSettings`."""
     eye_distance: EyeDistanceSource = "none"
     prior: LearnedPrior | None = None
     """As learned from earlier sessions; None for the default."""
@@ -131,10 +129,10 @@ def lead_through(
             )
             solved.append((alignment, solve_alignment(alignment, wearer.rig)))
             seconds += usual.reaction_s + usual.movement_s + usual.dwell_s
-        elif verify and not verified:
-            for eye in EYES:
-                verified[eye] = _verify(rng, wearer, sitting, model, eye, shift_m[eye], at_rest_m)
-                seconds += model.verify_s
+        elif verify and (eye := next_check(results, verified, settings=placement)) is not None:
+            found = _verify(rng, wearer, sitting, model, eye, shift_m[eye], at_rest_m)
+            verified[eye] = found.after(verified.get(eye))
+            seconds += model.verify_s
         else:
             assert results is not None
             return Calibrated(shift_m, results, seconds)
