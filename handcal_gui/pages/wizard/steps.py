@@ -177,7 +177,8 @@ class Wizard:
                 self._free = Step.VERIFY if to_verify else STEPS[place - 1]
             case Action.ANOTHER | Action.REPEAT_LEFT | Action.REPEAT_RIGHT:
                 advice = _advice(snapshot) if self._is_complete(snapshot) else None
-                self._repeat = _REPEATS.get(action, advice.eyes if advice else None)
+                # The advice of a session that follows a plan names no eyes.
+                self._repeat = _REPEATS.get(action, (advice.eyes or EYES) if advice else None)
                 self._free = Step.SHOW_HAND
             case Action.SKIP:
                 self._skipped |= set(self.unverified(snapshot)[:1])
@@ -362,7 +363,7 @@ class Wizard:
                 runs_after_s=_STILL_S,
             )
         if advice := _advice(snapshot):
-            eyes = _names(advice.eyes)
+            eyes = _names(advice.eyes or EYES)
             few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
             return WizardView(
                 Step.VERIFY,
