@@ -26,6 +26,7 @@ from handcal_gui.window import MainWindow, Panel
 _POLL_MS = 4
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
+    Step.SHOW_HAND: "results",
     Step.ALIGN: "rotation",
     Step.SOLVE: "results",
     Step.VERIFY: "results",
