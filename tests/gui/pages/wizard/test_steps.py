@@ -14,15 +14,8 @@ from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName, Verification
-from handcal_gui.pages.wizard.steps import (
-    STEPS,
-    Action,
-    Step,
-    Wizard,
-    WizardView,
-    is_complete,
-    next_eyes,
-)
+from handcal_gui.pages.wizard.steps import Wizard, is_complete, next_eyes
+from handcal_gui.pages.wizard.view import STEPS, Action, Step, WizardView
 
 Maker = Callable[..., Snapshot]
 VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
