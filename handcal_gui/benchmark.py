@@ -37,7 +37,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import CameraIdentity, Frame
 from handcal_gui.app import keep_window_quick
-from handcal_gui.pages.wizard.steps import Action
+from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from handcal.station.snapshot import Snapshot
 from handcal_gui.control.live import CalibrationController
-from handcal_gui.pages.wizard.steps import Action, WizardView
+from handcal_gui.pages.wizard.view import Action, WizardView
 from handcal_gui.pages.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7

@@ -14,7 +14,7 @@ from handcal_gui.autopilot.autopilot import Autopilot
 from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.autopilot.tour import Tour
 from handcal_gui.dialogs.export import ExportDialog
-from handcal_gui.pages.wizard.steps import Step, WizardView
+from handcal_gui.pages.wizard.view import Step, WizardView
 from handcal_gui.program import Program
 
 

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder
-from handcal_gui.pages.wizard.steps import STEPS, Action, Step, WizardView
+from handcal_gui.pages.wizard.view import STEPS, Action, Step, WizardView
 
 
 class Screenshots:

@@ -19,13 +19,15 @@ from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.engine.engine_thread import Command, EngineThread
-from handcal_gui.pages.wizard.steps import Action, Step, Wizard
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.window import MainWindow, Panel
 
 _POLL_MS = 4
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
+    Step.SHOW_HAND: "results",
     Step.ALIGN: "rotation",
     Step.SOLVE: "results",
     Step.VERIFY: "results",

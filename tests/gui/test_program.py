@@ -28,7 +28,7 @@ from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui import launch
-from handcal_gui.pages.wizard.steps import Action, Step
+from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.theme import use_theme

@@ -32,7 +32,8 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
 from handcal_gui.keys import keys_by_group, keys_html
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, Wizard, WizardView
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable

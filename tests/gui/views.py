@@ -10,7 +10,8 @@ from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
-from handcal_gui.pages.wizard.steps import PLANS, Action, Step, Wizard, WizardView
+from handcal_gui.pages.wizard.steps import PLANS, Wizard
+from handcal_gui.pages.wizard.view import Action, Step, WizardView
 
 _ZERO = (0.0, 0.0, 0.0)
 

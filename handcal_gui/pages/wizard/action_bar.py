@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.keys import add_action
-from handcal_gui.pages.wizard.steps import ButtonSpec, WizardView
+from handcal_gui.pages.wizard.view import ButtonSpec, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.widgets.fields import main_button, with_name
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from handcal_gui.pages.wizard.steps import Action, Step, WizardView
+from handcal_gui.pages.wizard.view import Action, Step, WizardView
 
 _LAPSE_S = 0.4
 """A main button that is disabled for less time is not waited for from the start again."""

@@ -10,7 +10,7 @@ from handcal.hand.overlay import contour_px
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye, Frame
 from handcal_gui.pages.wizard.result_bar import ResultBar
-from handcal_gui.pages.wizard.steps import Step
+from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.panels.wearer_view.panel import origin_text

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -13,6 +11,14 @@ from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
+from handcal_gui.pages.wizard.checks import (
+    hand_check,
+    is_placed,
+    is_steady,
+    still_check,
+    verdict_checks,
+)
+from handcal_gui.pages.wizard.view import STEPS, Action, ButtonSpec, Precondition, Step, WizardView
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
@@ -30,86 +36,6 @@ _SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
 _MOST_BY_ITSELF = 2
 """Most further alignments of an eye that are begun without asking."""
 _SENDS_UNUSABLE = "Draws with a result that should not be used"
-
-
-class Step(StrEnum):
-    """The steps, in order; the value is the title."""
-
-    CONNECT = "Connect"
-    SHOW_HAND = "Show hand"
-    MAKE_CURSOR = "Make cursor"
-    ALIGN = "Align"
-    SOLVE = "Solve"
-    VERIFY = "Verify"
-    SAVE = "Save"
-
-
-STEPS = tuple(Step)
-
-
-class Action(StrEnum):
-    """Actions of the buttons; the value is the engine's command, or a move within the wizard."""
-
-    NEXT = "next"
-    MAKE_CURSOR = "make cursor"
-    CONFIRM = "confirm"
-    SOLVE = "solve"
-    APPLY = "apply"
-    ANOTHER = "another alignment"
-    REPEAT_LEFT = "repeat left eye"
-    REPEAT_RIGHT = "repeat right eye"
-    REDO = "redo"
-    BACK = "back"
-    VERIFY = "verify the eye"
-    VERIFIED = "confirm the verification"
-    UNDO_NUDGE = "undo the last nudge"
-    SKIP = "skip the verification"
-    FINISH = "finish"
-    NEXT_WEARER = "next wearer"
-    EXPORT = "export"
-
-
-@dataclass(frozen=True, slots=True)
-class Precondition:
-    """A precondition, and whether it holds."""
-
-    text: str
-    holds: bool
-    verdict: VerdictName | None = None
-    """The verdict that it shows, if it shows one."""
-
-
-@dataclass(frozen=True, slots=True)
-class ButtonSpec:
-    """A button: its action and its label."""
-
-    action: Action
-    label: str
-    """On buttons other than the main one, & precedes the letter that presses it with Alt."""
-    is_enabled: bool = True
-    discards: str = ""
-    """The loss that the button causes, if any: then only a click or the letter presses it."""
-
-
-@dataclass(frozen=True, slots=True)
-class WizardView:
-    """Everything that the wizard shows at one moment."""
-
-    step: Step
-    sentence: str
-    """The instruction to the wearer or the technician."""
-    checks: tuple[Precondition, ...]
-    main: ButtonSpec
-    """The button that the space bar presses."""
-    others: tuple[ButtonSpec, ...] = ()
-    note: str = ""
-    """The last event or current activity, such as a refusal; empty if none."""
-    fact: str = ""
-    """The findings so far; empty if there are none."""
-    runs_after_s: float | None = None
-    """Time for which the main button is enabled before it presses itself; None if it never does."""
-    unearned: frozenset[Step] = frozenset()
-    """Earlier steps that were left without what they are for."""
 
 
 def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ...]:
@@ -177,7 +103,8 @@ class Wizard:
                 self._free = Step.VERIFY if to_verify else STEPS[place - 1]
             case Action.ANOTHER | Action.REPEAT_LEFT | Action.REPEAT_RIGHT:
                 advice = _advice(snapshot) if self._is_complete(snapshot) else None
-                self._repeat = _REPEATS.get(action, advice.eyes if advice else None)
+                # The advice of a session that follows a plan names no eyes.
+                self._repeat = _REPEATS.get(action, (advice.eyes or EYES) if advice else None)
                 self._free = Step.SHOW_HAND
             case Action.SKIP:
                 self._skipped |= set(self.unverified(snapshot)[:1])
@@ -236,29 +163,25 @@ class Wizard:
         return WizardView(
             Step.SHOW_HAND,
             f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
-            (_hand_check(snapshot),),
-            ButtonSpec(Action.NEXT, "Next", _is_placed(snapshot)),
+            (hand_check(snapshot),),
+            ButtonSpec(Action.NEXT, "Next", is_placed(snapshot)),
             (back,),
             runs_after_s=_SHOWN_S,
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
-        seen = snapshot.observation
-        held = _still_check(snapshot)
-        if seen is not None and seen.needs_delay:
-            held = Precondition("The wearer has looked slowly to the left and to the right", False)
         return WizardView(
             Step.MAKE_CURSOR,
             f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
-            (_hand_check(snapshot), held),
-            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", _is_steady(snapshot)),
+            (hand_check(snapshot), still_check(snapshot)),
+            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady(snapshot)),
             (ButtonSpec(Action.BACK, "&Back"),),
             runs_after_s=_STILL_S,
         )
 
     def _align(self, snapshot: Snapshot) -> WizardView:
         procedure, seen = snapshot.procedure, snapshot.observation
-        hand = _hand_check(snapshot)
+        hand = hand_check(snapshot)
         is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
         limit_deg = np.degrees(procedure.guard_limit_rad)
         cursor = procedure.cursor
@@ -271,7 +194,7 @@ class Wizard:
             Step.ALIGN,
             f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
             (hand, Precondition(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
-            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", _is_placed(snapshot) and is_due),
+            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", is_placed(snapshot) and is_due),
             (ButtonSpec(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
             procedure.refusal,
         )
@@ -294,7 +217,7 @@ class Wizard:
                 (redo,),
                 runs_after_s=_SHOWN_S,
             )
-        verdicts = _verdict_checks(snapshot)
+        verdicts = verdict_checks(snapshot)
         if procedure.state is State.APPLYING:
             wait = "Waiting for the headset to acknowledge its projections."
             return WizardView(
@@ -325,7 +248,7 @@ class Wizard:
         )
 
     def _verify(self, snapshot: Snapshot) -> WizardView:
-        checks = _verdict_checks(snapshot)
+        checks = verdict_checks(snapshot)
         if snapshot.procedure.state is State.APPLYING:
             wait = "Waiting for the headset to acknowledge its projections."
             sending = ButtonSpec(Action.APPLY, "Sending…", False)
@@ -360,13 +283,13 @@ class Wizard:
             return WizardView(
                 Step.VERIFY,
                 f"Raise the hand and hold it still, to measure the error of the {eye} eye.",
-                (_hand_check(snapshot), _still_check(snapshot), *checks),
-                ButtonSpec(Action.VERIFY, f"Verify the {eye} eye", _is_steady(snapshot)),
+                (hand_check(snapshot), still_check(snapshot), *checks),
+                ButtonSpec(Action.VERIFY, f"Verify the {eye} eye", is_steady(snapshot)),
                 (ButtonSpec(Action.SKIP, "&Skip"), *each),
                 runs_after_s=_STILL_S,
             )
         if advice := _advice(snapshot):
-            eyes = _names(advice.eyes)
+            eyes = _names(advice.eyes or EYES)
             few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
             return WizardView(
                 Step.VERIFY,
@@ -404,7 +327,7 @@ class Wizard:
     def _save(self, snapshot: Snapshot) -> WizardView:
         checks = (
             Precondition(f"Saved in {snapshot.session_path}", not snapshot.problem),
-            *_verdict_checks(snapshot),
+            *verdict_checks(snapshot),
         )
         others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
         is_accepted = len(checks) > 1 and all(check.holds for check in checks[1:])
@@ -468,8 +391,8 @@ def _nudge(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
         Step.VERIFY,
         f"Close the {other} eye. Arrow keys move the outline, + and − change its size, until it "
         "covers the hand.",
-        (_hand_check(snapshot), _still_check(snapshot)),
-        ButtonSpec(Action.VERIFIED, "It covers the hand", _is_steady(snapshot)),
+        (hand_check(snapshot), still_check(snapshot)),
+        ButtonSpec(Action.VERIFIED, "It covers the hand", is_steady(snapshot)),
         (
             ButtonSpec(Action.UNDO_NUDGE, "&Undo", verifying.can_undo),
             ButtonSpec(Action.SKIP, "&Skip"),
@@ -478,41 +401,6 @@ def _nudge(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
         fact=f"{eye.capitalize()} eye moved by {total_arcmin:.1f}′: "
         f"{abs(moved.right_arcmin):.1f}′ {across}, {abs(moved.down_arcmin):.1f}′ {along}, "
         f"size {100 * moved.size:+.1f} %",
-    )
-
-
-def _is_steady(snapshot: Snapshot) -> bool:
-    return snapshot.observation is not None and snapshot.observation.is_steady
-
-
-def _still_check(snapshot: Snapshot) -> Precondition:
-    return Precondition("Hand held still", _is_steady(snapshot))
-
-
-def _is_placed(snapshot: Snapshot) -> bool:
-    return snapshot.observation is not None and snapshot.observation.hand is not None
-
-
-def _hand_check(snapshot: Snapshot) -> Precondition:
-    seen = snapshot.observation
-    # A hand that is seen without a problem is placed with one of the next frames.
-    if _is_placed(snapshot) or (seen and seen.cloud is not None and not seen.problem):
-        return Precondition("Hand found", True)
-    problem = seen.problem if seen is not None else ""
-    return Precondition(sentence(problem or "no hand in view"), False)
-
-
-def _verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
-    results = snapshot.procedure.results
-    if results is None:
-        return ()
-    return tuple(
-        Precondition(
-            f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}",
-            verdict.name == "accept",
-            verdict.name,
-        )
-        for eye, verdict in results.verdicts.items()
     )
 
 

@@ -22,15 +22,8 @@ from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.automatic import Automatic
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
-from handcal_gui.pages.wizard.steps import (
-    PLANS,
-    STEPS,
-    Action,
-    Precondition,
-    Step,
-    Wizard,
-    WizardView,
-)
+from handcal_gui.pages.wizard.steps import PLANS, Wizard
+from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, Step, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
-from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, WizardView
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from handcal_gui.pages.wizard.automatic import Automatic
-from handcal_gui.pages.wizard.steps import Action, ButtonSpec, Step, WizardView
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
 
 VIEW = WizardView(
     Step.MAKE_CURSOR,

@@ -11,7 +11,8 @@ from pytestqt.qtbot import QtBot
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal_gui.pages.wizard.steps import Action, Step, Wizard
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from tests.gui.views import all_views
 

@@ -1,0 +1,50 @@
+"""Preconditions of the wizard's steps, from a snapshot; without Qt."""
+
+from __future__ import annotations
+
+from handcal.station.snapshot import Snapshot
+from handcal_gui.pages.wizard.view import Precondition
+from handcal_gui.widgets.sentence import sentence
+
+
+def is_steady(snapshot: Snapshot) -> bool:
+    """Return whether a cursor can be made of the hand."""
+    return snapshot.observation is not None and snapshot.observation.is_steady
+
+
+def still_check(snapshot: Snapshot) -> Precondition:
+    """Return whether the hand is held still and can be placed in time, as a precondition."""
+    seen = snapshot.observation
+    if seen is not None and seen.needs_delay:
+        return Precondition("The wearer has looked slowly to the left and to the right", False)
+    return Precondition("Hand held still", is_steady(snapshot))
+
+
+def is_placed(snapshot: Snapshot) -> bool:
+    """Return whether the newest hand has a place in the world."""
+    return snapshot.observation is not None and snapshot.observation.hand is not None
+
+
+def hand_check(snapshot: Snapshot) -> Precondition:
+    """Return whether a hand is found, as a precondition, with the reason if there is none."""
+    seen = snapshot.observation
+    # A hand that is seen without a problem is placed with one of the next frames.
+    if is_placed(snapshot) or (seen and seen.cloud is not None and not seen.problem):
+        return Precondition("Hand found", True)
+    problem = seen.problem if seen is not None else ""
+    return Precondition(sentence(problem or "no hand in view"), False)
+
+
+def verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
+    """Return the verdict on each solved eye as a precondition."""
+    results = snapshot.procedure.results
+    if results is None:
+        return ()
+    return tuple(
+        Precondition(
+            f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}",
+            verdict.name == "accept",
+            verdict.name,
+        )
+        for eye, verdict in results.verdicts.items()
+    )

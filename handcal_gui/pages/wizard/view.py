@@ -1,0 +1,88 @@
+"""The values that the wizard shows: steps, actions, preconditions, buttons; without Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from handcal.types import VerdictName
+
+
+class Step(StrEnum):
+    """The steps, in order; the value is the title."""
+
+    CONNECT = "Connect"
+    SHOW_HAND = "Show hand"
+    MAKE_CURSOR = "Make cursor"
+    ALIGN = "Align"
+    SOLVE = "Solve"
+    VERIFY = "Verify"
+    SAVE = "Save"
+
+
+STEPS = tuple(Step)
+
+
+class Action(StrEnum):
+    """Actions of the buttons; the value is the engine's command, or a move within the wizard."""
+
+    NEXT = "next"
+    MAKE_CURSOR = "make cursor"
+    CONFIRM = "confirm"
+    SOLVE = "solve"
+    APPLY = "apply"
+    ANOTHER = "another alignment"
+    REPEAT_LEFT = "repeat left eye"
+    REPEAT_RIGHT = "repeat right eye"
+    REDO = "redo"
+    BACK = "back"
+    VERIFY = "verify the eye"
+    VERIFIED = "confirm the verification"
+    UNDO_NUDGE = "undo the last nudge"
+    SKIP = "skip the verification"
+    FINISH = "finish"
+    NEXT_WEARER = "next wearer"
+    EXPORT = "export"
+
+
+@dataclass(frozen=True, slots=True)
+class Precondition:
+    """A precondition, and whether it holds."""
+
+    text: str
+    holds: bool
+    verdict: VerdictName | None = None
+    """The verdict that it shows, if it shows one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ButtonSpec:
+    """A button: its action and its label."""
+
+    action: Action
+    label: str
+    """On buttons other than the main one, & precedes the letter that presses it with Alt."""
+    is_enabled: bool = True
+    discards: str = ""
+    """The loss that the button causes, if any: then only a click or the letter presses it."""
+
+
+@dataclass(frozen=True, slots=True)
+class WizardView:
+    """Everything that the wizard shows at one moment."""
+
+    step: Step
+    sentence: str
+    """The instruction to the wearer or the technician."""
+    checks: tuple[Precondition, ...]
+    main: ButtonSpec
+    """The button that the space bar presses."""
+    others: tuple[ButtonSpec, ...] = ()
+    note: str = ""
+    """The last event or current activity, such as a refusal; empty if none."""
+    fact: str = ""
+    """The findings so far; empty if there are none."""
+    runs_after_s: float | None = None
+    """Time for which the main button is enabled before it presses itself; None if it never does."""
+    unearned: frozenset[Step] = frozenset()
+    """Earlier steps that were left without what they are for."""
