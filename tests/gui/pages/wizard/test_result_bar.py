@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtPrintSupport import QPrinter
+from PySide6.QtWidgets import QToolButton
+from pytestqt.qtbot import QtBot
+
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal_gui.pages.wizard.picture import GuidePicture
+from handcal_gui.pages.wizard.result_bar import ResultBar
+from handcal_gui.pages.wizard.view import Step
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
+from tests.gui.helpers import button, show
+
+Maker = Callable[..., Snapshot]
+
+
+def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_path: Path) -> None:
+    bar = show(qtbot, ResultBar(), 700, 300)
+    qtbot.addWidget(bar.buttons)
+    assert bar.text() == ""
+    bar.set_target(6.5)
+    bar.show_snapshot(snapshot(State.APPLIED))
+    button(bar.buttons, QToolButton, "Copy").click()
+    copied = QGuiApplication.clipboard().text()
+    assert copied.startswith("Wearer: without a name\n")
+    assert "Target: 6.5′" in copied
+    assert copied.count("After, measured: not measured") == 2
+    printer = QPrinter()
+    printer.setOutputFileName(str(tmp_path / "result.pdf"))
+    bar.print_to(printer)
+    assert (tmp_path / "result.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_before_and_after_are_shown_in_turn(qtbot: QtBot, snapshot: Maker) -> None:
+    picture = show(qtbot, GuidePicture(), 700, 500)
+    qtbot.addWidget(picture.result.buttons)
+    picture.step = Step.VERIFY
+    picture.show_snapshot(snapshot(State.APPLIED))
+    left = next(one for one in picture.findChildren(EyeCanvas) if one.isVisible())
+    after = left.grab().toImage()
+    blink = button(picture.result.buttons, QToolButton, "Blink before/after")
+    blink.click()
+    before = left.grab().toImage()
+    assert before != after
+    qtbot.waitUntil(lambda: left.grab().toImage() == after)
+    qtbot.waitUntil(lambda: left.grab().toImage() == before)
+    blink.click()
+    assert left.grab().toImage() == after
