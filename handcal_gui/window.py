@@ -327,7 +327,9 @@ class MainWindow(QMainWindow):
             self.addDockWidget(_LEFT, docks[name])
         for name in _RIGHT_COLUMN:
             self.addDockWidget(_LEFT if is_small else _RIGHT, docks[name])
-        behind = {"results": ("wearer_view", "trials", "session", "link")}
+        behind: dict[str, tuple[str, ...]] = {
+            "results": ("wearer_view", "trials", "session", "link")
+        }
         if is_small:
             behind = {"camera": tuple(name for name in docks if name != "camera")}
         else:

@@ -170,7 +170,9 @@ def test_no_step_needs_scrolling(
     window.use_arrangement(arrangement)
     window.show_page("live")
     window.reset_layout()
-    area = guide.parent().parent()
+    viewport = guide.parent()
+    assert viewport is not None
+    area = viewport.parent()
     assert isinstance(area, QScrollArea)
     states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
     for state in states:
