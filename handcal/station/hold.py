@@ -1,4 +1,8 @@
-"""One surface from the frames of a hold: its median, without flying pixels."""
+"""One surface from the frames of a hold: its median, without flying pixels.
+
+The wearer may have moved by only a millimetre before a confirmation, to a cursor drawn nearly where
+the hand was. φ would be wrong by as much, so frames with the hand elsewhere are left out.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
+from handcal.errors import HandError
 from handcal.geometry import invert, transform
+from handcal.register.rigid import RigidSettings, motion_covariance, register_rigid
+from handcal.register.surface import Surface, describe_surface, mean_point
 from handcal.station.hands import PlacedHand
 
 # More frames take longer than the time between two frames, and lower the noise little.
@@ -17,10 +25,14 @@ _MOST_FRAMES = 7
 _REACH = 1.5
 # The surface is where at least this share of the frames sees it.
 _SEEN = 0.5
+# A hand is where it was unless noise explains the movement found with less than 0.1 %: the quantile
+# of χ² with six degrees of freedom.
+_MOVED = 22.5
+_SETTINGS = RigidSettings(max_points=700, tolerance_m=1e-4)
 
 
 def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand:
-    """Return the median surface of the frames of a hold, with the movement during it.
+    """Return the median surface of the frames with the hand in one place, and the movement of all.
 
     Each point of the reference stays on its ray, at the median of the depths that the frames
     measure there, unless fewer than half of them see anything: then it is a flying pixel.
@@ -35,6 +47,7 @@ def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand
     movement_m = float(np.linalg.norm(np.ptp(middles, axis=0)))
     some = [hand for hand in hands if hand is not reference]
     some = some[:: max(1, -(-len(some) // (_MOST_FRAMES - 1)))]
+    some = _in_one_place(some, reference)
     if not some:
         return replace(reference, movement_m=movement_m)
     T_D_W = invert(reference.T_W_D)
@@ -69,3 +82,29 @@ def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand
         frames=1 + len(some),
         movement_m=movement_m,
     )
+
+
+def _in_one_place(hands: Sequence[PlacedHand], reference: PlacedHand) -> list[PlacedHand]:
+    """Return the hands that, but for noise, are where the reference is.
+
+    None if almost all points of one lie at cut edges.
+    """
+    try:
+        place, *seen = [
+            describe_surface(hand.points_W_m, hand.cloud.is_cut, _SETTINGS.max_points)
+            for hand in (reference, *hands)
+        ]
+    except HandError:
+        return []
+    return [hand for hand, surface in zip(hands, seen, strict=True) if _is_at(surface, place)]
+
+
+def _is_at(surface: Surface, place: Surface) -> bool:
+    """Return True if noise explains the movement from one surface to the other."""
+    fit = register_rigid(surface, place, _SETTINGS, np.eye(4))
+    T = fit.T_target_source
+    middle_m = mean_point(surface.points_m)
+    moved_m = transform(T, middle_m[None])[0] - middle_m
+    moved = np.concatenate([Rotation.from_matrix(T[:3, :3]).as_rotvec(), moved_m])
+    noise = motion_covariance(fit.rows, surface, place, T)
+    return float(moved @ np.linalg.solve(noise, moved)) < _MOVED

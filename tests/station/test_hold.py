@@ -49,6 +49,25 @@ def test_the_median_has_less_noise_and_no_flying_pixels(hands: list[PlacedHand])
     assert merged.t_host_ns == hands[-1].t_host_ns
 
 
+@pytest.mark.parametrize("moved_m", [[0.0, 0.0, -0.001], [0.0, 0.0, 0.001], [0.0015, 0.0, 0.0]])
+def test_a_hand_that_moved_before_does_not_count(moved_m: list[float]) -> None:
+    rays = np.stack(np.meshgrid(*[np.linspace(-0.12, 0.12, 160)] * 2), axis=-1).reshape(-1, 2)
+    rng = np.random.default_rng(1)
+
+    def held(number: int, offset_m: Float64) -> PlacedHand:
+        """See a flat hand, displaced, on the camera's rays."""
+        on_hand = np.abs(0.5 * rays - offset_m[:2]).max(axis=1) < 0.05
+        depth_m = 0.5 + offset_m[2] + rng.normal(0.0, 0.001, np.count_nonzero(on_hand))
+        seen = np.column_stack([rays[on_hand], np.ones(len(depth_m))]) * depth_m[:, None]
+        return _held(seen, number)
+
+    there = [held(number, np.zeros(3)) for number in range(3)]
+    elsewhere = [held(number, np.array(moved_m)) for number in range(3, 6)]
+    merged = merge_hold([*elsewhere, *there], there[-1])
+    assert merged.frames == 3
+    assert merged.points_W_m[:, 2].mean() == pytest.approx(0.5, abs=1e-4)
+
+
 def test_what_few_frames_have_seen_is_left_out(hands: list[PlacedHand]) -> None:
     extra_m = np.array([[0.2, 0.0, 0.5], [0.21, 0.0, 0.5]])
     last = _held(np.concatenate([hands[-1].points_W_m, extra_m]), 9)
