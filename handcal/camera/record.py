@@ -115,8 +115,9 @@ class _Take:
                 self.stop_reason = str(error)
                 return
             else:
-                heard_s = time.monotonic()
                 yield frame
+                # After it was stored: a slow disk is no silent camera.
+                heard_s = time.monotonic()
         self.stop_reason = "stopped"
 
     def _from_first_color(self, frames: Iterator[Frame]) -> Iterator[Frame]:
