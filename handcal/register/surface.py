@@ -72,14 +72,16 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
     tree = KdTree(thinned)
     count = min(_NEIGHBOURS, len(thinned) - 1)
     index, distance_m2 = tree.batch_knn_search(thinned, count + 1)
-    around = thinned.take(index[:, 1:].view(np.intp), axis=0)
-    centroid = np.matmul(np.full(count, 1.0 / count), around)
-    centred = around - centroid[:, None]
-    normals, thickness_m2 = thinnest(np.matmul(centred.transpose(0, 2, 1), centred))
-    outward = thinned - centroid
+    # Coordinates come first, so that NumPy works along rows of all points.
+    around = np.ascontiguousarray(thinned.T).take(index[:, 1:].T.view(np.intp), axis=1)
+    centroid = around.mean(axis=1)
+    around -= centroid[:, None]
+    scatter = np.einsum("ikn,jkn->ijn", around, around)
+    normals, thickness_m2 = thinnest(scatter.transpose(2, 0, 1))
+    outward = thinned - centroid.T
     outward -= np.einsum("nd,nd->n", outward, normals)[:, None] * normals
     offset_m = np.sqrt(np.einsum("nd,nd->n", outward, outward))
-    wide_m2 = np.einsum("nkd,nkd->n", centred, centred) - thickness_m2
+    wide_m2 = scatter[0, 0] + scatter[1, 1] + scatter[2, 2] - thickness_m2
     radius_m = np.sqrt(np.maximum(wide_m2, 1e-18) / count)
     weight = np.clip((offset_m / radius_m - _EDGE_NONE) / (_EDGE_FULL - _EDGE_NONE), 0.0, 1.0)
     spacing_m = float(np.sqrt(np.median(distance_m2[:, _SPACING_NEIGHBOUR])))
