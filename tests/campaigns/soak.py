@@ -1,0 +1,91 @@
+"""A station that runs for long: memory, handles and threads at the end and at a quarter.
+
+Cursors are made, alignments confirmed, solved and deleted again, so that nothing has to grow.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from handcal.errors import HandcalError
+from handcal.station.procedure import State
+from handcal.station.settings import StationSettings
+from handcal.station.station import Station
+from handcal.types import EYES
+from tests.campaigns.campaign import Tally, campaign
+from tests.helpers import write_small_rig
+
+FRAMES, SHORT_FRAMES = 20_000, 60
+GROWTH_MAX = 1.02
+KEPT = 3
+"""Alignments that stay."""
+LIMIT_S = 60 * float(os.environ.get("HANDCAL_SOAK_MINUTES", "60"))
+
+
+def soak(tally: Tally, is_short: bool) -> None:
+    wanted = SHORT_FRAMES if is_short else FRAMES
+    with tempfile.TemporaryDirectory() as folder:
+        rig = write_small_rig(Path(folder) / "rig.yaml")
+        settings = StationSettings(seed=1, rig=str(rig), sessions=str(Path(folder) / "sessions"))
+        with Station(settings, "soak") as station:
+            looks = list(_watch(station, wanted, tally))
+    if tally.tried < wanted:
+        tally.note = f"ended after {LIMIT_S / 60:.0f} min; "
+    if is_short:
+        if not looks:
+            tally.fail("not one frame")
+        return
+    quarter, end = looks[len(looks) // 4], looks[-1]
+    growth = end[0] / quarter[0]
+    tally.note += (
+        f"memory {quarter[0] / 2**20:.1f} MB at a quarter, {end[0] / 2**20:.1f} MB at the end "
+        f"({growth:.3f} times), handles {quarter[1]} and {end[1]}, threads {quarter[2]} and {end[2]}"
+    )
+    if growth > GROWTH_MAX:
+        tally.fail(f"the memory grew {growth:.3f} times")
+    if end[1] > quarter[1] or end[2] > quarter[2]:
+        tally.fail("handles or threads grew")
+
+
+def _watch(station: Station, wanted: int, tally: Tally) -> Iterator[tuple[int, int, int]]:
+    """Step the station; give memory, handles and threads every hundredth of the way."""
+    calibration = station.calibration
+    end_s = time.monotonic() + LIMIT_S
+    while tally.tried < wanted and time.monotonic() < end_s:
+        snapshot = station.step()
+        if snapshot.problem:
+            tally.seen["problems told"] += 1
+        if snapshot.observation is None:
+            continue
+        tally.tried += 1
+        try:
+            if calibration.state is State.ALIGNED:
+                tally.seen["alignments"] += 1
+                calibration.solve()
+                calibration.apply()
+            elif calibration.state in (State.SHOW_HAND, State.APPLIED):
+                if len(calibration.alignments) > KEPT:
+                    station.delete("alignment", min(calibration.alignments))
+                elif snapshot.observation.is_steady and station.session.revision < 3000:
+                    calibration.make_cursor(EYES)
+        except HandcalError as error:
+            tally.seen[f"told: {str(error)[:60]}"] += 1
+        if tally.tried % max(1, wanted // 100) == 0:
+            gc.collect()
+            yield _look()
+
+
+def _look() -> tuple[int, int, int]:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    handles = len(list(Path("/proc/self/fd").iterdir()))
+    return pages * os.sysconf("SC_PAGE_SIZE"), handles, threading.active_count()
+
+
+if __name__ == "__main__":
+    campaign("soak: frames of a running station", soak)
