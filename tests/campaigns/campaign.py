@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections import Counter
@@ -22,6 +23,12 @@ class Tally:
     failures: list[str] = field(default_factory=list)
     note: str = ""
     """More for the line."""
+    end_s: float = math.inf
+    """When to end although less was tried than wanted."""
+
+    def is_done(self, wanted: int) -> bool:
+        """True once as much was tried as wanted, or the time is over."""
+        return self.tried >= wanted or time.monotonic() > self.end_s
 
     def fail(self, what: str) -> None:
         """Note a failure; the first ones are printed at once."""
@@ -44,10 +51,11 @@ def campaign(what: str, run: Callable[[Tally, bool], None]) -> None:
     """
     parser = argparse.ArgumentParser(description=what)
     parser.add_argument("--short", action="store_true", help="take seconds instead of minutes")
-    is_short = parser.parse_args().short
-    tally = Tally(what)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="end after this time")
+    arguments = parser.parse_args()
     start_s = time.monotonic()
-    run(tally, is_short)
+    tally = Tally(what, end_s=start_s + 60.0 * arguments.minutes)
+    run(tally, arguments.short)
     if not tally.tried and not tally.note:
         tally.fail("nothing was tried")
     print(tally.line(time.monotonic() - start_s), flush=True)  # noqa: T201

@@ -60,6 +60,8 @@ def inject(tally: Tally, is_short: bool) -> None:
         tally.seen["system calls of a life"] = calls
         for fault in Fault:
             for number in range(1, calls + 1, SHORT_EVERY if is_short else 1):
+                if tally.is_done(10**6):
+                    return
                 tally.tried += 1
                 _live(library_loaded, root, seed, number, fault, tally)
 
@@ -93,10 +95,9 @@ def _live(
     steps = [line for line in lines if line.startswith("STEP")]
     if code not in (0, _DIED):
         tally.fail(f"{where}: {' '.join(lines[-7:])} (exit {code})")
-    elif steps:
-        # In the order of the pipe: the last step was begun, all before have returned.
-        if problem := _judge(folder, random.Random(seed), len(steps), code == _DIED):
-            tally.fail(f"{where}: {problem}")
+    # In the order of the pipe: the last step was begun, all before have returned.
+    elif steps and (problem := _judge(folder, random.Random(seed), len(steps), code == _DIED)):
+        tally.fail(f"{where}: {problem}")
     return next((int(line.split()[1]) for line in lines if line.startswith("COUNT")), 0)
 
 
