@@ -28,7 +28,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def mutated(data: bytes, kind: str, chance: random.Random) -> bytes:
-    """Return a mutation of a file's content; its kind is ``binary``, ``png``, ``json``, ``text``."""
+    """Return a mutation of a file's content of kind binary, png, json or text."""
     luck = chance.random()
     if kind == "png" and luck < 0.6 and data.startswith(_PNG):
         return _png(data, chance)
