@@ -24,6 +24,7 @@ from tests.helpers import write_small_rig
 FRAMES, SHORT_FRAMES = 20_000, 60
 GROWTH_MAX = 1.02
 ALIGNMENTS = 3
+_READY = State.SHOW_HAND, State.APPLIED
 
 
 def soak(tally: Tally, is_short: bool) -> None:
@@ -67,12 +68,11 @@ def _watch(station: Station, wanted: int, tally: Tally) -> Iterator[tuple[int, i
                 tally.seen["alignments"] += 1
                 calibration.solve()
                 calibration.apply()
-            elif calibration.state in (State.SHOW_HAND, State.APPLIED):
-                if snapshot.observation.is_steady:
-                    calibration.make_cursor(EYES)
-                    tally.seen["cursors"] += 1
-                    if len(calibration.alignments) >= ALIGNMENTS:
-                        calibration.redo()
+            elif calibration.state in _READY and snapshot.observation.is_steady:
+                calibration.make_cursor(EYES)
+                tally.seen["cursors"] += 1
+                if len(calibration.alignments) >= ALIGNMENTS:
+                    calibration.redo()
         except HandcalError as error:
             tally.seen[f"told: {str(error)[:60]}"] += 1
         if tally.tried % max(1, wanted // 100) == 0:
