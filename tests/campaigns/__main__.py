@@ -9,12 +9,12 @@ import sys
 import time
 
 SHORT_VARIABLE = "HANDCAL_SHORT_CAMPAIGNS"
-PROGRAMS = {
+PROGRAMS: dict[str, tuple[str, ...]] = {
     name: ("-m", f"tests.campaigns.{name}")
     for name in ("faults", "kills", "powercut", "damage", "files", "privacy", "cameras", "soak")
 }
 LINK = ("-m", "pytest", "-q", "-s", "-m", "campaign", "tests/campaigns/link")
-TESTS = {"link": LINK}
+TESTS: dict[str, tuple[str, ...]] = {"link": LINK}
 
 
 def main() -> None:

@@ -19,7 +19,7 @@ from handcal.io.closable import Closable
 from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
-from handcal.types import EYES, CameraIdentity, Frame
+from handcal.types import EYES, Frame
 from tests.campaigns.campaign import Tally, campaign
 from tests.helpers import write_small_rig
 
@@ -73,16 +73,10 @@ class FaultyCamera(Closable):
 
     def __init__(self, camera: Camera) -> None:
         self.fault = ""
+        self.name, self.identity = camera.name, camera.identity
+        self.depth_intrinsics = camera.depth_intrinsics
         self._camera = camera
         self._last: Frame | None = None
-
-    @property
-    def name(self) -> str:
-        return self._camera.name
-
-    @property
-    def identity(self) -> CameraIdentity:
-        return self._camera.identity
 
     def read(self, timeout_s: float = 1.0) -> Frame:
         if self.fault == "unplugged":
@@ -144,7 +138,8 @@ def _watch(
     station: FaultyStation, seconds: float, tally: Tally, where: str, until_frame: bool = False
 ) -> set[str]:
     """Step for some time; return what the station said. With `until_frame`, wait for one."""
-    calibration, said = station.calibration, set()
+    calibration = station.calibration
+    said: set[str] = set()
     end_s, steps = time.monotonic() + seconds, 0
     while time.monotonic() < end_s or steps < 8:
         steps += 1

@@ -46,7 +46,7 @@ def inject(tally: Tally, is_short: bool) -> None:
         with tempfile.TemporaryDirectory(dir=_memory()) as folder:
             library = Path(folder) / "faults.so"
             source = Path(__file__).with_name("faults.c")
-            command = [compiler, "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"]
+            command = [compiler, "-shared", "-fPIC", "-O1", "-o", str(library), str(source), "-ldl"]
             subprocess.run(command, check=True)
             root = Path(folder) / "root"
             root.mkdir()
