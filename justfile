@@ -26,6 +26,10 @@ docs:
 pictures:
     bash docs/pictures.sh && QT_QPA_PLATFORM=offscreen python docs/rig_pictures.py
 
+# the promises of docs/reliability.md attacked, in about an hour; --short: within a minute
+campaigns *arguments:
+    nice python -m tests.campaigns {{arguments}}
+
 # every figure of the documentation that a command measures: the benchmarks and both studies
-campaigns:
+figures:
     handcal bench --json results/bench.json && handcal study noise && handcal study methods

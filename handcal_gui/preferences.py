@@ -19,7 +19,7 @@ from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
-_MOST_WEARERS, _MOST_SESSIONS = 20, 8
+_MOST_SESSIONS = 8
 
 
 def _default_station() -> StationSettings:
@@ -35,9 +35,8 @@ class Preferences:
     station: StationSettings = field(default_factory=_default_station)
     plan: EyePlan = "each"
     """The order in which the eyes are aligned."""
-    wearers: tuple[str, ...] = ()
     sessions: tuple[str, ...] = ()
-    """Names of wearers, and paths of session folders; newest first."""
+    """Paths of session folders, newest first. Names of wearers are only in the sessions."""
     export: ExportSettings = field(default_factory=ExportSettings)
     export_folder: str = ""
     """Folder of the last export; empty before the first."""
@@ -53,14 +52,11 @@ class Preferences:
     review_layout: str = ""
     """Geometry of the window and layouts of its docks on either page: Qt's state in base64."""
 
-    def with_wearer(self, name: str) -> Self:
-        """Return a copy with a wearer's name as the newest."""
-        return replace(self, wearers=_newest_first(name, self.wearers, _MOST_WEARERS))
-
     def with_session(self, path: Path) -> Self:
         """Return a copy with a session as the newest."""
         newest = str(path.absolute())
-        return replace(self, sessions=_newest_first(newest, self.sessions, _MOST_SESSIONS))
+        others = (other for other in self.sessions if other != newest)
+        return replace(self, sessions=(newest, *others)[:_MOST_SESSIONS])
 
 
 class PreferencesFile:
@@ -88,7 +84,9 @@ class PreferencesFile:
         if not self.path.exists():
             return Preferences(), ""
         try:
-            return read_settings(Preferences, read_json(self.path), "preferences"), ""
+            stored = read_json(self.path)
+            stored.pop("wearers", None)  # names of wearers, which were stored here once
+            return read_settings(Preferences, stored, "preferences"), ""
         except FileError as error:
             bad = self.path.with_name(f"{self.path.name}.bad")
             with suppress(OSError):
@@ -131,9 +129,3 @@ class PreferencesFile:
 def _default_path() -> Path:
     config = QStandardPaths.StandardLocation.AppConfigLocation
     return Path(QStandardPaths.writableLocation(config)) / "preferences.json"
-
-
-def _newest_first(newest: str, others: tuple[str, ...], most: int) -> tuple[str, ...]:
-    if not newest:
-        return others
-    return (newest, *(other for other in others if other != newest))[:most]

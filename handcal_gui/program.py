@@ -112,7 +112,7 @@ class Program(QObject):
 
     def start_calibration(self, settings: StationSettings, wearer: str) -> None:
         """Open a station for a wearer."""
-        self._remember(replace(self._preferences.with_wearer(wearer), station=settings))
+        self._remember(replace(self._preferences, station=settings))
         self._run(lambda: Station(settings, wearer, pairings=self._pairings))
 
     def resume_session(self, path: Path) -> None:

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Installs what is missing, then runs every check and all tests but those marked slow or campaign.
+# Installs what is missing, then runs every check, all tests but those marked slow or campaign, and
+# the short form of every campaign.
 # Arguments go to pytest: -m quick for a check within two minutes, -m "" for every test.
 set -euo pipefail
 lock=installer/requirements.lock # everything, also what the checks and the extras need
-# Real windows on a virtual screen, PDF pages, and the headset's program in C#.
-test_packages=(xvfb xauth xdotool poppler-utils mono-mcs mono-runtime)
+# Real windows on a virtual screen, PDF pages, the headset's program in C#, sockets that are opened.
+test_packages=(xvfb xauth xdotool poppler-utils mono-mcs mono-runtime strace)
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 export HANDCAL_REQUIRE_MONO=1 # installed above: no test may be skipped for want of it
@@ -15,3 +16,4 @@ ruff format --check
 mypy
 lint-imports
 pytest -n 2 --dist loadfile "$@"
+python -m tests.campaigns --short

@@ -161,6 +161,7 @@ def run_demo(
             "sent": statistics.sent,
             "lost": statistics.lost,
             "acked": statistics.acked,
+            "given_up": dict(statistics.given_up),
             "projection_acked": calibration.projection_acked,
         },
         "timing_ms": _timing(calibration, rig, watch.seen),

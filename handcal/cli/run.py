@@ -129,6 +129,9 @@ def run(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
     for eye, found in result["eyes"].items():
         console.print(f"{eye}: {found['verdict']}: {found['reason']}", markup=False)
+    if lost := result["link"]["given_up"]:
+        listed = ", ".join(f"{name.replace('_', ' ')} {count}×" for name, count in lost.items())
+        console.print(f"The headset never acknowledged: {listed}", markup=False)
     console.print(f"Session: {result['session']}", markup=False)
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
         sys.exit(_CONTRADICTED)

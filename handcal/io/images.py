@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ _MAX_FILE_BYTES = 64 * 2**20
 MAX_SIDE_PX = 8192
 _MAX_PIXELS = 16 * 2**20
 _PNG = b"\x89PNG\r\n\x1a\n"
+_PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+"""Values of a pixel by the colour type in a PNG's header."""
+_PIECE_BYTES = 2**20
+_HARMLESS_BYTES = 2**20
+"""A shorter PNG cannot unpack to more than 1 GB, in about two seconds."""
 _JPEG = b"\xff\xd8"
 # Start-of-frame segments, which hold a JPEG's size; C4, C8 and CC among them are something else.
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
@@ -35,6 +41,8 @@ def read_image(path: Path, flags: int) -> NDArray[Any]:
     width, height = _image_size(data, path)
     if width * height > _MAX_PIXELS or max(width, height) > MAX_SIDE_PX:
         raise FileError(f"{path} is {width}x{height} pixels, more than is allowed")
+    if data.startswith(_PNG) and len(data) > _HARMLESS_BYTES:
+        _require_pixels_only(data, path, width, height)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
@@ -55,6 +63,30 @@ def write_png(path: Path, image: UInt8) -> None:
     require_suffix(path, ".png")
     stored = image[..., ::-1] if image.ndim == 3 else image
     write_atomic(path, cv2.imencode(".png", stored)[1].tobytes())
+
+
+def _require_pixels_only(data: bytes, path: Path, width: int, height: int) -> None:
+    """Raise FileError if a PNG unpacks to more than the pixels that its header announces.
+
+    The decoder would unpack all of it, for seconds, after the last pixel.
+    """
+    values = _PNG_CHANNELS.get(data[25], 0) * data[24] if len(data) > 25 else 0
+    # Interlaced rows are shorter, but up to twice as many; each begins with a byte of its own.
+    left_bytes = 2 * height * (1 + (width * values + 7) // 8) + width
+    unpacker = zlib.decompressobj()
+    at = len(_PNG)
+    while at + 12 <= len(data) and not unpacker.eof:
+        end = at + 8 + int.from_bytes(data[at : at + 4])
+        packed = data[at + 8 : end] if data[at + 4 : at + 8] == b"IDAT" else b""
+        at = end + 4
+        while packed and not unpacker.eof:
+            try:
+                left_bytes -= len(unpacker.decompress(packed, _PIECE_BYTES))
+            except zlib.error:
+                return  # the decoder says what is wrong
+            if left_bytes < 0:
+                raise FileError(f"{path} unpacks to more than its {width}x{height} pixels")
+            packed = unpacker.unconsumed_tail
 
 
 def _image_size(data: bytes, path: Path) -> tuple[int, int]:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 from handcal.errors import FileError
 
@@ -19,14 +20,14 @@ if sys.platform == "win32":
     # Windows locks bytes against reading too: lock one far beyond the process id.
     _LOCKED_BYTE = 2**30
 
-    def _try_lock(file: BinaryIO) -> None:
+    def _try_lock(file: FileIO) -> None:
         file.seek(_LOCKED_BYTE)
         msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         file.seek(0)
 else:
     import fcntl
 
-    def _try_lock(file: BinaryIO) -> None:
+    def _try_lock(file: FileIO) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
@@ -41,21 +42,21 @@ class FileLock:
 
     def __init__(self, path: Path) -> None:
         try:
-            file = path.open("a+b")
+            file = path.open("a+b", buffering=0)
         except OSError as error:
             raise FileError(f"cannot lock {path}: {error.strerror or error}") from error
         try:
             _try_lock(file)
         except OSError as error:
             file.seek(0)
-            holder = file.read(20).decode(errors="replace") or "unknown"
+            holder = (file.read(20) or b"").decode(errors="replace") or "unknown"
             file.close()
             raise FileError(
                 f"{path.parent} is in use by process {holder}; close it there first"
             ) from error
-        file.truncate(0)
-        file.write(str(os.getpid()).encode())
-        file.flush()
+        with suppress(OSError):  # only for people to read: a full disk locks nobody out
+            file.truncate(0)
+            file.write(str(os.getpid()).encode())
         self._file = file
         self._path = path
 

@@ -57,6 +57,7 @@ class Endpoint(Closable):
         self._outbox = Outbox(settings)
         self._stream: deque[pb.Envelope] = deque()
         self._next_burst_s = 0.0
+        self._given_up = Counter[str]()
         self._sent = Counter[str]()
         self._received = Counter[str]()
         self._rejected = Counter[Rejection]()
@@ -230,6 +231,8 @@ class Endpoint(Closable):
         level = logging.INFO if self._channel is None else logging.WARNING
         for message in self._outbox.expire(now_s):
             _LOG.log(level, "delivery of the %s failed", message.slot.name.lower())
+            if self._channel is not None:
+                self._given_up[message.slot.name.lower()] += 1
         if self._channel is not None:
             receipts = self._channel.inbox.take_receipts()
             if receipts:

@@ -80,6 +80,12 @@ class Outbox:
         return len(self._pending())
 
     @property
+    def given_up(self) -> tuple[Slot, ...]:
+        """Slots whose newest message was given up, so that the receiver lacks it."""
+        newest = self._newest.items()
+        return tuple(slot for slot, message in newest if message.state is Delivery.FAILED)
+
+    @property
     def has_queued(self) -> bool:
         """True if fragments are ready to be sent."""
         return any(message.queue for message in self._pending())

@@ -7,7 +7,7 @@ import secrets
 import time
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from handcal.errors import FileError
 from handcal.link import greetings, messages, nudges, version1, wire
@@ -95,6 +95,10 @@ class LinkStatistics:
     """Headset's clock minus the host's; None until it is known."""
     bytes_sent: int
     bytes_received: int
+    given_up: Mapping[str, int] = field(default_factory=dict)
+    """Number of messages that connected headsets never acknowledged, by slot."""
+    missing: tuple[str, ...] = ()
+    """Slots whose newest message the connected headset lacks, because it was given up."""
     notice: str = ""
     """Another headset that asks to connect now, and why it is refused; empty if there is none."""
 
@@ -287,6 +291,10 @@ class HeadsetServer(Sender):
                 clock_uncertainty_ms=fit.uncertainty_ns / 1e6 if fit else None,
                 bytes_sent=self._sent["bytes"],
                 bytes_received=self._received["bytes"],
+                given_up=dict(self._given_up),
+                missing=tuple(slot.name.lower() for slot in self._outbox.given_up)
+                if self.connected
+                else (),
                 notice=self._notice if time.monotonic() < self._notice_until_s else "",
             )
 

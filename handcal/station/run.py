@@ -246,6 +246,7 @@ def _result(station: Station, snapshot: Snapshot) -> dict[str, Any]:
             "lost": link.lost,
             "acked": link.acked,
             "failed": link.failed,
+            "given_up": dict(link.given_up),
             "latency_ms": link.latency_ms,
             "pose_rate_hz": link.pose_rate_hz,
         },

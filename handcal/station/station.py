@@ -440,9 +440,16 @@ class Station(Closable):
             self.require_headset()
         except LinkError as error:
             return str(error)
-        if notice := self._link.statistics().notice:
-            return notice
-        if self._link.connected:
+        link = self._link.statistics()
+        if link.notice:
+            return link.notice
+        if link.missing:
+            missing = " and ".join(link.missing).replace("_", " ")
+            return (
+                f"the headset lacks the {missing}: it did not acknowledge it in time; improve the "
+                "network, or restart the headset's app"
+            )
+        if link.connected:
             return ""
         if self._simulation is not None:
             return "the virtual headset has not connected yet"

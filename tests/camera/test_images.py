@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 import zlib
 from pathlib import Path
 from typing import Any
@@ -122,6 +123,19 @@ def test_huge_image_is_refused_before_it_is_decoded(files: tuple[Path, Path, Pat
     files[1].write_bytes(png_header(60_000, 60_000))
     with pytest.raises(FileError, match="60000x60000 pixels, more than is allowed"):
         read_frame(*files)
+
+
+def test_a_png_that_unpacks_to_gigabytes_is_refused_at_once(files: tuple[Path, Path, Path]) -> None:
+    packer = zlib.compressobj(9)
+    packed = b"".join(packer.compress(bytes(2**24)) for _ in range(80)) + packer.flush()
+    assert len(packed) > 2**20
+    chunk = b"IDAT" + packed
+    bomb = len(packed).to_bytes(4) + chunk + zlib.crc32(chunk).to_bytes(4)
+    files[1].write_bytes(png_header(640, 480) + bomb + bytes(4) + b"IEND\xaeB`\x82")
+    start_s = time.process_time()
+    with pytest.raises(FileError, match="unpacks to more than its 640x480 pixels"):
+        read_frame(*files)
+    assert time.process_time() - start_s < 1.0
 
 
 @given(data=st.data())

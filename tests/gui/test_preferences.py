@@ -27,7 +27,6 @@ CHANGED = Preferences(
         calibration=CalibrationSettings(guard=GuardSettings(limit_rad=0.1)),
     ),
     plan="both",
-    wearers=("Ada", "γ 2"),
     sessions=("/a/b",),
     export=ExportSettings(formats=("report", "zip"), near_m=0.2),
     export_folder="/c",
@@ -106,7 +105,7 @@ def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:
         b"[]",
         b"[" * 100_000,
         b'{"theme": "pink"}',
-        b'{"wearers": [1]}',
+        b'{"sessions": [1]}',
         b'{"export": {"formats": []}}',
         b'{"station": {"port": 1.5}}',
         b'{"later_version": 1}',
@@ -139,15 +138,25 @@ def test_what_cannot_be_saved_is_reported_and_leaves_the_old(
     assert file.load() == (CHANGED, "")
 
 
-def test_wearers_and_sessions_are_remembered_newest_first(tmp_path: Path) -> None:
+def test_sessions_are_remembered_newest_first(tmp_path: Path) -> None:
     preferences = Preferences()
-    for name in ("Ada", "", "Bea", *(f"P{i}" for i in range(30)), "Ada"):
-        preferences = preferences.with_wearer(name)
-    assert preferences.wearers[:2] == ("Ada", "P29")
-    assert len(preferences.wearers) == len(set(preferences.wearers)) == 20
     for name in ("a", "b", "a"):
         preferences = preferences.with_session(tmp_path / name)
     assert preferences.sessions == (str(tmp_path / "a"), str(tmp_path / "b"))
+    for number in range(30):
+        preferences = preferences.with_session(tmp_path / str(number))
+    assert len(preferences.sessions) == 8
+    assert preferences.sessions[0] == str(tmp_path / "29")
+
+
+def test_names_of_wearers_that_were_stored_once_are_forgotten(file: PreferencesFile) -> None:
+    file.save(CHANGED)
+    stored = json.loads(file.path.read_text())
+    file.path.write_text(json.dumps({**stored, "wearers": ["Ada"]}))
+    preferences, complaint = file.load()
+    assert (preferences, complaint) == (CHANGED, "")
+    file.save(preferences)
+    assert "Ada" not in file.path.read_text()
 
 
 def test_the_pairing_key_is_made_once_and_apart(file: PreferencesFile, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from handcal.errors import LinkError, PosePendingError
 from handcal.link import wire
 from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
-from handcal.link.reliable import Delivery
+from handcal.link.reliable import Delivery, Inbox
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.link.transport import Address
@@ -52,6 +52,25 @@ def test_a_projection_that_cannot_arrive_is_clearly_refused() -> None:
             server.wait_acked(message, 3.0)
         assert message.state is Delivery.FAILED
         assert server.statistics().failed == 1
+
+
+def test_what_a_connected_headset_lacks_is_told_until_it_has_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with (
+        HeadsetServer(KEY, settings=LinkSettings(give_up_s=0.3)) as server,
+        HeadsetClient(server.address, KEY, IDENTITY),
+    ):
+        server.wait_connected(5.0)
+        server.wait_acked(server.send_prompt("one"), 5.0)
+        with monkeypatch.context() as patch:
+            patch.setattr(Inbox, "take_receipts", lambda _: [])  # every acknowledgement is lost
+            server.send_prompt("two")
+            eventually(lambda: server.statistics().missing == ("prompt",))
+        assert server.statistics().given_up["prompt"] == 1
+        server.wait_acked(server.send_prompt("three"), 5.0)
+        assert server.statistics().missing == ()
+        assert server.statistics().given_up["prompt"] == 1
 
 
 FLOOD_HZ = 5_000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
@@ -100,10 +100,18 @@ class NewCalibration(Card):
     def show_preferences(self, preferences: Preferences) -> None:
         """Show the preferences, for the next wearer."""
         self._form.show_settings(preferences.station)
-        self._wearer.clear()
-        self._wearer.addItems(list(preferences.wearers))
         self._wearer.setCurrentIndex(-1)
         self._wearer.clearEditText()
+
+    def show_wearers(self, names: Sequence[str]) -> None:
+        """Offer the names of earlier wearers; what has been typed stays."""
+        if list(names) == [self._wearer.itemText(i) for i in range(self._wearer.count())]:
+            return
+        typed = self._wearer.currentText()
+        self._wearer.clear()
+        self._wearer.addItems(list(names))
+        self._wearer.setCurrentIndex(-1)
+        self._wearer.setEditText(typed)
 
     def set_rig(self, path: str) -> None:
         """Show another rig file."""

@@ -21,6 +21,8 @@ class Entry:
     text: str
     is_enabled: bool = True
     """True if it can be chosen; otherwise `text` contains the reason."""
+    wearer: str = ""
+    """Name or code; empty if it is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,12 @@ class KnownSessions:
 
     unfinished: tuple[Entry, ...]
     recent: tuple[Entry, ...]
+
+    @property
+    def wearers(self) -> tuple[str, ...]:
+        """The wearers of all these sessions, each once."""
+        names = (entry.wearer for entry in (*self.recent, *self.unfinished))
+        return tuple(dict.fromkeys(filter(None, names)))
 
 
 def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
@@ -54,7 +62,7 @@ def _unfinished(session: UnfinishedSession) -> Entry:
     text = _text(session.wearer, session.started, session.alignments, session.trials)
     if session.damaged:
         text += f" · damaged: {pluralize(session.damaged, 'part')} left out"
-    return Entry(session.path, text)
+    return Entry(session.path, text, wearer=session.wearer)
 
 
 def _recent(path: Path) -> Entry | None:
@@ -67,7 +75,7 @@ def _recent(path: Path) -> Entry | None:
     if not (alignments.active or alignments.deleted or trials.active or trials.deleted):
         return None
     text = _text(state.wearer, events[0].time, len(alignments.active), len(trials.active))
-    return Entry(path, text)
+    return Entry(path, text, wearer=state.wearer)
 
 
 def _text(wearer: str, started: str, alignments: int, trials: int) -> str:

@@ -154,6 +154,7 @@ class StartPage(QWidget):
         self._unfinished.show_entries(offers.unfinished)
         self._resume.setVisible(bool(offers.unfinished))
         self._opened.show_entries(offers.recent)
+        self.new.show_wearers(offers.wearers)
 
     def _lay_out(self) -> None:
         title = QLabel("handcal")

@@ -15,7 +15,7 @@ from handcal_gui.widgets.path_field import PathField
 
 BEFORE = Preferences(
     station=StationSettings(source="realsense", port=50_000, sessions="/a"),
-    wearers=("Ada",),
+    sessions=("/s",),
     theme="light",
 )
 

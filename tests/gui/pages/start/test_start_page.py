@@ -135,11 +135,13 @@ def test_the_next_wearer_finds_everything_as_it_was(
     page = open_page(source="realsense", headset="network", port=50_001)
     QTest.keyClicks(wearer(page), "Ada")
     before = page.new.settings
-    preferences = Preferences(station=before, wearers=("Ada", "Bea"))
-    page.show_preferences(preferences)
+    page.show_preferences(Preferences(station=before))
     assert page.new.settings == before
     assert before.port == 50_001
     assert wearer(page).currentText() == ""
+    QTest.keyClicks(wearer(page), "B")
+    page.new.show_wearers(["Ada", "Bea"])
+    assert wearer(page).currentText() == "B"
     assert [wearer(page).itemText(i) for i in range(2)] == ["Ada", "Bea"]
 
 
