@@ -9,6 +9,8 @@ import json
 import time
 from typing import Any
 
+import numpy as np
+
 from handcal.errors import HandcalError
 from handcal.station.snapshot import Snapshot
 
@@ -102,7 +104,10 @@ def events(before: Snapshot | None, now: Snapshot) -> list[dict[str, object]]:
         for eye, shift in new.results.eyes.items():
             verdict = new.results.verdicts[eye].name
             add("solved", eye=eye, phi_m=shift.shift_m.tolist(), verdict=verdict)
-    if new.is_applied and not old.is_applied:
-        for eye, shift_m in new.applied_shift_m.items():
+    for eye, shift_m in new.applied_shift_m.items():
+        was_m = old.applied_shift_m.get(eye)
+        # Between two frames a φ may be both sent and acknowledged.
+        is_same = was_m is not None and np.array_equal(shift_m, was_m)
+        if new.is_applied and not (old.is_applied and is_same):
             add("applied", eye=eye, phi_m=shift_m.tolist())
     return found

@@ -67,3 +67,5 @@ def test_what_is_applied_is_told_once(snapshot: Snapshot, later: Callable[..., S
     ]
     assert np.allclose(np.array(told[0]["phi_m"]), [0.003, 0.001, 0.005])
     assert events(applied, later()) == []
+    moved = later(applied_shift_m={"left": np.array([0.001, 0.0, 0.0]), "right": np.zeros(3)})
+    assert [(one["event"], one["eye"]) for one in events(applied, moved)] == [("applied", "left")]
