@@ -97,7 +97,7 @@ def _chosen_rig(settings: StationSettings) -> Path | None:
 
 def _recording(settings: StationSettings) -> Finding:
     name = settings.recording
-    kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, a folder that handcal or ROS 2 recorded"
+    kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, or a folder that handcal or ROS 2 recorded"
     if not name:
         return _broken("no recording is chosen", f"choose {kinds}")
     path = Path(name)

@@ -151,8 +151,7 @@ def test_a_damaged_recording_is_one_error(
     for size in (0, 100, len(whole) // 2):
         file.write_bytes(whole[:size])
         with pytest.raises(CameraError) as caught, open_recording(tmp_path / "bag") as camera:
-            for _ in range(3):
-                camera.read()
+            assert [camera.read() for _ in range(3)] == []
         assert "\n" not in str(caught.value)
     (tmp_path / "bag/metadata.yaml").write_text("rosbag2_bagfile_information: []")
     with pytest.raises(CameraError, match="cannot be read as a ROS 2 recording"):
