@@ -1,4 +1,4 @@
-"""Poses and projections in the conventions of OpenGL, Unity, WinRT and OpenXR.
+"""Poses and projections in the conventions of OpenGL, Unity, WinRT, OpenXR and 3D Slicer.
 
 handcal's own axes are OpenCV's, x right, y down, z forward, and its pixels have their centres at
 whole numbers, so that a display's image runs from -0.5 to width - 0.5. The others:
@@ -11,6 +11,7 @@ OpenXR    as OpenGL                                 quaternion and position
 WinRT     as OpenGL                                 row vectors: the transpose
 Unity     world x right, y up, z forward (left-     column vectors, or quaternion and position
           handed); camera space as OpenGL
+Slicer    x right, y forward (anterior), z up       column vectors, mm
 ========  ========================================  =======================================
 """
 
@@ -19,6 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from handcal.display import projections
@@ -28,6 +30,8 @@ from handcal.types import Eye, Float64, Projection, Rig, Solved, brief, freeze
 # Each is its own inverse.
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 _UNITY_FROM_OPENCV = np.diag([1.0, -1.0, 1.0, 1.0])
+
+_SLICER_FROM_OPENCV = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,6 +200,23 @@ def unity_transform(T: Float64) -> Float64:
 def unity_world_to_camera(T_V_W: Float64) -> Float64:
     """Return Unity's ``Camera.worldToCameraMatrix``: from Unity's world to OpenGL's camera axes."""
     return _OPENGL_FROM_OPENCV @ T_V_W @ _UNITY_FROM_OPENCV
+
+
+def slicer_transform(T: Float64) -> Float64:
+    """Convert a rigid (4, 4) transform to 3D Slicer's: mm, axes right, anterior, superior.
+
+    Both frames turn alike: right stays, forward is anterior, up is superior.
+    """
+    turn = rigid(_SLICER_FROM_OPENCV)
+    turned = turn @ T @ turn.T
+    turned[:3, 3] *= 1e3
+    return turned
+
+
+def slicer_points_mm(points_m: ArrayLike) -> Float64:
+    """Return (N, 3) points in 3D Slicer's axes, in mm; see `slicer_transform`."""
+    points: Float64 = 1e3 * np.asarray(points_m, dtype=np.float64) @ _SLICER_FROM_OPENCV.T
+    return points
 
 
 def opengl_projection(projection: Projection, near_m: float, far_m: float) -> Float64:

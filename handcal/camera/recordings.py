@@ -1,4 +1,4 @@
-"""Opening and writing recordings of both kinds: librealsense's files and folders of images."""
+"""Opening and writing recordings: files of librealsense and ROS 2, and folders of images."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from handcal.camera.folder import FolderCamera, record_folder
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.camera.recording import RecordingCamera
+from handcal.camera.ros import RosCamera, ros_recording
 from handcal.camera.sdk_recorder import record_db3
 from handcal.types import CameraIdentity, Frame
 
@@ -16,13 +17,15 @@ RECORDING_SUFFIXES = (".db3", ".bag")
 
 
 def open_recording(path: Path, settings: PlaybackSettings | None = None) -> PlayedCamera:
-    """Return a camera that plays a ``.db3`` or ``.bag`` file, or a folder of images.
+    """Return a camera that plays a ``.db3`` or ``.bag`` file, a ROS 2 recording, or a folder.
 
     Raises
     ------
     CameraError
         If it cannot be played.
     """
+    if (folder := ros_recording(path)) is not None:
+        return RosCamera(folder, settings)
     return FolderCamera(path, settings) if path.is_dir() else RecordingCamera(path, settings)
 
 

@@ -9,6 +9,7 @@ from handcal.camera.folder import DESCRIPTION
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
+from handcal.camera.ros import ros_recording
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera, open_viewpoint
 
@@ -45,6 +46,7 @@ def open_view_source(
     if source.isdecimal():
         return open_viewpoint(int(source))
     path = Path(source).expanduser()
-    if path.suffix.lower() in RECORDING_SUFFIXES or (path / DESCRIPTION).is_file():
+    is_folder = (path / DESCRIPTION).is_file() or ros_recording(path) is not None
+    if is_folder or path.suffix.lower() in RECORDING_SUFFIXES:
         return ColorCamera(open_recording(path, playback), tell)
     return open_viewpoint(path, playback=playback)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import LinkError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
+    from handcal.bridge.bridge import Bridge
     from handcal.link.pairing import Pairings
 
 LISTEN = (
@@ -87,6 +90,14 @@ _SHARE = number(float, 0.0, 1.0)
     arg("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of the simulated wearer"),
     arg("--loss", type=_SHARE, metavar="P", default=0.0, help="virtual headset: datagrams lost"),
     arg("--reorder", type=_SHARE, metavar="P", default=0.0, help="virtual headset: and reordered"),
+    arg(
+        "--slicer",
+        nargs="?",
+        const="127.0.0.1:18944",
+        metavar="HOST:PORT",
+        help="serve OpenIGTLink for 3D Slicer (default address: 127.0.0.1:18944)",
+    ),
+    arg("--lsl", action="store_true", help="send the events to the Lab Streaming Layer"),
     *REALSENSE_OPTIONS,
     json=True,
 )
@@ -118,8 +129,12 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.patience_s,
     )
     pairings = paired_headsets(arguments.keys) if arguments.headset == "network" else None
-    with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
-        result = run_calibration(settings, progress, pairings)
+    with (
+        until_interrupted() as is_stopped,
+        bridges(arguments) as watchers,
+        show_progress(is_stopped) as progress,
+    ):
+        result = run_calibration(settings, progress, pairings, watchers)
     save(arguments.json, result)
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "verdict", "headset applied it")
     for eye, found in result["eyes"].items():
@@ -135,6 +150,28 @@ def run(arguments: argparse.Namespace) -> None:
     console.print(f"Session: {result['session']}", markup=False)
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
         sys.exit(_CONTRADICTED)
+
+
+@contextmanager
+def bridges(arguments: argparse.Namespace) -> Iterator[list[Bridge[Any]]]:
+    """Run the bridges that the arguments name."""
+    from handcal.bridge.bridge import Bridge
+    from handcal.bridge.lsl import LslOutput
+    from handcal.bridge.slicer import SlicerOutput
+
+    def tell(line: str) -> None:
+        console.print(line, markup=False)
+
+    with ExitStack() as stack:
+        running: list[Bridge[Any]] = []
+        if arguments.slicer is not None:
+            host, _, port = arguments.slicer.rpartition(":")
+            if not (host and port.isdecimal() and 0 < int(port) < 65536):
+                fail(f"--slicer: an address is HOST:PORT, not {arguments.slicer}", 2)
+            running.append(stack.enter_context(Bridge(SlicerOutput(tell, host, int(port)), tell)))
+        if arguments.lsl:
+            running.append(stack.enter_context(Bridge(LslOutput(), tell)))
+        yield running
 
 
 def paired_headsets(path: Path | None) -> Pairings:

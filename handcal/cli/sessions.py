@@ -9,7 +9,7 @@ from pathlib import Path
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, fail, number
-from handcal.export.formats import FORMATS
+from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
 from handcal.types import METHODS
 
@@ -82,8 +82,9 @@ def solve(arguments: argparse.Namespace) -> None:
     arg(
         "--format",
         action="append",
-        choices=tuple(FORMATS),
-        help="format to write; may be repeated (default: all)",
+        choices=(*FORMATS, *TOOL_FORMATS),
+        help="format to write; may be repeated (default: all but unity, openxr, northstar and "
+        "slicer)",
     ),
     arg(
         "--near-m",

@@ -9,12 +9,15 @@ from pathlib import Path
 from handcal.export.archive import write_archive
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
-from handcal.export.formats import FORMATS, Format
+from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
 from handcal.export.tables import write_parameters, write_trials
+from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity
 from handcal.progress import Progress
 from handcal.session.session import SessionRecord
+
+_ALL = {**FORMATS, **TOOL_FORMATS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,15 +25,15 @@ class ExportSettings:
     """Settings of an export."""
 
     formats: tuple[Format, ...] = tuple(FORMATS)
-    """A selection of `FORMATS`."""
+    """A selection of `FORMATS` and `TOOL_FORMATS`."""
     near_m: float = 0.1
     far_m: float = 100.0
     """Clipping distances of the OpenGL and Unity matrices."""
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.formats if name not in FORMATS]
+        unknown = [name for name in self.formats if name not in _ALL]
         if unknown or not self.formats:
-            raise ValueError(f"choose formats from {', '.join(FORMATS)}")
+            raise ValueError(f"choose formats from {', '.join(_ALL)}")
         if not 0.0 < self.near_m < self.far_m < float("inf"):
             raise ValueError(
                 f"0 < near_m < far_m is needed, got {self.near_m:g} and {self.far_m:g}"
@@ -64,16 +67,16 @@ def export_session(
     FileError
         If the session cannot be solved, or a file cannot be written or replaced.
     """
-    formats = [name for name in FORMATS if name in settings.formats]
+    formats = [name for name in _ALL if name in settings.formats]
     with Staging(folder) as staging:
         parts = 1 + len(formats)
         outcome = load_outcome(record, progress.part(0.0, 1.0 / parts))
         for done, name in enumerate(formats, 1):
-            part = progress.part(done / parts, (done + 1) / parts, FORMATS[name].title)
+            part = progress.part(done / parts, (done + 1) / parts, _ALL[name].title)
             part.at(0.0)
             _write(name, outcome, staging.path, folder, settings, part)
         progress.at(1.0, "Moving the files in place")
-        return staging.publish([pattern for name in formats for pattern in FORMATS[name].patterns])
+        return staging.publish([pattern for name in formats for pattern in _ALL[name].patterns])
 
 
 def _write(
@@ -115,3 +118,11 @@ def _write(
             write_clouds(place / "clouds", outcome, progress)
         case "zip":
             write_archive(place / "session.zip", outcome.record, folder, progress)
+        case "unity":
+            write_unity(place / "unity.json", outcome, settings.near_m, settings.far_m)
+        case "openxr":
+            write_openxr(place / "openxr.json", outcome)
+        case "northstar":
+            write_northstar(place / "northstar.json", outcome)
+        case "slicer":
+            write_slicer(place / "slicer", outcome, progress)

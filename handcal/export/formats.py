@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
-Format: TypeAlias = Literal["report", "html", "csv", "yaml", "json", "ply", "zip"]
+Format: TypeAlias = Literal[
+    "report", "html", "csv", "yaml", "json", "ply", "zip", "unity", "openxr", "northstar", "slicer"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,3 +35,21 @@ FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
         "zip": FormatInfo("Whole session (ZIP)", ("session.zip",)),
     }
 )
+"""The formats of an export that names none."""
+
+TOOL_FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
+    {
+        "unity": FormatInfo("Unity", ("unity.json",)),
+        "openxr": FormatInfo("OpenXR", ("openxr.json",)),
+        "northstar": FormatInfo("North Star (Monado)", ("northstar.json",)),
+        "slicer": FormatInfo(
+            "3D Slicer",
+            (
+                "slicer/*EyeToHead.tfm",
+                "slicer/alignment-*-hand.vtk",
+                "slicer/alignment-*-cursor.vtk",
+            ),
+        ),
+    }
+)
+"""The formats for one other tool each, written only if they are named."""

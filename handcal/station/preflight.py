@@ -9,9 +9,9 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from handcal.camera.folder import FolderCamera
 from handcal.camera.recording import check_recording
-from handcal.camera.recordings import RECORDING_SUFFIXES
+from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
+from handcal.camera.ros import ros_recording
 from handcal.camera.sdk_devices import choose_device, connected_devices, librealsense
 from handcal.errors import HandcalError, LinkError
 from handcal.link.server import LOOPBACK
@@ -97,13 +97,13 @@ def _chosen_rig(settings: StationSettings) -> Path | None:
 
 def _recording(settings: StationSettings) -> Finding:
     name = settings.recording
-    kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, or a folder that handcal recorded"
+    kinds = f"a {' or '.join(RECORDING_SUFFIXES)} file, or a folder that handcal or ROS 2 recorded"
     if not name:
         return _broken("no recording is chosen", f"choose {kinds}")
     path = Path(name)
     how = "played in a loop" if settings.playback.loop else "played once"
-    if path.is_dir():
-        with FolderCamera(path) as camera:
+    if path.is_dir() or ros_recording(path) is not None:
+        with open_recording(path) as camera:
             found = _good(f"{camera.name}, {how}")
             rig, intrinsics = _chosen_rig(settings), camera.depth_intrinsics
             return with_rig(found, rig, camera.identity, intrinsics)

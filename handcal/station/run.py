@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -42,7 +42,10 @@ class RunSettings:
 
 
 def run_calibration(
-    settings: RunSettings, progress: Progress = Progress(), pairings: Pairings | None = None
+    settings: RunSettings,
+    progress: Progress = Progress(),
+    pairings: Pairings | None = None,
+    watchers: Iterable[Callable[[Snapshot], object]] = (),
 ) -> dict[str, Any]:
     """Calibrate one wearer; each step follows by itself as soon as it can.
 
@@ -55,6 +58,8 @@ def run_calibration(
         Called with the present step and the share of the whole that is done.
     pairings : Pairings, optional
         The network headsets that may connect.
+    watchers : iterable of callable
+        See `Station.watch`.
 
     Returns
     -------
@@ -76,6 +81,8 @@ def run_calibration(
     plan = PlanSettings(settings.plan, usable, is_automatic=is_recommended)
     wanted = replace(settings.station, plan=plan)
     with Station(wanted, settings.wearer, pairings=pairings) as station:
+        for watcher in watchers:
+            station.watch(watcher)
         run = _Run(station, settings, progress)
         run.wait(0.0, "Waiting for the headset", _is_connected, "no headset connected")
         if is_recommended:

@@ -6,6 +6,7 @@ One thread owns a station: it calls `step` repeatedly, and other methods in betw
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -108,6 +109,7 @@ class Station(Closable):
             pairings = Pairings((Pairing(key),))
         self._pairings = pairings
         self.watch_views = False
+        self._watchers: list[Callable[[Snapshot], object]] = []
         self.holds_plan = False
         self._next_step: NextStep | None = None
         self._simulation: Simulation | None = None
@@ -228,7 +230,7 @@ class Station(Closable):
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
         self._number += 1
-        return Snapshot(
+        snapshot = Snapshot(
             number=self._number,
             t_host_ns=time.monotonic_ns(),
             frame=self._frame,
@@ -242,6 +244,13 @@ class Station(Closable):
             record=self._record,
             views=dict(self._views),
         )
+        for watcher in self._watchers:
+            watcher(snapshot)
+        return snapshot
+
+    def watch(self, watcher: Callable[[Snapshot], object]) -> None:
+        """Call `watcher` with every new snapshot, in the station's thread; it must not wait."""
+        self._watchers.append(watcher)
 
     def _follow_plan(self, observation: Observation) -> NextStep:
         """Do the plan's next step if it is automatic; return it."""

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import handcal
-from tests.helpers import ROOT, write_thin_session
+from tests.helpers import ROOT, write_small_rig, write_thin_session
 
 pytestmark = pytest.mark.process
 
@@ -138,3 +138,16 @@ def test_every_example_is_run_and_has_a_docstring_and_a_main() -> None:
         tree = ast.parse((EXAMPLES / name).read_text(encoding="utf-8"))
         assert ast.get_docstring(tree)
         assert any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body)
+
+
+def test_a_calibration_is_followed_by_bridges(tmp_path: Path) -> None:
+    pytest.importorskip("pylsl")
+    pytest.importorskip("pyigtl")
+    rig = write_small_rig(tmp_path / "rig.yaml")
+    said = run("09_bridges.py", "--sessions", tmp_path, "--rig", rig, "--port", 47947)
+    assert '"event":"session"' in said
+    events = re.findall(r'"event":"(\w+)"', said)
+    assert events.count("confirmed") == 1
+    assert events.count("solved") == 2
+    assert events.index("confirmed") < events.index("solved")
+    assert events[events.index("solved") :].count("applied") == 2

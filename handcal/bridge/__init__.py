@@ -1,0 +1,1 @@
+"""Outputs of a running calibration for programs that labs already run."""

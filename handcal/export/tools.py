@@ -1,0 +1,189 @@
+"""The final calibration in the files of single tools: Unity, OpenXR, North Star and 3D Slicer.
+
+docs/export.md describes every file and how the tool reads it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from handcal.conventions import (
+    opengl_projection,
+    opengl_transform,
+    openxr_view,
+    pose,
+    slicer_points_mm,
+    slicer_transform,
+    unity_world_to_camera,
+)
+from handcal.errors import FileError
+from handcal.export.outcome import SessionOutcome
+from handcal.geometry import invert, rigid
+from handcal.io.files import make_folder, write_atomic, write_json
+from handcal.progress import Progress
+from handcal.types import EYES, Eye, Float64
+
+_VERSION = 1
+_GRID = 65
+_FOV_MARGIN = 1.02
+_OPENGL_AXES = np.diag([1.0, -1.0, -1.0])
+
+
+def write_unity(path: Path, outcome: SessionOutcome, near_m: float, far_m: float) -> None:
+    """Write both eyes for ``JsonUtility.FromJson``, which reads no nested arrays.
+
+    A matrix is 16 numbers in the order of ``Matrix4x4``'s index, column by column.
+    """
+    values: dict[str, object] = {
+        "handcalUnity": _VERSION,
+        "session": outcome.name,
+        "nearM": near_m,
+        "farM": far_m,
+    }
+    for eye in EYES:
+        clip = opengl_projection(outcome.projection(eye, outcome.final(eye)), near_m, far_m)
+        view = unity_world_to_camera(outcome.record.rig.eyes[eye].T_V_H)
+        values[eye] = {
+            "projection": clip.ravel("F").tolist(),
+            "viewFromHead": view.ravel("F").tolist(),
+            "focusDistanceM": outcome.record.rig.eyes[eye].z_C0_S_m,
+        }
+    write_json(path, values)
+
+
+def write_openxr(path: Path, outcome: SessionOutcome) -> None:
+    """Write both views with the fields of XrView, posed in the headset rig.
+
+    Raises
+    ------
+    FileError
+        If a projection has skew or rotation, which XrFovf cannot express.
+    """
+    views = []
+    for eye in EYES:
+        try:
+            in_view, fov = openxr_view(outcome.projection(eye, outcome.final(eye)))
+        except ValueError as error:
+            raise FileError(f"{error} ({eye} eye); export json instead") from error
+        T_H_V = opengl_transform(invert(outcome.record.rig.eyes[eye].T_V_H))
+        in_head = pose(T_H_V @ rigid(translation_m=in_view.position_m))
+        views.append(
+            {
+                "eye": eye,
+                "pose": {
+                    "orientation": dict(zip("xyzw", in_head.quaternion_xyzw.tolist(), strict=True)),
+                    "position": dict(zip("xyz", in_head.position_m.tolist(), strict=True)),
+                },
+                "fov": {
+                    f"angle{name.removesuffix('_rad').capitalize()}": angle_rad
+                    for name, angle_rad in asdict(fov).items()
+                },
+            }
+        )
+    write_json(path, {"handcalOpenxr": _VERSION, "session": outcome.name, "views": views})
+
+
+def write_northstar(path: Path, outcome: SessionOutcome) -> None:
+    """Write the mesh of bearings that Monado's North Star driver reads (`ns_mt_parse`).
+
+    Monado's head has both eyes on its x axis and parallel to it. That frame N is placed into the
+    solved eyes, so the bearings of a plane projection are exact at the mesh's nodes.
+    """
+    eyes_H_m, axes = {}, []
+    for eye in EYES:
+        P_H = _from_head(outcome, eye)
+        eyes_H_m[eye] = -np.linalg.solve(P_H[:, :3], P_H[:, 3])
+        axes.append(P_H[2, :3] / np.linalg.norm(P_H[2, :3]))
+    between_m = eyes_H_m["right"] - eyes_H_m["left"]
+    distance_m = float(np.linalg.norm(between_m))
+    x = between_m / distance_m
+    z = np.mean(axes, axis=0)
+    z = z - (z @ x) * x
+    z /= np.linalg.norm(z)
+    R_H_N = np.column_stack([x, np.cross(z, x), z])
+    bearings = {eye: _bearings(outcome, eye, R_H_N) for eye in EYES}
+    edges = np.concatenate([grid.reshape(-1, 2) for grid in bearings.values()])
+    low, high = edges.min(axis=0), edges.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * _FOV_MARGIN * (high - low)
+    (left, down), (right, up) = np.arctan(middle - half), np.arctan(middle + half)
+    T_H_N = rigid(R_H_N, 0.5 * (eyes_H_m["left"] + eyes_H_m["right"]))
+    write_json(
+        path,
+        {
+            "type": "Moses Turner's distortion correction",
+            "version": 2,
+            "num_grid_points_x": _GRID,
+            "num_grid_points_y": _GRID,
+            "ipd": 1e3 * distance_m,
+            "fov": [left, right, up, down],
+            **{eye: {"grid": bearings[eye].tolist()} for eye in EYES},
+            "handcal": {
+                "session": outcome.name,
+                "rig_from_head": opengl_transform(T_H_N).tolist(),
+            },
+        },
+    )
+
+
+def write_slicer(folder: Path, outcome: SessionOutcome, progress: Progress = Progress()) -> None:
+    """Write each eye's pose as ``LeftEyeToHead.tfm``, and the clouds as ``.vtk`` files, in mm.
+
+    An ITK file holds the inverse of Slicer's transform, in LPS; the clouds say that they are RAS.
+    """
+    make_folder(folder)
+    for eye in EYES:
+        P_H = _from_head(outcome, eye)
+        center_m = -np.linalg.solve(P_H[:, :3], P_H[:, 3])
+        T_H_E = invert(outcome.record.rig.eyes[eye].T_V_H)
+        T_H_E[:3, 3] = center_m
+        lps = np.diag([-1.0, -1.0, 1.0, 1.0])
+        from_parent = lps @ invert(slicer_transform(T_H_E)) @ lps
+        numbers = [*from_parent[:3, :3].ravel(), *from_parent[:3, 3]]
+        lines = (
+            "#Insight Transform File V1.0",
+            "#Transform 0",
+            "Transform: AffineTransform_double_3_3",
+            f"Parameters: {' '.join(map(repr, map(float, numbers)))}",
+            "FixedParameters: 0 0 0",
+        )
+        text = "\n".join(lines) + "\n"
+        write_atomic(folder / f"{eye.capitalize()}EyeToHead.tfm", text.encode("ascii"))
+    alignments = outcome.record.alignments
+    for done, (number, alignment) in enumerate(alignments.items()):
+        progress.at(done / len(alignments))
+        for kind, points_m in (("cursor", alignment.cursor_m), ("hand", alignment.hand_m)):
+            _write_vtk(folder / f"alignment-{number}-{kind}.vtk", points_m)
+
+
+def _from_head(outcome: SessionOutcome, eye: Eye) -> Float64:
+    """Return P (3, 4) of the final calibration, from the headset rig."""
+    P: Float64 = outcome.projection(eye, outcome.final(eye)).P @ outcome.record.rig.eyes[eye].T_V_H
+    return P
+
+
+def _bearings(outcome: SessionOutcome, eye: Eye, R_H_N: Float64) -> Float64:
+    """Return x and y of each node's ray at z = -1, y up, (rows, columns, 2)."""
+    display = outcome.record.rig.eyes[eye]
+    u_px = np.linspace(-0.5, display.width_px - 0.5, _GRID)
+    v_px = np.linspace(-0.5, display.height_px - 0.5, _GRID)
+    pixels = np.stack([*np.meshgrid(u_px, v_px), np.ones((_GRID, _GRID))], axis=-1)
+    back = _OPENGL_AXES @ R_H_N.T @ np.linalg.inv(_from_head(outcome, eye)[:, :3])
+    rays = pixels @ back.T
+    bearings: Float64 = rays[..., :2] / -rays[..., 2:]
+    return bearings
+
+
+def _write_vtk(path: Path, points_m: Float64) -> None:
+    """Write a legacy VTK file with one vertex for each point; Slicer shows no bare points."""
+    points_mm = slicer_points_mm(points_m).astype(">f8")
+    count = len(points_mm)
+    cells = np.column_stack([np.ones(count), np.arange(count)]).astype(">i4")
+    head = (
+        f"# vtk DataFile Version 3.0\nSPACE=RAS\nBINARY\nDATASET POLYDATA\nPOINTS {count} double\n"
+    )
+    middle = f"\nVERTICES {count} {2 * count}\n"
+    data = head.encode() + points_mm.tobytes() + middle.encode() + cells.tobytes() + b"\n"
+    write_atomic(path, data)

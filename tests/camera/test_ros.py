@@ -1,0 +1,158 @@
+"""ROS 2 recordings, written by rosbags and played as a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.camera.recordings import open_recording
+from handcal.camera.ros import RosCamera
+from handcal.errors import CameraEndError, CameraError
+from handcal.geometry import rigid
+from handcal.types import Frame, Intrinsics
+from tests.camera.rosbag import (
+    COLOR,
+    DEPTH,
+    frame_messages,
+    image,
+    info,
+    transforms,
+    write_messages,
+    write_rosbag,
+)
+
+CAMERA = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
+INFO = ("/camera/depth/camera_info", 1, info(CAMERA, "depth"))
+GRAY = np.arange(12, dtype=np.uint16).reshape(3, 4)
+MakeFrames = Callable[..., Iterator[Frame]]
+
+
+@pytest.mark.parametrize("is_mcap", [True, False])
+def test_every_pixel_and_number_comes_back(
+    tmp_path: Path, make_frames: MakeFrames, is_mcap: bool
+) -> None:
+    write_rosbag(tmp_path / "bag", make_frames(5), is_mcap)
+    (file,) = (path for path in (tmp_path / "bag").iterdir() if path.suffix in (".mcap", ".db3"))
+    with open_recording(file) as camera:
+        assert isinstance(camera, RosCamera)
+        for wanted in make_frames(5):
+            frame = camera.read()
+            assert frame.color is not None
+            assert wanted.color is not None
+            assert np.array_equal(frame.depth, wanted.depth)
+            assert np.array_equal(frame.color, wanted.color)
+            assert frame.t_camera_ns == wanted.t_camera_ns
+            assert frame.depth_scale_m == 1e-3
+            assert frame.depth_intrinsics == wanted.depth_intrinsics
+            assert frame.color_intrinsics == wanted.color_intrinsics
+            np.testing.assert_allclose(frame.T_C_D, wanted.T_C_D, atol=1e-12)
+        with pytest.raises(CameraEndError):
+            camera.read()
+        camera.seek(0.0)
+        assert camera.read().index == 1
+
+
+def play(folder: Path, messages: list[tuple[str, int, Any]]) -> Frame:
+    write_messages(folder / "bag", messages)
+    with RosCamera(folder / "bag") as camera:
+        return camera.read()
+
+
+def test_metres_become_tenths_of_a_millimetre(tmp_path: Path) -> None:
+    metres = np.array([[0.0, np.nan, np.inf, -1.0], [0.5, 6.5, 6.6, 0.00004], [1, 2, 3, 4]], "<f4")
+    frame = play(tmp_path, [INFO, (DEPTH, 2, image(2, "depth", "32FC1", metres))])
+    assert frame.depth_scale_m == 1e-4
+    wanted = [[0, 0, 0, 0], [5000, 65000, 0, 0], [10000, 20000, 30000, 40000]]
+    assert frame.depth.tolist() == wanted
+
+
+def test_rows_may_be_padded_and_big_endian(tmp_path: Path) -> None:
+    padded = image(2, "depth", "16UC1", GRAY.astype(">u2"), pad_bytes=6)
+    assert np.array_equal(play(tmp_path, [INFO, (DEPTH, 2, padded)]).depth, GRAY)
+
+
+def test_blue_first_colours_are_turned_and_the_nearest_in_time_taken(tmp_path: Path) -> None:
+    T_D_C = rigid([0.0, 0.1, 0.0], [0.015, 0.0, 0.0])
+    color = np.zeros((3, 4, 4), np.uint8)
+    color[..., 0], color[..., 2] = 10, 30
+    messages = [
+        INFO,
+        ("/camera/color/camera_info", 1, info(CAMERA, "color")),
+        ("/tf_static", 1, transforms(("depth", "color", T_D_C))),
+        (COLOR, 1, image(970_000_000, "color", "bgra8", color + 1)),
+        (DEPTH, 2, image(1_000_000_000, "depth", "16UC1", GRAY)),
+        (COLOR, 3, image(1_010_000_000, "color", "bgra8", color)),
+    ]
+    frame = play(tmp_path, messages)
+    assert frame.color is not None
+    assert frame.color[0, 0].tolist() == [30, 0, 10]
+    np.testing.assert_allclose(frame.T_C_D, np.linalg.inv(T_D_C), atol=1e-12)
+
+
+def test_depth_aligned_to_colour_is_the_second_choice(tmp_path: Path) -> None:
+    aligned = "/camera/aligned_depth_to_color"
+    messages = [
+        INFO,
+        (f"{aligned}/camera_info", 1, info(CAMERA, "color")),
+        (f"{aligned}/image_raw", 1, image(1, "color", "16UC1", GRAY + 7)),
+        (DEPTH, 2, image(2, "depth", "16UC1", GRAY)),
+    ]
+    assert np.array_equal(play(tmp_path, messages).depth, GRAY)
+
+
+@pytest.mark.parametrize(
+    ("messages", "problem"),
+    [
+        ([INFO], "no depth images"),
+        ([(DEPTH, 2, image(2, "depth", "16UC1", GRAY))], "no camera_info for /camera/depth"),
+        (
+            [
+                ("/camera/depth/camera_info", 1, info(CAMERA, "depth", "equidistant")),
+                (DEPTH, 2, image(2, "depth", "16UC1", GRAY)),
+            ],
+            "lens model 'equidistant'",
+        ),
+        (
+            [
+                ("/camera/depth/camera_info", 1, info(replace(CAMERA, fx=np.nan), "depth")),
+                (DEPTH, 2, image(2, "depth", "16UC1", GRAY)),
+            ],
+            "not those of a camera",
+        ),
+        ([INFO, (DEPTH, 2, image(2, "depth", "16UC1", GRAY[:2]))], "not of its camera's size"),
+    ],
+)
+def test_what_cannot_be_played_is_one_line(
+    tmp_path: Path, messages: list[tuple[str, int, Any]], problem: str
+) -> None:
+    with pytest.raises(CameraError, match=problem) as caught:
+        play(tmp_path, messages)
+    assert "\n" not in str(caught.value)
+
+
+def test_colour_without_a_transform_is_refused(tmp_path: Path, make_frames: MakeFrames) -> None:
+    messages = [one for one in frame_messages(make_frames(2)) if one[0] != "/tf_static"]
+    with pytest.raises(CameraError, match="no transform between 'depth' and 'color'"):
+        play(tmp_path, messages)
+
+
+@pytest.mark.parametrize("is_mcap", [True, False])
+def test_a_damaged_recording_is_one_error(
+    tmp_path: Path, make_frames: MakeFrames, is_mcap: bool
+) -> None:
+    write_rosbag(tmp_path / "bag", make_frames(3), is_mcap)
+    (file,) = (path for path in (tmp_path / "bag").iterdir() if path.suffix in (".mcap", ".db3"))
+    whole = file.read_bytes()
+    for size in (0, 100, len(whole) // 2):
+        file.write_bytes(whole[:size])
+        with pytest.raises(CameraError) as caught, open_recording(tmp_path / "bag") as camera:
+            assert [camera.read() for _ in range(3)] == []
+        assert "\n" not in str(caught.value)
+    (tmp_path / "bag/metadata.yaml").write_text("rosbag2_bagfile_information: []")
+    with pytest.raises(CameraError, match="cannot be read as a ROS 2 recording"):
+        open_recording(tmp_path / "bag")
