@@ -108,6 +108,14 @@ _RIG: Mapping[str, Entry] = {
     "compare": Entry(
         "Compare two rig files, and show how far apart they draw a target.", "rig_files"
     ),
+    "accept": Entry(
+        "Check a rig without a wearer, by a camera in the eye's place; exit code 1 if it fails.",
+        "accept",
+    ),
+    "simulate": Entry(
+        "Render the images of an offline calibration and of an acceptance, to practise with.",
+        "accept",
+    ),
     "migrate": Entry(
         "Convert a rig file of any known version to the newest, and list what it does not say.",
         "rig_files",

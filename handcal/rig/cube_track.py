@@ -65,9 +65,7 @@ class CubeFilter:
     def take(self, T_W_T: Float64, t_host_ns: int) -> TrackedCube:
         """Return the filtered pose after a measured one, (4, 4), at a time of the host's clock."""
         settings, before = self._settings, self._newest
-        if before is None or not _near(
-            T_W_T, before.T_W_T, settings.jump_m, settings.jump_rad
-        ):
+        if before is None or not _near(T_W_T, before.T_W_T, settings.jump_m, settings.jump_rad):
             self._recent.clear()
             filtered = TrackedCube(t_host_ns, T_W_T, False, 1)
         else:

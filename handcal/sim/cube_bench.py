@@ -113,9 +113,7 @@ class CubeBench(Closable):
             color_intrinsics=camera,
         )
 
-    def adjust(
-        self, eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]
-    ) -> Float64:
+    def adjust(self, eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
         """Return φ after the wearer has moved it until the drawn corners cover the cube's.
 
         At each look the wearer compares what the headset draws with the cube as the true eye sees
@@ -144,7 +142,9 @@ class CubeBench(Closable):
             )
             drawn_px = project(state.drawn[eye].P, transform(T_V_W, corners_W_m))
             gap_px = seen_px + seeing_px - drawn_px
-            shift_m = shift_m + STEP_M * np.rint(_move(display, shift_m, shown_E_m, gap_px) / STEP_M)
+            shift_m = shift_m + STEP_M * np.rint(
+                _move(display, shift_m, shown_E_m, gap_px) / STEP_M
+            )
             draw(shift_m)
         return shift_m
 
@@ -164,9 +164,7 @@ class CubeBench(Closable):
         self._poses.join()
 
 
-def _move(
-    display: EyeDisplay, shift_m: Float64, points_E_m: Float64, gap_px: Float64
-) -> Float64:
+def _move(display: EyeDisplay, shift_m: Float64, points_E_m: Float64, gap_px: Float64) -> Float64:
     """Return the change of φ, (3,), that best moves the drawn points by `gap_px`, (N, 2)."""
     here_px = project(eye_projection(display, shift_m), points_E_m)
     J = np.column_stack(

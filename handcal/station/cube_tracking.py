@@ -13,7 +13,13 @@ import numpy as np
 
 from handcal.camera.camera import Camera
 from handcal.camera.clock import FrameClock
-from handcal.errors import CameraError, CameraTimeoutError, PoseError, PosePendingError, CameraEndError
+from handcal.errors import (
+    CameraError,
+    CameraTimeoutError,
+    PoseError,
+    PosePendingError,
+    CameraEndError,
+)
 from handcal.geometry import invert, transform
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress

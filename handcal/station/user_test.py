@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from handcal.display import TARGET_DEPTHS_M, view_of_eye
-from handcal.errors import FileError, HandcalError
+from handcal.errors import FileError, HandcalError, PoseError
 from handcal.geometry import transform
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
@@ -30,6 +30,7 @@ Adjust: TypeAlias = Callable[[Eye, Float64, Callable[[Float64], None]], Float64]
 
 _ACK_S = 6.0
 _POSE_AGE_NS = 60_000_000
+_POSE_PATIENCE_S, _POLL_S = 3.0, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +168,12 @@ def wait_for_cube(
 
 
 def _head_now(server: HeadsetServer) -> Float64:
-    """Return the newest pose T_W_H that can be interpolated."""
-    return server.pose_at_host_ns(time.monotonic_ns() - _POSE_AGE_NS)
-
+    """Return a pose T_W_H of just now; PoseError if none arrives for a while."""
+    end_s = time.monotonic() + _POSE_PATIENCE_S
+    while True:
+        try:
+            return server.pose_at_host_ns(time.monotonic_ns() - _POSE_AGE_NS)
+        except PoseError:
+            if time.monotonic() > end_s:
+                raise
+        time.sleep(_POLL_S)

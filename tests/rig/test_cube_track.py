@@ -43,7 +43,5 @@ def test_the_cubes_faces_are_in_order() -> None:
     np.testing.assert_allclose(facing_corners_m(cube, straight), corners_m[:4])
     turned = rigid([0.0, 1.2, 0.0], [0.0, 0.0, 0.5])
     face_m = transform(turned, facing_corners_m(cube, turned))
-    nearest_m = min(
-        (turned @ face_pose(cube, marker))[2, 3] for marker in cube.ids
-    )
+    nearest_m = min((turned @ face_pose(cube, marker))[2, 3] for marker in cube.ids)
     np.testing.assert_allclose(face_m[:, 2].mean(), nearest_m)
