@@ -126,9 +126,10 @@ def simulate(arguments: argparse.Namespace) -> None:
     import numpy as np
 
     from handcal.rig.example import example_rig
+    from handcal.rig.formats import write_intrinsics
     from handcal.rig.rig_file import read_rig
     from handcal.sim.acceptance import write_acceptance
-    from handcal.sim.photographs import write_photographs
+    from handcal.sim.photographs import DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
 
     folder = make_folder(arguments.folder)
     if any(folder.iterdir()):
@@ -138,6 +139,8 @@ def simulate(arguments: argparse.Namespace) -> None:
     with show_progress() as progress:
         progress.at(0.0, "Offline calibration")
         write_photographs(folder, rig, arguments.views, rng, samples=2)
+        for name, camera in (("depth", DEPTH_CAMERA), ("headset", HEADSET_CAMERA)):
+            write_intrinsics(folder / f"{name}.json", camera, "json")
         progress.at(0.7, "Acceptance")
         write_acceptance(folder / "accept", rig, max(8, arguments.views // 2), rng)
     console.print(f"{folder}: made with a board of 8×6 squares", markup=False)

@@ -1,4 +1,4 @@
-"""``handcal evaluate cube track`` and ``handcal evaluate trials``: a cube that stands in the room."""
+"""``handcal evaluate cube track, trials``: a cube that stands in the room."""
 
 from __future__ import annotations
 
@@ -238,8 +238,8 @@ def _ask_to_place(depth_m: float) -> None:
 def _adjust(eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
     """Ask for keys until the drawn corners cover the cube's."""
     console.print(
-        f"{eye} eye: move φ by {_STEP_MM} mm with l r u d (left, right, up, down) and f b (forward, "
-        "back), as many as you like, then Enter; an empty line when the corners coincide"
+        f"{eye} eye: move φ by {_STEP_MM} mm with l r u d (left, right, up, down) and f b "
+        "(forward, back), as many as you like, then Enter; an empty line when the corners coincide"
     )
     while typed := console.input("> ").strip().lower():
         moved = shift_m.copy()

@@ -115,7 +115,7 @@ def accept_eye(
     depths_m = {name: _middle_m(T_C_B[name], pairs[name][0]) for name in pairs}
     if max(depths_m.values()) < _LEAST_SPREAD * min(depths_m.values()):
         raise ViewsError("the board is at nearly the same distance in all images; move it")
-    # The board is seen smaller, and its rotation acts on a longer lever: σ of the place grows as z².
+    # Far away the board is smaller and its rotation acts on a longer lever: σ grows as z².
     weights = [depths_m[name] ** -4 for name in pairs]
     T_S_C = np.linalg.inv(homography.H_C_S)
     seen_px = {

@@ -14,11 +14,11 @@ import numpy as np
 from handcal.camera.camera import Camera
 from handcal.camera.clock import FrameClock
 from handcal.errors import (
+    CameraEndError,
     CameraError,
     CameraTimeoutError,
     PoseError,
     PosePendingError,
-    CameraEndError,
 )
 from handcal.geometry import invert, transform
 from handcal.link.server import HeadsetServer

@@ -8,14 +8,16 @@ import pytest
 
 from handcal.display import reprojection_error_px
 from handcal.errors import FileError, HandcalError
+from handcal.geometry import transform
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.rig.cube import Cube
+from handcal.rig.cube_track import TrackedCube, cube_corners_m
 from handcal.session.session import Session
 from handcal.sim.cube_bench import CubeBench
 from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
 from handcal.station.user_test import TrialSettings, run_user_trials
-from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics
+from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics, Shape
 from tests.helpers import ROOT
 
 TRUE_M: dict[Eye, Float64] = {
@@ -49,14 +51,26 @@ def tracker(session: Session, server: HeadsetServer, bench: CubeBench) -> CubeTr
 
 
 def test_the_tracked_cube_is_drawn_where_it_is(
-    session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
+    session: Session,
+    bench: tuple[HeadsetServer, HeadsetClient, CubeBench],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     server, client, room = bench
-    found = run_cube_tracking(tracker(session, server, room), server, 1.5)
+    cube, drawn = tracker(session, server, room), list[Shape | None]()
+    step = cube.step
+
+    def look_and_step() -> TrackedCube | None:
+        drawn.append(client.state().shape)
+        return step()
+
+    monkeypatch.setattr(cube, "step", look_and_step)
+    found = run_cube_tracking(cube, server, 1.5)
     assert len(found.tracked) > 5
     error_m = np.linalg.norm(found.tracked[-1].T_W_T[:3, 3] - room.T_W_T[:3, 3])
     assert error_m < 0.0015
-    assert client.state().shape is None or len(client.state().shape.corners_W_m) == 8  # type: ignore[union-attr]
+    assert drawn[-1] is not None
+    true_m = transform(room.T_W_T, cube_corners_m(Cube()))
+    np.testing.assert_allclose(drawn[-1].corners_W_m, true_m, atol=0.003)
 
 
 def test_the_trials_measure_the_true_error(
@@ -90,6 +104,9 @@ def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
     cube = tracker(session, server, room)
     with pytest.raises(HandcalError, match=r"0\.\d+ m from the eyes; put it down there"):
         run_user_trials(session, server, cube, room.adjust, lambda _: room.place(0.45), impatient)
-    with Session.create(session.path.parent, Session.open(session.path).rig, {}) as empty:
-        with pytest.raises(FileError, match="left eye is not solved"):
-            run_user_trials(empty, server, cube, room.adjust, room.place, impatient)
+    rig = Session.open(session.path).rig
+    with (
+        Session.create(session.path.parent, rig, {}) as empty,
+        pytest.raises(FileError, match="left eye is not solved"),
+    ):
+        run_user_trials(empty, server, cube, room.adjust, room.place, impatient)
