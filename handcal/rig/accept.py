@@ -136,11 +136,11 @@ def accept_eye(
         }, shift_m
 
     off_px, shift_m = errors_px(np.zeros(3))
-    fitted = least_squares(
-        lambda turn_rad: np.concatenate([one.ravel() for one in errors_px(turn_rad)[0].values()]),
-        np.zeros(3),
-        x_scale=1e-3,
-    )
+
+    def residuals(turn_rad: Float64) -> Float64:
+        return np.concatenate([one.ravel() for one in errors_px(turn_rad)[0].values()])
+
+    fitted = least_squares(residuals, np.zeros(3), x_scale=1e-3)
     arcmin = {name: _arcmin(display, one) for name, one in off_px.items()}
     views = [
         AcceptedView(name, depths_m[name], len(one), float(one.mean()), float(one.max()))

@@ -88,8 +88,8 @@ class CubeFilter:
 
 def cube_corners_m(cube: Cube) -> Float64:
     """Return the cube's vertices, (8, 3) in its frame: the front face, then the back behind it."""
-    front = cube.side_m * _AROUND + [0.0, 0.0, -0.5 * cube.side_m]
-    return np.concatenate([front, front + [0.0, 0.0, cube.side_m]])
+    around_m, inwards_m = cube.side_m * _AROUND, np.array([0.0, 0.0, 0.5 * cube.side_m])
+    return np.concatenate([around_m - inwards_m, around_m + inwards_m])
 
 
 def facing_corners_m(cube: Cube, T_E_T: Float64) -> Float64:

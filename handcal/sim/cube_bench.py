@@ -126,6 +126,7 @@ class CubeBench(Closable):
         """
         display = self._rig.eyes[eye]
         sigma_px = SEEING_SIGMA_ARCMIN / float(arcmin_from_px(display, 1.0))
+        shift_m = shift_m.copy()
         seeing_px = self._rng.normal(0.0, sigma_px, (4, 2))
         for _ in range(_LOOKS):
             state = self._client.state()
@@ -142,9 +143,7 @@ class CubeBench(Closable):
             )
             drawn_px = project(state.drawn[eye].P, transform(T_V_W, corners_W_m))
             gap_px = seen_px + seeing_px - drawn_px
-            shift_m = shift_m + STEP_M * np.rint(
-                _move(display, shift_m, shown_E_m, gap_px) / STEP_M
-            )
+            shift_m += STEP_M * np.rint(_move(display, shift_m, shown_E_m, gap_px) / STEP_M)
             draw(shift_m)
         return shift_m
 
