@@ -172,5 +172,4 @@ def _move(display: EyeDisplay, shift_m: Float64, points_E_m: Float64, gap_px: Fl
             for one in STEP_M * np.eye(3)
         ]
     )
-    moved: Float64 = np.linalg.lstsq(J, gap_px.ravel(), rcond=None)[0]
-    return moved
+    return np.asarray(np.linalg.lstsq(J, gap_px.ravel(), rcond=None)[0], np.float64)
