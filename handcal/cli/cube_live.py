@@ -85,9 +85,12 @@ class _Setup(NamedTuple):
 )
 def track(arguments: argparse.Namespace) -> None:
     """Track a cube with the depth camera, and have the headset draw it where it is."""
+    import numpy as np
+
     from handcal.rig.example import example_rig
     from handcal.rig.rig_file import read_rig
     from handcal.station.cube_tracking import run_cube_tracking
+    from handcal.station.drawing import Drawing
 
     rig = example_rig() if arguments.rig is None else read_rig(arguments.rig)
     with (
@@ -95,6 +98,9 @@ def track(arguments: argparse.Namespace) -> None:
         until_interrupted() as is_stopped,
         show_progress(is_stopped) as progress,
     ):
+        if setup.server is not None:
+            offline_m = {eye: np.zeros(3) for eye in EYES}
+            Drawing(rig, setup.server, "").send(offline_m)
         found = run_cube_tracking(setup.tracker, setup.server, arguments.seconds, progress)
         pose = found.tracked[-1].T_W_T if found.tracked else None
         error_mm = None
@@ -153,8 +159,6 @@ def trials(arguments: argparse.Namespace) -> None:
     with (
         Session(arguments.session) as session,
         _setup(arguments, record.rig, True, seed) as setup,
-        until_interrupted() as is_stopped,
-        show_progress(is_stopped) as progress,
     ):
         bench, server = setup.bench, setup.server
         if server is None:
@@ -166,7 +170,6 @@ def trials(arguments: argparse.Namespace) -> None:
             _adjust if bench is None else bench.adjust,
             _ask_to_place if bench is None else bench.place,
             settings,
-            progress,
         )
     save(arguments.json, {"trials": [trial_json(trial) for trial in made]})
     shown = table("eye", "distance, m", "error, arcmin", "error, px")

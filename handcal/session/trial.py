@@ -42,8 +42,9 @@ class Trial:
 
     eye: Eye
     target_depth_m: float
+    """Nominal distance."""
     corners_E_m: Float64
-    """(4, 3); the target's corners in E, clockwise from the upper left."""
+    """(4, 3); the target's corners in E, in order around it."""
     calibrated_shift_m: Float64
     adjusted_shift_m: Float64
     """(3,); calibrated φ, and φ adjusted by hand."""

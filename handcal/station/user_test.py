@@ -91,6 +91,9 @@ def run_user_trials(
     rig, solved_m = record.rig, solved_shifts_m(record, settings.eyes)
     drawing = Drawing(rig, server, record.wearer)
     trials: list[Trial] = []
+    # A headset draws nothing before it has the projections of both eyes.
+    drawing.send({eye: solved_m.get(eye, np.zeros(3)) for eye in EYES})
+    drawing.wait_acked(_ACK_S)
     try:
         for round_number, depth_m in enumerate(settings.depths_m):
             place(depth_m)
