@@ -74,7 +74,7 @@ def obey(arguments: argparse.Namespace) -> None:
         if arguments.headset == "virtual":
             server, observe = stack.enter_context(_simulated(rig, arguments.mode))
         else:
-            server = stack.enter_context(_network(arguments))
+            server = stack.enter_context(network_server(arguments))
             observe = stack.enter_context(_observer(arguments.viewpoint))
         is_asked = arguments.headset == "network" and arguments.viewpoint is None
         made = run_display_check(
@@ -110,7 +110,8 @@ def _simulated(rig: Rig, mode: str) -> Iterator[tuple[HeadsetServer, Observe]]:
 
 
 @contextmanager
-def _network(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
+def network_server(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
+    """Yield the link once a paired headset has connected."""
     from handcal.link.server import HeadsetServer
 
     pairings = paired_headsets(arguments.keys)

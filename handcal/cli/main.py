@@ -25,6 +25,10 @@ class Entry(NamedTuple):
 
 
 _CUBE: Mapping[str, Entry] = {
+    "track": Entry(
+        "Track a cube with the depth camera, and have the headset draw it where it is.",
+        "cube_live",
+    ),
     "net": Entry(
         "Make a cube: its net to print at true size, and the file that describes it.", "cube"
     ),
@@ -46,6 +50,10 @@ _EVALUATE: Mapping[str, Entry] = {
     ),
     "segmentation": Entry(
         "Measure the segmentation of the hand on frames with true masks.", "evaluate"
+    ),
+    "trials": Entry(
+        "Record the user test's trials with a cube in the room, for a calibrated session.",
+        "cube_live",
     ),
     "users": Entry(
         "Evaluate the user test: the errors that wearers saw after calibration.",
@@ -99,6 +107,14 @@ _RIG: Mapping[str, Entry] = {
     ),
     "compare": Entry(
         "Compare two rig files, and show how far apart they draw a target.", "rig_files"
+    ),
+    "accept": Entry(
+        "Check a rig without a wearer, by a camera in the eye's place; exit code 1 if it fails.",
+        "accept",
+    ),
+    "simulate": Entry(
+        "Render the images of an offline calibration and of an acceptance, to practise with.",
+        "accept",
     ),
     "migrate": Entry(
         "Convert a rig file of any known version to the newest, and list what it does not say.",

@@ -42,8 +42,9 @@ class Trial:
 
     eye: Eye
     target_depth_m: float
+    """Nominal distance."""
     corners_E_m: Float64
-    """(4, 3); the target's corners in E, clockwise from the upper left."""
+    """(4, 3); the target's corners in E, in order around it."""
     calibrated_shift_m: Float64
     adjusted_shift_m: Float64
     """(3,); calibrated φ, and φ adjusted by hand."""
@@ -93,8 +94,19 @@ def make_trial(
     depth_m: float,
     calibrated_shift_m: ArrayLike,
     adjusted_shift_m: ArrayLike,
+    corners_E_m: Float64 | None = None,
 ) -> Trial:
     """Return the trial of a calibrated φ against the φ adjusted by hand.
+
+    Parameters
+    ----------
+    display : EyeDisplay
+    eye : {"left", "right"}
+    depth_m : float
+        Nominal distance of the target.
+    calibrated_shift_m, adjusted_shift_m : (3,) array_like
+    corners_E_m : (4, 3) float64, optional
+        Corners of a target that is fixed in the world; default: the target fixed to the head.
 
     Raises
     ------
@@ -103,7 +115,8 @@ def make_trial(
     """
     if not 0.0 < depth_m < np.inf:
         raise ValueError(f"a target at {depth_m:g} m is not in front of the eye")
-    corners_E_m = target_corners_m(depth_m)
+    if corners_E_m is None:
+        corners_E_m = target_corners_m(depth_m)
     drawn_px, truth_px = (
         project(eye_projection(display, shift_m), corners_E_m)
         for shift_m in (calibrated_shift_m, adjusted_shift_m)

@@ -75,6 +75,8 @@ def _paint_faces(
         u, v, ahead = np.moveaxis(rays @ np.linalg.inv(plane).T.astype(np.float32), 2, 0)
         half_m = 0.5 * cube.side_m * ahead
         on_face = (np.abs(u) <= half_m) & (np.abs(v) <= half_m)
+        if not on_face.any():  # outside the image
+            continue
         box = cv2.boundingRect(on_face.astype(np.uint8))
         part = np.s_[box[1] : box[1] + box[3], box[0] : box[0] + box[2]]
         on_face = on_face[part]

@@ -213,7 +213,7 @@ class _Studio:
         """Return T_E_T, true and tracked, of a cube seen whole by display and cameras."""
         settings, depth_camera = self._settings, self._rig.depth_intrinsics
         for _ in range(_MOST_TRIES):
-            T_E_T = self._some_pose(rng)
+            T_E_T = some_cube_pose(self._display, rng.uniform(_NEAR_M, _FAR_M), rng)
             vertices_m = transform(T_E_T, settings.cube.side_m * _VERTICES)
             if not (
                 _sees(settings.camera, T_E_C, vertices_m)
@@ -229,15 +229,15 @@ class _Studio:
             "the cube is not seen whole on the display and by the cameras: use a smaller one"
         )
 
-    def _some_pose(self, rng: np.random.Generator) -> Float64:
-        """Return T_E_T of a cube in front of the display's centre with three visible faces."""
-        middle_px = [(self._display.width_px - 1) / 2, (self._display.height_px - 1) / 2, 1.0]
-        ray = np.linalg.solve(eye_projection(self._display)[:, :3], middle_px)
-        depth_m = rng.uniform(_NEAR_M, _FAR_M)
-        aside_m = rng.uniform(-_ASIDE_M, _ASIDE_M, 2)
-        yaw = rng.uniform(*_YAW_RAD) * rng.choice([-1.0, 1.0])
-        turn = Rotation.from_euler("ZXY", [rng.uniform(*_ROLL_RAD), rng.uniform(*_PITCH_RAD), yaw])
-        return rigid(turn.as_matrix(), depth_m * ray / ray[2] + [*aside_m, 0.0])
+
+def some_cube_pose(display: EyeDisplay, depth_m: float, rng: np.random.Generator) -> Float64:
+    """Return T_E_T of a cube before the display's centre with three visible faces, at random."""
+    middle_px = [(display.width_px - 1) / 2, (display.height_px - 1) / 2, 1.0]
+    ray = np.linalg.solve(eye_projection(display)[:, :3], middle_px)
+    aside_m = rng.uniform(-_ASIDE_M, _ASIDE_M, 2)
+    yaw = rng.uniform(*_YAW_RAD) * rng.choice([-1.0, 1.0])
+    turn = Rotation.from_euler("ZXY", [rng.uniform(*_ROLL_RAD), rng.uniform(*_PITCH_RAD), yaw])
+    return rigid(turn.as_matrix(), depth_m * ray / ray[2] + [*aside_m, 0.0])
 
 
 def _sees(camera: Intrinsics, T_E_camera: Float64, points_E_m: Float64) -> bool:

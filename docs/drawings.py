@@ -1,0 +1,231 @@
+"""Draws the tutorial's arrangements and the mount of the depth camera (SVG), and the mount (STL).
+
+    python docs/drawings.py                          # rewrites docs/pictures/*.svg
+    python docs/drawings.py --mount FOLDER --tilt-deg 15 --holes-mm 45
+
+The mount is a foot that is strapped to the headset's brow, and an upright plate with two slots for
+the screws in the depth camera's back. Measure the camera and the headset; nothing here was tried on
+a device.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from itertools import product
+from pathlib import Path
+from typing import TypeAlias
+
+Point: TypeAlias = tuple[float, float, float]
+Triangle: TypeAlias = tuple[Point, Point, Point]
+PICTURES = Path(__file__).parent / "pictures"
+_STYLE = "font-family='sans-serif' font-size='13' fill='#222'"
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Measures of the mount; the defaults are for the outer size of a D435, 90 × 25 × 25 mm."""
+
+    width_mm: float = 90.0
+    """Width of the camera."""
+    height_mm: float = 25.0
+    """Height of the camera."""
+    holes_mm: float = 45.0
+    """Distance of the screw holes in the camera's back: measure it."""
+    screw_mm: float = 3.4
+    """Width of the slots: the screw's diameter and some room."""
+    depth_mm: float = 40.0
+    """Length of the foot on the headset's brow: measure it."""
+    thick_mm: float = 4.0
+    tilt_deg: float = 15.0
+    """Rotation of the camera downwards from the brow."""
+
+    def __post_init__(self) -> None:
+        if min(getattr(self, one.name) for one in fields(self) if one.name != "tilt_deg") <= 0:
+            raise ValueError("every length must be positive")
+        if not self.holes_mm + 2 * self.screw_mm < self.width_mm:
+            raise ValueError("the holes must lie within the camera's width")
+        if not 2.5 * self.screw_mm < self.height_mm:
+            raise ValueError("the slots must be lower than the camera")
+        if not 0 <= self.tilt_deg <= 45:
+            raise ValueError("the tilt must lie between 0 and 45°")
+
+
+def mount_triangles(mount: Mount) -> list[Triangle]:
+    """Return the closed surface of the mount, seen from outside counterclockwise, in mm.
+
+    x to the right, y to the front along the brow, z up.
+    """
+    half, slot, t = mount.width_mm / 2, mount.screw_mm / 2, mount.thick_mm
+    hole, top = mount.holes_mm / 2, t + mount.height_mm
+    low = t + mount.height_mm / 4
+    x = [-half, -hole - slot, -hole + slot, hole - slot, hole + slot, half]
+    y = [0.0, mount.depth_mm - t, mount.depth_mm]
+    z = [0.0, t, low, top - mount.height_mm / 4, top]
+
+    def is_filled(i: int, j: int, k: int) -> bool:
+        if not (0 <= i < len(x) - 1 and 0 <= j < len(y) - 1 and 0 <= k < len(z) - 1):
+            return False
+        is_slot = i in (1, 3) and k == 2
+        return k == 0 or (j == 1 and not is_slot)
+
+    def place(i: int, j: int, k: int) -> Point:
+        # The foot's underside is a wedge: on a level brow the camera looks down.
+        down = math.tan(math.radians(mount.tilt_deg)) * y[j] if k == 0 else 0.0
+        height = z[k] if k else -(math.tan(math.radians(mount.tilt_deg)) * y[-1] - down)
+        return x[i], y[j], height
+
+    cells = product(range(len(x) - 1), range(len(y) - 1), range(len(z) - 1))
+    return [
+        triangle
+        for cell in cells
+        if is_filled(*cell)
+        for axis in range(3)
+        for side in (0, 1)
+        if not is_filled(*(n + (2 * side - 1) * (a == axis) for a, n in enumerate(cell)))
+        for triangle in _face(cell, axis, side, place)
+    ]
+
+
+def _face(
+    cell: tuple[int, ...], axis: int, side: int, place: Callable[..., Point]
+) -> Iterator[Triangle]:
+
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    around = []
+    for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
+        corner = list(cell)
+        corner[axis] += side
+        corner[u] += du
+        corner[v] += dv
+        around.append(place(*corner))
+    a, b, c, d = around if side else around[::-1]
+    yield a, b, c
+    yield a, c, d
+
+
+def write_stl(path: Path, triangles: list[Triangle]) -> None:
+    """Write a binary STL file in mm."""
+    with path.open("wb") as file:
+        file.write(b"handcal mount, mm".ljust(80) + struct.pack("<I", len(triangles)))
+        for triangle in triangles:
+            # Zero normals: programs compute them from the order of the corners.
+            file.write(struct.pack("<12fH", 0, 0, 0, *(x for point in triangle for x in point), 0))
+
+
+def mount_svg(mount: Mount) -> str:
+    """Return the drawing of the mount: from the front and from the side, 3 px per mm."""
+    s, t, high = 3.0, mount.thick_mm, mount.height_mm + mount.thick_mm
+    wedge = math.tan(math.radians(mount.tilt_deg)) * mount.depth_mm
+    x0, y0 = 40.0, 50.0
+    parts = [_box(x0, y0, s * mount.width_mm, s * high, "")]
+    slot_y = y0 + s * mount.height_mm / 4
+    for sign in (-1, 1):
+        middle = x0 + s * (mount.width_mm + sign * mount.holes_mm) / 2
+        width = s * mount.screw_mm
+        parts.append(_box(middle - width / 2, slot_y, width, s * mount.height_mm / 2, "", "#fff"))
+    parts.append(_text(x0, y0 - 12, f"front: width {mount.width_mm:g} mm"))
+    below = y0 + s * (high + wedge) + 24
+    parts.append(_text(x0, below, f"slots {mount.holes_mm:g} mm apart, {mount.screw_mm:g} mm wide"))
+    x1 = x0 + s * mount.width_mm + 70
+    base, foot = y0 + s * high, s * mount.depth_mm
+    side = [
+        (x1, base - s * t),
+        (x1 + foot - s * t, base - s * t),
+        (x1 + foot - s * t, y0),
+        (x1 + foot, y0),
+        (x1 + foot, base),
+        (x1, base + s * wedge),
+    ]
+    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in side)
+    parts.append(f"<polygon points='{corners}' fill='#dde6f0' stroke='#222'/>")
+    parts.append(_text(x1, y0 - 12, f"side: plate {high:g} mm high, {t:g} mm thick"))
+    parts.append(_text(x1, below, f"foot {mount.depth_mm:g} mm, tilt {mount.tilt_deg:g}°"))
+    return _svg(x1 + max(foot, 230) + 20, below + 20, parts)
+
+
+ARRANGEMENTS = {
+    "setup-stereo": (
+        "Depth and headset camera: one board, seen by both",
+        [(40, 60, "depth camera D"), (40, 130, "headset camera H")],
+        [(430, 95, "board")],
+        "0.3 to 0.6 m",
+    ),
+    "setup-display": (
+        "Display: the viewpoint camera in the eye's place, dark room",
+        [(40, 95, "viewpoint camera C")],
+        [(230, 95, "combiner"), (430, 95, "virtual grid")],
+        "focus at the virtual image",
+    ),
+    "setup-accept": (
+        "Acceptance: after the grid, the board at several distances",
+        [(40, 60, "depth camera D"), (40, 130, "viewpoint camera C")],
+        [(230, 130, "combiner (off)"), (430, 95, "board")],
+        "0.35 to 0.65 m",
+    ),
+    "setup-cube": (
+        "Cube in the room: tracked by D, drawn by the headset",
+        [(40, 60, "depth camera D"), (40, 130, "eye, or camera C")],
+        [(230, 130, "combiner"), (430, 95, "cube")],
+        "0.4, 0.5, 0.6 m",
+    ),
+}
+
+
+def arrangement_svg(name: str) -> str:
+    """Return the drawing of an arrangement, seen from the side."""
+    title, lookers, things, distance = ARRANGEMENTS[name]
+    parts = [_text(20, 28, title)]
+    x_end, y_end, _ = things[-1]
+    for x, y, _ in lookers:
+        line = f"x1='{x + 130}' y1='{y + 18}' x2='{x_end}' y2='{y_end + 18}'"
+        parts.append(f"<line {line} stroke='#888' stroke-dasharray='5 4'/>")
+    parts += [_box(x, y, 150, 36, label) for x, y, label in (*lookers, *things)]
+    parts.append(_text(430, 160, distance))
+    return _svg(620, 190, parts)
+
+
+def _box(x: float, y: float, width: float, height: float, label: str, fill: str = "#dde6f0") -> str:
+    box = f"<rect x='{x:.1f}' y='{y:.1f}' width='{width:.1f}' height='{height:.1f}'"
+    box += f" fill='{fill}' stroke='#222'/>"
+    return box + (_text(x + 10, y + height / 2 + 5, label) if label else "")
+
+
+def _text(x: float, y: float, text: str) -> str:
+    return f"<text x='{x:.1f}' y='{y:.1f}' {_STYLE}>{text}</text>"
+
+
+def _svg(width: float, height: float, parts: list[str]) -> str:
+    size = f"width='{width:.0f}' height='{height:.0f}' viewBox='0 0 {width:.0f} {height:.0f}'"
+    paper = "<rect width='100%' height='100%' fill='#fff'/>"
+    body = "\n".join([paper, *parts])
+    return f"<svg xmlns='http://www.w3.org/2000/svg' {size}>\n{body}\n</svg>\n"
+
+
+def main() -> None:
+    """Write the drawings, or a mount with its own measures."""
+    parser = argparse.ArgumentParser(description="Draw the mount and the arrangements.")
+    parser.add_argument("--mount", type=Path, metavar="FOLDER", help="only the mount: SVG and STL")
+    for one in fields(Mount):
+        option = "--" + one.name.replace("_", "-")
+        parser.add_argument(option, type=float, default=one.default)
+    arguments = parser.parse_args()
+    try:
+        mount = Mount(*(getattr(arguments, one.name) for one in fields(Mount)))
+    except ValueError as error:
+        parser.error(str(error))
+    folder = arguments.mount or PICTURES
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "mount.svg").write_text(mount_svg(mount), "utf-8")
+    if arguments.mount:
+        write_stl(folder / "mount.stl", mount_triangles(mount))
+        return
+    for name in ARRANGEMENTS:
+        (folder / f"{name}.svg").write_text(arrangement_svg(name), "utf-8")
+
+
+if __name__ == "__main__":
+    main()

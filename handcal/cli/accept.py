@@ -1,0 +1,123 @@
+"""``handcal rig accept, simulate``: acceptance of a rig, and rendered images to practise with."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from handcal.cli.output import console, save, show_progress, table, triple
+from handcal.cli.rig import BOARD_OPTIONS, GRID_OPTION, board_of
+from handcal.cli.terminal import arg, command, number
+from handcal.errors import HandcalError
+from handcal.io.files import make_folder
+from handcal.types import EYES
+
+
+@command(
+    arg("folder", type=Path, help="images: EYE/grid.png, EYE/viewpoint, EYE/depth; camera.json"),
+    arg("--rig", type=Path, metavar="FILE", required=True, help="rig file to accept"),
+    arg("--eyes", choices=("both", *EYES), default="both", help="eyes to check"),
+    arg(
+        "--camera-intrinsics",
+        type=Path,
+        metavar="FILE",
+        help="intrinsics of the viewpoint camera (default: FOLDER/camera.json)",
+    ),
+    arg(
+        "--depth-intrinsics",
+        type=Path,
+        metavar="FILE",
+        help="intrinsics of the depth camera's images (default: FOLDER/depth.json if it exists, "
+        "else the rig's)",
+    ),
+    arg(
+        "--limit-arcmin",
+        type=number(float, 0.1, 60.0),
+        metavar="ARCMIN",
+        default=5.0,
+        help="largest accepted mean error at any distance",
+    ),
+    arg(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        default=Path("results/acceptance"),
+        help="folder for the page with the result",
+    ),
+    *BOARD_OPTIONS,
+    GRID_OPTION,
+    json=True,
+)
+def accept(arguments: argparse.Namespace) -> None:
+    """Check a rig without a wearer, by a camera in the eye's place; exit code 1 if it fails."""
+    from handcal.rig.acceptance import AcceptanceSettings, run_acceptance, view_rows
+
+    settings = AcceptanceSettings(
+        arguments.folder,
+        arguments.rig,
+        arguments.output,
+        board_of(arguments),
+        arguments.square_px,
+        EYES if arguments.eyes == "both" else (arguments.eyes,),
+        arguments.camera_intrinsics,
+        arguments.depth_intrinsics,
+        arguments.limit_arcmin,
+    )
+    with show_progress() as progress:
+        found = run_acceptance(settings, progress)
+    save(arguments.json, found.json(settings.limit_arcmin))
+    for name, why in found.left_out.items():
+        console.print(f"Left out: {name}: {why}", markup=False)
+    shown = table("eye", "distance, m", "corners", "mean, arcmin", "largest, arcmin")
+    for eye, one in found.eyes.items():
+        for row in view_rows(one):
+            shown.add_row(eye, *row)
+    console.print(shown)
+    for file in found.files:
+        console.print(str(file), markup=False)
+    for eye, one in found.eyes.items():
+        console.print(
+            f"{eye}: {found.problems[eye] or 'passed'}; {one.mean_arcmin:.1f}′ on average, camera "
+            f"{triple(1e3 * one.shift_m)} mm from C0",
+            markup=False,
+        )
+    if found.cause:
+        raise HandcalError(f"the rig fails: {found.cause}")
+    console.print(f"passed: at most {settings.limit_arcmin:g}′ at every distance")
+
+
+@command(
+    arg("folder", type=Path, help="new folder for the images"),
+    arg("--rig", type=Path, metavar="FILE", help="the true rig (default: the shipped example)"),
+    arg(
+        "--views",
+        type=number(int, 3, 100),
+        metavar="N",
+        default=20,
+        help="images of the board for each camera",
+    ),
+    arg("--seed", type=number(int, 0, 2**32 - 1), metavar="N", default=1, help="random seed"),
+)
+def simulate(arguments: argparse.Namespace) -> None:
+    """Render the images of an offline calibration and of an acceptance, to practise with."""
+    import numpy as np
+
+    from handcal.rig.example import example_rig
+    from handcal.rig.formats import write_intrinsics
+    from handcal.rig.rig_file import read_rig
+    from handcal.sim.acceptance import write_acceptance
+    from handcal.sim.photographs import DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
+
+    folder = make_folder(arguments.folder)
+    if any(folder.iterdir()):
+        raise HandcalError(f"{folder} is not empty: choose a new folder")
+    rig = example_rig() if arguments.rig is None else read_rig(arguments.rig)
+    rng = np.random.default_rng(arguments.seed)
+    with show_progress() as progress:
+        progress.at(0.0, "Offline calibration")
+        write_photographs(folder, rig, arguments.views, rng, samples=2)
+        for name, camera in (("depth", DEPTH_CAMERA), ("headset", HEADSET_CAMERA)):
+            write_intrinsics(folder / f"{name}.json", camera, "json")
+        progress.at(0.7, "Acceptance")
+        write_acceptance(folder / "accept", rig, max(8, arguments.views // 2), rng)
+    console.print(f"{folder}: made with a board of 8×6 squares", markup=False)

@@ -1,0 +1,198 @@
+"""Acceptance of a rig without a wearer: a camera in the eye's place sees what would be drawn.
+
+The viewpoint camera stands behind a display. A picture of the display's grid gives the display's
+pixel for each of the camera's. Then it sees a board at several distances, which the depth camera
+sees too. The depth camera's picture gives the place of the board and, with the viewpoint camera's,
+the camera's own place φ. The pixels at which the rig draws the board's corners for an eye at φ are
+compared with those at which the camera sees them. Nothing is fitted.
+
+A depth camera that has only shifted moves φ and the board alike, and is hardly seen. A wearer's
+calibration compensates it in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from handcal.display import arcmin_from_px, eye_projection, view_of_eye
+from handcal.geometry import invert, project, rigid, transform
+from handcal.rig.board import BoardView
+from handcal.rig.display import DisplayHomography, undistort
+from handcal.rig.viewpoint import board_pose
+from handcal.rig.views import ViewsError
+from handcal.types import EyeDisplay, Float64, Intrinsics, Rig, freeze
+
+FEWEST_VIEWS = 5
+LIMIT_ARCMIN = 5.0
+"""Largest accepted mean error at any distance; calibrated wearers have 4 to 9 arcmin in all."""
+LARGEST_SHIFT_M = 0.015
+_LEAST_SPREAD = 1.2
+_EXPLAINED = 0.5
+_SAME_TURN = 0.35
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedView:
+    """The error of drawing in one pair of images."""
+
+    name: str
+    depth_m: float
+    """Distance of the board's middle from the viewpoint camera."""
+    corners: int
+    mean_arcmin: float
+    largest_arcmin: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeAcceptance:
+    """The errors of one eye's drawing."""
+
+    views: tuple[AcceptedView, ...]
+    """By distance."""
+    shift_m: Float64
+    """(3,); place φ of the viewpoint camera from C0, E axes."""
+    turn_rad: Float64
+    """(3,); rotation of the depth camera, H axes, that would explain the errors best."""
+    left_arcmin: float
+    """Mean error that this rotation leaves."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "shift_m", np.float64, 3)
+        freeze(self, "turn_rad", np.float64, 3)
+
+    @property
+    def mean_arcmin(self) -> float:
+        """Mean over views."""
+        return float(np.mean([view.mean_arcmin for view in self.views]))
+
+    @property
+    def worst_arcmin(self) -> float:
+        """The largest mean of a view."""
+        return max(view.mean_arcmin for view in self.views)
+
+
+def accept_eye(
+    rig: Rig,
+    display: EyeDisplay,
+    homography: DisplayHomography,
+    camera: Intrinsics,
+    pairs: Mapping[str, tuple[BoardView, BoardView]],
+    depth_camera: Intrinsics,
+) -> EyeAcceptance:
+    """Compare what the rig draws for one eye with what a camera in its place sees.
+
+    Parameters
+    ----------
+    rig : Rig
+    display : EyeDisplay
+    homography : DisplayHomography
+        Of the display's grid, seen from the same place as the boards.
+    camera : Intrinsics
+        The viewpoint camera.
+    pairs : mapping of name to (BoardView, BoardView)
+        The board seen by the viewpoint camera and, at the same place, by the depth camera.
+    depth_camera : Intrinsics
+        Of the depth camera's images.
+
+    Raises
+    ------
+    ViewsError
+        If there are fewer than `FEWEST_VIEWS` pairs, or the board's distance hardly changes.
+    """
+    if len(pairs) < FEWEST_VIEWS:
+        raise ViewsError(
+            f"{len(pairs)} pairs of images show the board; take at least {FEWEST_VIEWS}, at "
+            "different distances"
+        )
+    T_E_H = view_of_eye(display, np.eye(4))
+    T_C_B = {name: board_pose(seen, camera) for name, (seen, _) in pairs.items()}
+    T_H_B = {name: rig.T_H_D @ board_pose(seen, depth_camera) for name, (_, seen) in pairs.items()}
+    depths_m = {name: _middle_m(T_C_B[name], pairs[name][0]) for name in pairs}
+    if max(depths_m.values()) < _LEAST_SPREAD * min(depths_m.values()):
+        raise ViewsError("the board is at nearly the same distance in all images; move it")
+    # Far away the board is smaller and its rotation acts on a longer lever: σ grows as z².
+    weights = [depths_m[name] ** -4 for name in pairs]
+    T_S_C = np.linalg.inv(homography.H_C_S)
+    seen_px = {
+        name: cv2.perspectiveTransform(undistort(seen.pixels, camera)[None], T_S_C)[0]
+        for name, (seen, _) in pairs.items()
+    }
+
+    def errors_px(turn_rad: Float64) -> tuple[dict[str, Float64], Float64]:
+        """Return each corner's error, (N, 2), with a turned depth camera, and φ."""
+        turned = rig.T_H_D @ rigid(rig.T_H_D[:3, :3].T @ turn_rad) @ invert(rig.T_H_D)
+        placed = {name: T_E_H @ turned @ T for name, T in T_H_B.items()}
+        places_m = [placed[name] @ invert(T_C_B[name]) for name in pairs]
+        shift_m: Float64 = np.average([T[:3, 3] for T in places_m], axis=0, weights=weights)
+        P = eye_projection(display, shift_m)
+        return {
+            name: project(P, transform(placed[name], seen.points_m)) - seen_px[name]
+            for name, (seen, _) in pairs.items()
+        }, shift_m
+
+    off_px, shift_m = errors_px(np.zeros(3))
+
+    def residuals(turn_rad: Float64) -> Float64:
+        return np.concatenate([one.ravel() for one in errors_px(turn_rad)[0].values()])
+
+    fitted = least_squares(residuals, np.zeros(3), x_scale=1e-3)
+    arcmin = {name: _arcmin(display, one) for name, one in off_px.items()}
+    views = [
+        AcceptedView(name, depths_m[name], len(one), float(one.mean()), float(one.max()))
+        for name, one in arcmin.items()
+    ]
+    return EyeAcceptance(
+        tuple(sorted(views, key=lambda view: view.depth_m)),
+        shift_m,
+        fitted.x,
+        float(_arcmin(display, np.reshape(fitted.fun, (-1, 2))).mean()),
+    )
+
+
+def problem(found: EyeAcceptance, limit_arcmin: float = LIMIT_ARCMIN) -> str:
+    """Return what is wrong with an eye's drawing; empty if it passes."""
+    away_m = float(np.linalg.norm(found.shift_m))
+    if away_m > LARGEST_SHIFT_M:
+        return (
+            f"the camera is {1e3 * away_m:.0f} mm from the eye's place; move it there and check "
+            "again, or the depth camera has shifted"
+        )
+    if found.worst_arcmin <= limit_arcmin:
+        return ""
+    where = max(found.views, key=lambda view: view.mean_arcmin)
+    return f"{where.mean_arcmin:.1f}′ at {where.depth_m:.2f} m, more than {limit_arcmin:g}′"
+
+
+def likely_cause(found: Sequence[EyeAcceptance]) -> str:
+    """Return in words what has probably moved on a rig that fails."""
+    if any(one.left_arcmin > _EXPLAINED * one.mean_arcmin for one in found):
+        return (
+            "no rotation explains the errors: check the board's measured sides, the intrinsics, "
+            "and that the camera stood still; then calibrate the displays again"
+        )
+    turns_rad = np.array([one.turn_rad for one in found])
+    mean_rad = turns_rad.mean(axis=0)
+    apart_rad = np.linalg.norm(turns_rad - mean_rad, axis=1).max()
+    degrees = np.degrees(np.linalg.norm(mean_rad))
+    if len(found) > 1 and apart_rad <= _SAME_TURN * np.linalg.norm(mean_rad):
+        return (
+            f"both eyes' errors are those of a depth camera turned by {degrees:.2f}° on the "
+            "headset: fasten it, and calibrate its pose again (handcal rig stereo, rig make)"
+        )
+    return (
+        "each eye's errors are those of a rotation of its own: calibrate the displays again "
+        "(handcal rig display), and see with handcal rig compare what has changed"
+    )
+
+
+def _middle_m(T_C_B: Float64, seen: BoardView) -> float:
+    return float(transform(T_C_B, seen.points_m).mean(axis=0)[2])
+
+
+def _arcmin(display: EyeDisplay, off_px: Float64) -> Float64:
+    return arcmin_from_px(display, np.linalg.norm(off_px, axis=1))

@@ -1,0 +1,182 @@
+"""Trials of the user test with a cube that stands in the room, for a calibrated session.
+
+As in Hu et al. 2021 (user test): the cube is placed at random at 0.4, 0.5 and 0.6 m, the corners of
+one face are drawn fixed in the world, and φ is adjusted by hand until they cover the real ones.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from handcal.display import TARGET_DEPTHS_M, view_of_eye
+from handcal.errors import FileError, HandcalError, PoseError
+from handcal.geometry import transform
+from handcal.link.server import HeadsetServer
+from handcal.progress import Progress
+from handcal.rig.cube_track import TrackedCube, facing_corners_m
+from handcal.session.session import Session, SessionRecord
+from handcal.session.trial import Trial, make_trial
+from handcal.station.cube_tracking import CubeTracker
+from handcal.station.drawing import Drawing
+from handcal.types import EYES, Eye, Float64, Rig, Shape
+
+Adjust: TypeAlias = Callable[[Eye, Float64, Callable[[Float64], None]], Float64]
+"""Given an eye, its φ, and a function that draws with another φ: returns φ as adjusted by hand."""
+
+_ACK_S = 6.0
+_POSE_AGE_NS = 60_000_000
+_POSE_PATIENCE_S, _POLL_S = 3.0, 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class TrialSettings:
+    """Settings of the trials of one calibration."""
+
+    eyes: tuple[Eye, ...] = EYES
+    depths_m: tuple[float, ...] = TARGET_DEPTHS_M
+    near_m: float = 0.05
+    """Largest distance of the cube from the wanted one."""
+    patience_s: float = 120.0
+    """Longest time until the cube is at rest at the wanted distance."""
+
+
+def run_user_trials(
+    session: Session,
+    server: HeadsetServer,
+    tracker: CubeTracker,
+    adjust: Adjust,
+    place: Callable[[float], None],
+    settings: TrialSettings | None = None,
+    progress: Progress = Progress(),
+) -> tuple[Trial, ...]:
+    """Record a trial for each distance and eye of a session's calibration.
+
+    Parameters
+    ----------
+    session : Session
+        Solved.
+    server : HeadsetServer
+        With a connected headset.
+    tracker : CubeTracker
+    adjust : callable
+        See `Adjust`.
+    place : callable
+        Called before each distance: asks for the cube there.
+    settings : TrialSettings, optional
+    progress : Progress
+
+    Returns
+    -------
+    tuple of Trial
+        As saved in the session.
+
+    Raises
+    ------
+    FileError
+        If an eye of the session is not solved, or it cannot be written.
+    HandcalError
+        If the cube does not come to rest at the wanted distance.
+    LinkError
+        If the headset does not acknowledge what it is sent.
+    CameraError
+    CancelledError
+    """
+    settings = settings or TrialSettings()
+    record = Session.open(session.path)
+    rig, solved_m = record.rig, solved_shifts_m(record, settings.eyes)
+    drawing = Drawing(rig, server, record.wearer)
+    trials: list[Trial] = []
+    # A headset draws nothing before it has the projections of both eyes.
+    drawing.send({eye: solved_m.get(eye, np.zeros(3)) for eye in EYES})
+    drawing.wait_acked(_ACK_S)
+    try:
+        for round_number, depth_m in enumerate(settings.depths_m):
+            place(depth_m)
+            cube = wait_for_cube(tracker, server, rig, depth_m, settings, progress)
+            for eye in settings.eyes:
+                progress.at(round_number / len(settings.depths_m), f"{eye} eye, {depth_m} m")
+
+                def draw(shift_m: Float64) -> None:
+                    drawing.send({eye: shift_m})  # noqa: B023 (called before the next eye's turn)
+                    drawing.wait_acked(_ACK_S)
+
+                draw(solved_m[eye])
+                T_E_T = view_of_eye(rig.eyes[eye], _head_now(server)) @ cube.T_W_T
+                corners_W_m = transform(cube.T_W_T, facing_corners_m(tracker.cube, T_E_T))
+                server.wait_acked(server.send_shape(Shape(corners_W_m, (eye,))), _ACK_S)
+                adjusted_m = adjust(eye, solved_m[eye], draw)
+                T_E_W = view_of_eye(rig.eyes[eye], _head_now(server))
+                trial = make_trial(
+                    rig.eyes[eye],
+                    eye,
+                    depth_m,
+                    solved_m[eye],
+                    adjusted_m,
+                    transform(T_E_W, corners_W_m),
+                )
+                session.save_trial(trial)
+                trials.append(trial)
+                draw(solved_m[eye])
+    finally:
+        server.send_shape(None)
+    return tuple(trials)
+
+
+def solved_shifts_m(record: SessionRecord, eyes: Sequence[Eye]) -> Mapping[Eye, Float64]:
+    """Return φ of each eye as a session has solved it; FileError if one is not solved."""
+    solved = {} if record.results is None else record.results["eyes"]
+    missing = [eye for eye in eyes if eye not in solved]
+    if missing:
+        raise FileError(f"{record.path}: the {missing[0]} eye is not solved; calibrate it first")
+    return {eye: np.array(solved[eye]["shift_m"], np.float64) for eye in eyes}
+
+
+def wait_for_cube(
+    tracker: CubeTracker,
+    server: HeadsetServer,
+    rig: Rig,
+    depth_m: float,
+    settings: TrialSettings,
+    progress: Progress,
+) -> TrackedCube:
+    """Return the cube once it is at rest at about a distance from the eyes.
+
+    Raises
+    ------
+    HandcalError
+        If it does not come to rest there within the patience.
+    """
+    end_s = time.monotonic() + settings.patience_s
+    why = "the cube is not seen"
+    while time.monotonic() < end_s:
+        progress.check()
+        found = tracker.step()
+        why = tracker.problem or why
+        if found is None:
+            continue
+        T_E_W = view_of_eye(rig.eyes[settings.eyes[0]], _head_now(server))
+        seen_m = float((T_E_W @ found.T_W_T)[2, 3])
+        if abs(seen_m - depth_m) > settings.near_m:
+            why = f"it is {seen_m:.2f} m from the eyes"
+        elif found.is_at_rest:
+            return found
+        else:
+            why = "it moves"
+    raise HandcalError(f"the cube did not come to rest at {depth_m} m: {why}; put it down there")
+
+
+def _head_now(server: HeadsetServer) -> Float64:
+    """Return a pose T_W_H of just now; PoseError if none arrives for a while."""
+    end_s = time.monotonic() + _POSE_PATIENCE_S
+    while True:
+        try:
+            return server.pose_at_host_ns(time.monotonic_ns() - _POSE_AGE_NS)
+        except PoseError:
+            if time.monotonic() > end_s:
+                raise
+        time.sleep(_POLL_S)

@@ -1,0 +1,69 @@
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.camera.folder import record_folder
+from handcal.cli.main import parse
+from handcal.errors import HandcalError
+from handcal.geometry import rigid
+from handcal.rig.cube import Cube
+from handcal.rig.example import example_rig
+from handcal.sim.boards import PictureSettings
+from handcal.sim.cube import CubePainter
+from handcal.types import Frame, Intrinsics
+from tests.helpers import ROOT
+
+CAMERA = Intrinsics(640, 360, 502.0, 502.0, 319.5, 179.5)
+T_D_T = rigid([0, 0, 0.1], [0, 0, 0.45]) @ rigid([0.5, 0, 0]) @ rigid([0, 0.7, 0])
+
+
+def run(*words: object) -> None:
+    arguments = parse(["evaluate", *map(str, words)])
+    arguments.command(arguments)
+
+
+def recording(folder: Path, frames: int, has_cube: bool = True) -> Path:
+    painter = CubePainter(Cube(), CAMERA, PictureSettings(samples=1))
+    rng, depth = np.random.default_rng(1), np.zeros((CAMERA.height, CAMERA.width), np.uint16)
+
+    def frame(number: int) -> Frame:
+        T = T_D_T if has_cube else rigid(None, [0, 0, -1.0]) @ T_D_T
+        color = np.repeat(painter.paint(T, rng)[..., None], 3, axis=2)
+        t_ns = number * 50_000_000
+        return Frame(number, t_ns, t_ns, depth, 1e-3, CAMERA, color, CAMERA)
+
+    record_folder(folder, [frame(number) for number in range(frames)])
+    return folder
+
+
+def test_the_cube_of_a_recording_is_tracked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = tmp_path / "result.json"
+    played = recording(tmp_path / "take", 18)
+    run("cube", "track", "--camera", played, "--no-headset", "--seconds", 20, "--json", result)
+    found = json.loads(result.read_text())
+    assert found["frames"] == found["tracked"] == 18
+    assert found["is_at_rest"]
+    assert found["error_mm"] is None
+    expected = example_rig().T_H_D @ T_D_T
+    np.testing.assert_allclose(np.array(found["T_W_T"])[:3, 3], expected[:3, 3], atol=0.001)
+    assert "18 poses in 18 frames" in capsys.readouterr().out
+
+
+def test_a_recording_without_the_cube_says_why(tmp_path: Path) -> None:
+    played = recording(tmp_path / "take", 3, has_cube=False)
+    with pytest.raises(HandcalError, match="the cube was not tracked: no marker of the cube"):
+        run("cube", "track", "--camera", played, "--no-headset", "--seconds", 20)
+
+
+def test_a_session_of_a_real_wearer_has_no_simulated_one(tmp_path: Path) -> None:
+    session = tmp_path / "session"
+    shutil.copytree(ROOT / "resources" / "example_session", session)
+    with pytest.raises(HandcalError, match="not of a simulated wearer"):
+        run("trials", session, "--headset", "virtual", "--camera", "simulator")
+    with pytest.raises(HandcalError, match="go together"):
+        run("trials", session, "--headset", "virtual", "--camera", "realsense")

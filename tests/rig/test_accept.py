@@ -1,0 +1,97 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.display import eye_projection, view_of_eye
+from handcal.geometry import invert, rigid
+from handcal.rig.accept import EyeAcceptance, accept_eye, likely_cause, problem
+from handcal.rig.display import DisplayHomography
+from handcal.rig.example import example_rig
+from handcal.rig.views import ViewsError
+from handcal.sim.boards import board_poses, board_view
+from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
+from handcal.types import EYES, Eye, Float64, Rig
+
+RIG = example_rig()
+PHI_M = np.array([0.002, -0.001, 0.003])
+
+
+def accepted(
+    true: Rig, believed: Rig, eye: Eye, noise_px: float = 0.0, shift_m: Float64 = PHI_M
+) -> EyeAcceptance:
+    """Return what is found with images of the true rig, and the file of the believed one."""
+    rng = np.random.default_rng(1)
+    display = true.eyes[eye]
+    T_E_C = rigid([0.01, -0.02, 0.015], shift_m)
+    camera = replace(VIEWPOINT_CAMERA, distortion=())
+    K_C = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
+    shown = eye_projection(display, shift_m)[:, :3] @ T_E_C[:3, :3]
+    homography = DisplayHomography(K_C @ np.linalg.inv(shown), {}, 0.0, 0.0)
+    T_D_C = invert(view_of_eye(display, np.eye(4)) @ true.T_H_D) @ T_E_C
+    poses = board_poses(BOARD, camera, 12, rng, others=((T_D_C, DEPTH_CAMERA),))
+    pairs = {
+        str(number): (
+            board_view(BOARD, T, camera, rng, noise_px),
+            board_view(BOARD, T_D_C @ T, DEPTH_CAMERA, rng, noise_px),
+        )
+        for number, T in enumerate(poses)
+    }
+    return accept_eye(believed, believed.eyes[eye], homography, camera, pairs, DEPTH_CAMERA)
+
+
+def turned(rig: Rig, turn_rad: list[float], shift_m: list[float] | None = None) -> Rig:
+    return replace(rig, T_H_D=rig.T_H_D @ rigid(turn_rad, shift_m))
+
+
+def test_a_right_rig_passes_and_the_cameras_place_is_found() -> None:
+    for eye in EYES:
+        exact = accepted(RIG, RIG, eye)
+        assert exact.worst_arcmin < 0.01
+        np.testing.assert_allclose(exact.shift_m, PHI_M, atol=1e-5)
+        noisy = accepted(RIG, RIG, eye, noise_px=0.05)
+        assert noisy.worst_arcmin < 3.0
+        assert problem(noisy) == ""
+
+
+def test_a_turned_depth_camera_fails_and_is_named() -> None:
+    was = turned(RIG, [0.0, np.radians(0.5), 0.0])
+    found = [accepted(RIG, was, eye, noise_px=0.05) for eye in EYES]
+    assert all("more than 5′" in problem(one) for one in found)
+    assert "a depth camera turned by 0." in likely_cause(found)
+    assert all(
+        np.linalg.norm(one.turn_rad) == pytest.approx(np.radians(0.5), rel=0.2) for one in found
+    )
+
+
+def test_a_depth_camera_that_has_only_shifted_passes() -> None:
+    found = accepted(RIG, turned(RIG, [0.0, 0.0, 0.0], [0.002, 0.0, 0.0]), "left")
+    assert problem(found) == ""
+    assert np.linalg.norm(found.shift_m - PHI_M) == pytest.approx(0.002, rel=0.05)
+
+
+def test_a_changed_display_is_not_taken_for_the_depth_camera() -> None:
+    left = RIG.eyes["left"]
+    H = np.array([[1.0, 0.0, 15.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    changed = replace(left, K=H @ left.K)
+    was = replace(RIG, eyes={**RIG.eyes, "left": changed})
+    found = [accepted(RIG, was, "left", noise_px=0.05)]
+    assert problem(found[0])
+    assert "depth camera turned" not in likely_cause(found)
+    both = [*found, accepted(RIG, was, "right", noise_px=0.05)]
+    assert "depth camera turned" not in likely_cause(both)
+
+
+def test_a_camera_far_from_the_eye_and_too_few_views_are_refused() -> None:
+    far_m = np.array([0.02, 0.0, 0.0])
+    assert "20 mm from the eye's place" in problem(accepted(RIG, RIG, "left", shift_m=far_m))
+    display = RIG.eyes["left"]
+    with pytest.raises(ViewsError, match="take at least 5"):
+        accept_eye(
+            RIG,
+            display,
+            DisplayHomography(np.eye(3), {}, 0.0, 0.0),
+            VIEWPOINT_CAMERA,
+            {},
+            DEPTH_CAMERA,
+        )

@@ -1,0 +1,112 @@
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.display import reprojection_error_px
+from handcal.errors import FileError, HandcalError
+from handcal.geometry import transform
+from handcal.link.client import HeadsetClient
+from handcal.link.server import HeadsetServer
+from handcal.rig.cube import Cube
+from handcal.rig.cube_track import TrackedCube, cube_corners_m
+from handcal.session.session import Session
+from handcal.sim.cube_bench import CubeBench
+from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
+from handcal.station.user_test import TrialSettings, run_user_trials
+from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics, Shape
+from tests.helpers import ROOT
+
+TRUE_M: dict[Eye, Float64] = {
+    "left": np.array([0.002, 0.001, 0.003]),
+    "right": np.array([-0.004, -0.001, 0.0]),
+}
+CAMERA = Intrinsics(640, 360, 502.0, 502.0, 319.5, 179.5)
+KEY = b"a key of the cube tests"
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[Session]:
+    shutil.copytree(ROOT / "resources" / "example_session", tmp_path / "session")
+    with Session(tmp_path / "session") as session:
+        yield session
+
+
+@pytest.fixture
+def bench(session: Session) -> Iterator[tuple[HeadsetServer, HeadsetClient, CubeBench]]:
+    rig = replace(Session.open(session.path).rig, depth_intrinsics=CAMERA)
+    identity = HeadsetIdentity("0123456789abcdef", "Simulated headset", "simulator")
+    with HeadsetServer(KEY) as server, HeadsetClient(server.address, KEY, identity) as client:
+        server.wait_connected(10.0)
+        with CubeBench(client, rig, Cube(), TRUE_M) as bench:
+            yield server, client, bench
+
+
+def tracker(session: Session, server: HeadsetServer, bench: CubeBench) -> CubeTracker:
+    T_H_D = Session.open(session.path).rig.T_H_D
+    return CubeTracker(bench, Cube(), T_H_D, server.pose_at_host_ns)
+
+
+def test_the_tracked_cube_is_drawn_where_it_is(
+    session: Session,
+    bench: tuple[HeadsetServer, HeadsetClient, CubeBench],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    server, client, room = bench
+    cube, drawn = tracker(session, server, room), list[Shape | None]()
+    step = cube.step
+
+    def look_and_step() -> TrackedCube | None:
+        drawn.append(client.state().shape)
+        return step()
+
+    monkeypatch.setattr(cube, "step", look_and_step)
+    found = run_cube_tracking(cube, server, 1.5)
+    assert len(found.tracked) > 5
+    error_m = np.linalg.norm(found.tracked[-1].T_W_T[:3, 3] - room.T_W_T[:3, 3])
+    assert error_m < 0.0015
+    assert drawn[-1] is not None
+    true_m = transform(room.T_W_T, cube_corners_m(Cube()))
+    np.testing.assert_allclose(drawn[-1].corners_W_m, true_m, atol=0.003)
+
+
+def test_the_trials_measure_the_true_error(
+    session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
+) -> None:
+    server, _, room = bench
+    before = len(Session.open(session.path).trials)
+    settings = TrialSettings(depths_m=(0.4, 0.6))
+    made = run_user_trials(
+        session, server, tracker(session, server, room), room.adjust, room.place, settings
+    )
+    record = Session.open(session.path)
+    assert len(record.trials) == before + 4
+    assert [trial.eye for trial in made] == ["left", "right"] * 2
+    for trial in made:
+        assert np.ptp(trial.corners_E_m[:, 2]) > 0.005  # a face of the turned cube
+        true_px = reprojection_error_px(
+            record.rig.eyes[trial.eye],
+            trial.calibrated_shift_m,
+            TRUE_M[trial.eye],
+            trial.corners_E_m,
+        )
+        np.testing.assert_allclose(trial.error_px.mean(), true_px.mean(), rtol=0.25, atol=2.0)
+
+
+def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
+    session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
+) -> None:
+    server, _, room = bench
+    impatient = TrialSettings(depths_m=(0.6,), patience_s=0.5)
+    cube = tracker(session, server, room)
+    with pytest.raises(HandcalError, match=r"0\.\d+ m from the eyes; put it down there"):
+        run_user_trials(session, server, cube, room.adjust, lambda _: room.place(0.45), impatient)
+    rig = Session.open(session.path).rig
+    with (
+        Session.create(session.path.parent, rig, {}) as empty,
+        pytest.raises(FileError, match="left eye is not solved"),
+    ):
+        run_user_trials(empty, server, cube, room.adjust, room.place, impatient)
