@@ -5,7 +5,7 @@
 #   bash installer/build.sh windows    handcal-setup-VERSION.exe, for Windows 10 and 11
 #   bash installer/build.sh all
 # Runs on Debian 12 or newer with Python 3.11 to 3.13 (PYTHON names another than python3); deb
-# needs dpkg-dev, windows needs nsis and unzip. docs/platforms.md says what was measured.
+# needs binutils, windows needs nsis and unzip. docs/platforms.md says what was measured.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 work=$PWD/dist/work
@@ -39,7 +39,7 @@ build_wheel() {
 }
 
 build_deb() {
-    require dpkg-shlibdeps dpkg-dev
+    require objdump binutils
     local root=$work/deb depends size
     "$python" -m pip --quiet install --no-deps --force-reinstall "$wheel"
     # Elsewhere, so that it finds the installed program and not the checkout.
@@ -72,17 +72,19 @@ CONTROL
     dpkg-deb --root-owner-group -Zzstd -z9 --build "$root" "dist/handcal_${version}_amd64.deb"
 }
 
-# Prints the packages of the system's libraries that the bundle loads.
+# Prints the packages of the system's libraries that the bundle loads, for the control file.
 system_packages() {
-    local folder
-    folder=$(mktemp -d)
-    mkdir "$folder/debian"
-    echo "Source: handcal" >"$folder/debian/control"
-    find "$1" -type f \( -name '*.so*' -o -name handcal-gui \) -print0 |
-        (cd "$folder" && xargs -0 dpkg-shlibdeps -O --ignore-missing-info --warnings=0 \
-            -l"$1/_internal" $(find "$1/_internal" -name '*.libs' -printf '-l%p ') \
-            -l"$1/_internal/PySide6/Qt/lib") | sed 's/^shlibs:Depends=//'
-    rm -r "$folder"
+    local files glibc needed packages
+    files=$(find "$1" -type f \( -name '*.so*' -o -name handcal-gui \))
+    glibc=$(objdump -T $files | grep -o 'GLIBC_2\.[0-9.]*' | sort -uV | tail -1)
+    needed=$(objdump -p $files | awk '$1 == "NEEDED" { print $2 }' | sort -u)
+    packages=$(for library in $needed; do
+        [[ -n $(find "$1" -name "$library" -print -quit) || $library == ld-linux* ]] && continue
+        path=$(ldconfig -p | awk -v name="$library" '$1 == name { print $NF; exit }')
+        dpkg-query -S "*/${path##*/}" 2>/dev/null | grep -m1 -o '^[^:]*' ||
+            fail "$library is missing; install it, so that its package becomes a dependency"
+    done | sort -u | grep -vx libc6)
+    echo "libc6 (>= ${glibc#GLIBC_}), $(echo "$packages" | paste -sd, | sed 's/,/, /g')"
 }
 
 build_windows() {
