@@ -45,7 +45,7 @@ that of zeroconf (LGPL 2.1) at https://github.com/python-zeroconf/python-zerocon
 def is_licence(path: str) -> bool:
     """Return whether a file of a package, by its path in it, is a licence or a notice."""
     place = PurePosixPath(path)
-    if place.suffix.lower() in _CODE:
+    if path.endswith("/") or place.suffix.lower() in _CODE:
         return False
     in_folder = "dist-info/licenses/" in path or "dist-info/license_files/" in path
     return in_folder or bool(_LICENCE.match(place.name))

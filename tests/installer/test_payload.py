@@ -64,6 +64,7 @@ def test_licences_are_collected_from_wheels(tmp_path: Path) -> None:
             "good-1.0.dist-info/licenses/LICENSE": "the licence",
             "good/vendor/COPYING.txt": "another",
             "good/licence.py": "code",
+            "good-1.0.dist-info/licenses/parts/": "",
         },
     )
     script["collect"](tmp_path / "found", script["of_wheels"]([wheel]))
