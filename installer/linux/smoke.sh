@@ -17,8 +17,13 @@ inside apt-get update -qq
 inside apt-get install -y -qq --no-install-recommends "/root/${package##*/}"
 inside handcal doctor
 rm -rf "$folder/root/demo"
+log=$(mktemp)
 time inside handcal-gui --source simulator --autopilot --seed 1 --output /root/demo \
-    --preferences /root/demo/preferences.json
+    --preferences /root/demo/preferences.json 2> >(tee "$log" >&2)
+if grep -q 'Traceback\|No such file' "$log"; then
+    echo "the program complained" >&2
+    exit 1
+fi
 find "$folder/root/demo" -name '*.pdf' -o -name '*.svg' -o -name results.json | sort
 test -n "$(find "$folder/root/demo" -name '*.pdf')"
 inside apt-get remove -y -qq handcal
