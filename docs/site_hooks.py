@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
-ROOT_PAGES = ("CHANGELOG.md", "CONTRIBUTING.md")
+ROOT_PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")
 LOGO = "resources/icons/handcal.svg"
 _OUTSIDE = re.compile(r"\]\(\.\./([^)#\s]+)")
 _AT_ROOT = re.compile(r"\]\((?!docs/|https?:|#)([^)#\s]+)")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QMessageBox
 
 from handcal.io.configuration import keep_font_list_in_configuration
 from handcal.io.x_display import x_server_answers
@@ -145,5 +145,11 @@ def _require_display() -> None:
 
 
 def _fail(message: str, code: int) -> NoReturn:
-    sys.stderr.write(f"handcal-gui: {' '.join(message.split())}\n")
+    line = " ".join(message.split())
+    if sys.stderr is None:  # on Windows, a window has no console
+        app = QApplication.instance() or QApplication(sys.argv[:1])
+        QMessageBox.critical(None, "handcal", line)
+        app.quit()
+    else:
+        sys.stderr.write(f"handcal-gui: {line}\n")
     sys.exit(code)

@@ -7,12 +7,13 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QObject, QSize, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
+from handcal.io.resources import resource_path
 from handcal.link.pairing import Pairings
 from handcal.session.session import SessionRecord
 from handcal.station.settings import StationSettings
@@ -45,6 +46,7 @@ from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from handcal_gui.windows.manual import Manual
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.wizard import RigWizard
 
@@ -66,6 +68,7 @@ class Program(QObject):
     review : ReviewController
     inspection : Inspection
     start : StartPage
+    manual : Manual
     """
 
     def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
@@ -95,6 +98,7 @@ class Program(QObject):
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
+        self.manual = Manual(self.window)
         comparison = Comparison(panels.results)
         self.live = CalibrationController(self.window, self.wizard_panel, comparison)
         self.review = ReviewController(self.window, review_page, comparison)
@@ -271,7 +275,12 @@ class Program(QObject):
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
         add("File", "&Quit", "Ctrl+Q", self.window.close)
         add("View", "&Reset layout", "", self.window.reset_layout)
+        add("Help", "&Manual", "", lambda: self._read("docs/index.md"))
+        add("Help", "Headset &protocol", "", lambda: self._read("docs/protocol.md"))
+        add("Help", "&Examples in Python", "", lambda: self._show_folder("examples"))
+        add("Help", "&Unity package", "", lambda: self._show_folder("unity"))
         add("Help", "&Keys", "F1", self._show_keys)
+        add("Help", "&Licences", "", lambda: self._read("THIRD-PARTY.md"))
         add("Help", "&About handcal", "", self._show_about)
 
     def _restore(self) -> None:
@@ -363,6 +372,21 @@ class Program(QObject):
 
     def _show_keys(self) -> None:
         QMessageBox.information(self.window, "Keys", keys_html(self.window))
+
+    def _read(self, page: str) -> None:
+        try:
+            self.manual.open(page)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+
+    def _show_folder(self, name: str) -> None:
+        try:
+            folder = resource_path(name)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            self.window.banner.show_message(f"No file manager was found; the folder is {folder}")
 
     def _show_about(self) -> None:
         QMessageBox.about(

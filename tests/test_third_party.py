@@ -38,7 +38,7 @@ def test_what_these_need_in_turn_is_listed_as_in_the_lock() -> None:
             versions.setdefault(match[1], []).append(match[2])
             users = re.findall(r"^    #(?: via|  ) +(\S.*)$", block, re.MULTILINE)
             needed_by[match[1]] = ", ".join(users)
-    direct = {row[0].lower() for row in DIRECT}
+    direct = {row[0].lower().replace("_", "-") for row in DIRECT}
     assert [[row[0], row[1], row[3]] for row in IN_TURN] == [
         [name, ", ".join(found), re.sub(r"handcal \(.*?\)", "the set-up", needed_by[name])]
         for name, found in versions.items()

@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from typing import NamedTuple
 
 from handcal.cli.terminal import Command, Parser, errors_in_one_line
@@ -178,6 +179,9 @@ COMMANDS: Mapping[str, Entry] = {
 def main() -> None:
     """Run a command; every expected error is one line."""
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # its warnings would be further lines
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # Windows writes files and pipes without φ and →
+            stream.reconfigure(errors="replace")
     with errors_in_one_line():
         arguments = parse(sys.argv[1:])
         # Imported late: --help needs nothing of it.

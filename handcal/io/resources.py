@@ -8,7 +8,7 @@ from handcal.errors import FileError
 
 
 def resource_path(name: str) -> Path:
-    """Return the path of the shipped file `name`.
+    """Return the path of the shipped file or folder `name`, such as ``docs/guide.md``.
 
     Raises
     ------
@@ -16,7 +16,11 @@ def resource_path(name: str) -> Path:
         If it is missing, because the installation is damaged.
     """
     package = Path(__file__).parents[1]
-    for folder in (package / "_resources", package.parent / "resources"):
+    root = package.parent
+    folders = [package / "_resources"]
+    if (root / "pyproject.toml").exists():  # a checkout
+        folders = [root / "resources", root]
+    for folder in folders:
         if (path := folder / name).exists():
             return path
     raise FileError(f"the shipped file {name} is missing; install handcal again")

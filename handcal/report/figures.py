@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from matplotlib import rc_context
+
+# matplotlib imports them by name, so that packagers would not find them.
+from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
 from matplotlib.figure import Figure as Canvas
 
 from handcal.io.files import make_folder, write_atomic

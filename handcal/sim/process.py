@@ -18,9 +18,6 @@ _END_S = 5.0
 
 def program_command() -> list[str]:
     """Return the command that starts the command line, also in a packaged program."""
-    if getattr(sys, "frozen", False):  # there sys.executable may be the window
-        program = Path(sys.executable)
-        return [str(program.with_name(f"handcal{program.suffix}"))]
     return [sys.executable, "-m", "handcal"]
 
 

@@ -49,6 +49,7 @@ _PACKAGES = (
 _CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
 _SETTLE_S = 2.0
 _POLL_S = 0.05
+_LONGEST_STEP_MS = 1.0
 _LEAST_FREE_BYTES = 500 * 2**20
 
 
@@ -82,6 +83,7 @@ def examine(rig: Path | None = None) -> list[Finding]:
     """
     return [
         _python(),
+        _clock(),
         *_packages(),
         _examples(),
         _hand_detector(),
@@ -139,14 +141,31 @@ def _python() -> Finding:
     return Finding("Python", Health.BROKEN, found, "use Python 3.11, 3.12 or 3.13")
 
 
+def _clock() -> Finding:
+    step_ms = 1e3 * time.get_clock_info("monotonic").resolution
+    if step_ms < _LONGEST_STEP_MS:
+        return Finding("Clock", Health.GOOD, f"steps of at most {_LONGEST_STEP_MS} ms")
+    found = f"steps of {step_ms:.1f} ms, in which frames and head poses cannot be matched"
+    return Finding("Clock", Health.LIMITED, found, "on Windows, use Python 3.13")
+
+
+def _install_again() -> str:
+    """Return the advice for a damaged installation, which depends on how handcal was installed."""
+    if getattr(sys, "frozen", False):
+        return "install the Debian package of handcal again"
+    return {
+        "linux": "run bash installer/run.sh, or pip install handcal",
+        "win32": "run the setup of handcal again, or pip install handcal",
+    }.get(sys.platform, "pip install handcal")
+
+
 def _packages() -> list[Finding]:
     findings = []
     for name in _PACKAGES:
         try:
             version = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            advice = "run bash installer/run.sh, or pip install handcal"
-            findings.append(Finding(name, Health.BROKEN, "not installed", advice))
+            findings.append(Finding(name, Health.BROKEN, "not installed", _install_again()))
         else:
             findings.append(Finding(name, Health.GOOD, version))
     return findings
@@ -156,14 +175,14 @@ def _examples() -> Finding:
     def read() -> str:
         return read_rig(resource_path("example_rig.yaml")).name
 
-    return _try("Example rig", read, "install handcal again")
+    return _try("Example rig", read, _install_again())
 
 
 def _hand_detector() -> Finding:
     try:
         detector = load_detector()
     except HandcalError as error:
-        advice = "hands are found by depth alone; install handcal again"
+        advice = f"hands are found by depth alone; {_install_again()}"
         return Finding("Hand detector", Health.LIMITED, str(error), advice)
     return Finding("Hand detector", Health.GOOD, f"runs {detector.model.name}")
 
@@ -175,7 +194,10 @@ def _network() -> Finding:
         transport.close()
         return f"UDP works on the loopback interface (port {port})"
 
-    return _try("Network", bind, "let the firewall pass UDP on the loopback interface")
+    advice = "let the firewall pass UDP on the loopback interface"
+    if sys.platform == "win32":
+        advice = "in Windows Security, let handcal's Python pass the firewall in private networks"
+    return _try("Network", bind, advice)
 
 
 def _pairing() -> Finding:
@@ -200,6 +222,8 @@ def _cameras(rig: Path | None) -> list[Finding]:
         return [Finding("RealSense SDK", Health.LIMITED, str(error), "needed for real cameras")]
     if not devices:
         advice = "the simulator and recordings work without"
+        if sys.platform == "win32":
+            advice += "; a plugged-in camera needs Settings, Privacy, Camera, desktop apps: on"
         return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
     return [with_rig(examine_camera(device), rig, device.identity) for device in devices]
 

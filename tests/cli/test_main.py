@@ -21,6 +21,7 @@ import pytest
 from handcal.camera.folder import record_folder
 from handcal.cli.main import main
 from handcal.geometry import rigid
+from handcal.io.resources import resource_path
 from handcal.lab import bench
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.progress import Progress
@@ -411,6 +412,18 @@ def test_an_output_that_cannot_be_written_is_one_line(argument: str) -> None:
         )
     assert ended.returncode == 1
     assert ended.stderr == "handcal: cannot write the output: No space left on device\n"
+
+
+@pytest.mark.process
+def test_an_output_without_greek_letters_as_a_file_of_windows_gets_question_marks() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "handcal", "solve", resource_path("example_session")],
+        env=os.environ | {"PYTHONIOENCODING": "cp1252"},
+        capture_output=True,
+        check=True,
+    )
+    assert b"?, mm" in ended.stdout
+    assert ended.stderr == b""
 
 
 def test_each_command_is_listed_with_its_purpose(

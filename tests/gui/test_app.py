@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QApplication, QMessageBox
 
 from handcal_gui import app
 
@@ -62,6 +63,20 @@ def test_wrong_arguments(
     what: str,
 ) -> None:
     assert what in complaint(capsys, monkeypatch, *words)
+
+
+def test_without_a_console_as_on_windows_a_message_is_shown_in_a_box(
+    qapp: QApplication, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr(QMessageBox, "critical", lambda *words: shown.append(words[2]))
+    monkeypatch.setattr(qapp, "quit", lambda: None)
+    monkeypatch.setattr(sys, "argv", ["handcal-gui", "--rig"])
+    monkeypatch.setattr(sys, "stderr", None)
+    with pytest.raises(SystemExit) as ended:
+        app.main()
+    assert ended.value.code == 2
+    assert shown == ["argument --rig: expected one argument; see handcal-gui --help"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux may be without a display")

@@ -23,7 +23,6 @@ from handcal.link.server import Confirmation, HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.headset import HeadsetSettings, run_headset
-from handcal.sim.process import program_command
 from handcal.sim.scene import SceneReceiver, SceneState
 from handcal.types import EYES, Projection
 
@@ -115,13 +114,6 @@ def test_a_wearer_in_another_process_aligns_and_confirms(
 @pytest.fixture
 def settings(server: HeadsetServer, light: SceneReceiver) -> HeadsetSettings:
     return HeadsetSettings(str(RIG_PATH), server.address[1], light.port, patience_s=0.3)
-
-
-def test_a_packaged_program_starts_its_own_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert program_command() == [sys.executable, "-m", "handcal"]
-    monkeypatch.setattr(sys, "frozen", True, raising=False)
-    monkeypatch.setattr(sys, "executable", "/opt/handcal/handcal-gui.exe")
-    assert program_command() == ["/opt/handcal/handcal.exe"]
 
 
 def test_it_ends_when_the_time_is_over(settings: HeadsetSettings) -> None:

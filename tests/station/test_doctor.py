@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import shutil
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,6 +66,40 @@ def test_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("system", "advice"),
+    [
+        ({"platform": "linux", "frozen": True}, "install the Debian package of handcal again"),
+        ({"platform": "win32"}, "run the setup of handcal again, or pip install handcal"),
+        ({"platform": "darwin"}, "pip install handcal"),
+    ],
+)
+def test_advice_for_a_damaged_installation_is_that_of_the_platform(
+    system: dict[str, object], advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "sys", SimpleNamespace(version_info=(3, 13), **system))
+    monkeypatch.setattr(doctor, "read_rig", fail_with(FileError("rig.yaml is damaged")))
+    assert of("Example rig").advice == advice
+
+
+def test_a_clock_as_that_of_windows_before_python_3_13(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert of("Clock").health is Health.GOOD
+    clock = SimpleNamespace(resolution=0.015625)
+    monkeypatch.setattr(time, "get_clock_info", lambda _: clock)
+    assert "15.6 ms" in of("Clock").found
+    assert "3.13" in of("Clock").advice
+
+
+def test_on_windows_the_network_and_the_camera_have_advice_of_their_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(doctor, "sys", SimpleNamespace(version_info=(3, 13), platform="win32"))
+    monkeypatch.setattr(doctor, "UdpTransport", fail_with(LinkError("blocked")))
+    monkeypatch.setattr(doctor, "connected_devices", tuple)
+    assert "Windows Security" in of("Network").advice
+    assert "Privacy" in of("Camera").advice
+
+
 def test_a_missing_hand_detector_leaves_the_depth(monkeypatch: pytest.MonkeyPatch) -> None:
     assert of("Hand detector") == Finding("Hand detector", Health.GOOD, "runs some.onnx")
     monkeypatch.setattr(doctor, "load_detector", fail_with(FileError("no model")))
@@ -72,7 +107,7 @@ def test_a_missing_hand_detector_leaves_the_depth(monkeypatch: pytest.MonkeyPatc
         "Hand detector",
         Health.LIMITED,
         "no model",
-        "hands are found by depth alone; install handcal again",
+        "hands are found by depth alone; run bash installer/run.sh, or pip install handcal",
     )
 
 

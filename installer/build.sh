@@ -1,0 +1,126 @@
+#!/usr/bin/env bash
+# Builds what is given to users, in dist/:
+#   bash installer/build.sh wheel      handcal-VERSION-py3-none-any.whl
+#   bash installer/build.sh deb        handcal_VERSION_amd64.deb, for Debian and Ubuntu
+#   bash installer/build.sh windows    handcal-setup-VERSION.exe, for Windows 10 and 11
+#   bash installer/build.sh all
+# Runs on Debian 12 or newer with Python 3.11 to 3.13 (PYTHON names another than python3); deb
+# needs binutils, windows needs nsis and unzip. docs/platforms.md says what was measured.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+work=$PWD/dist/work
+python=$work/venv/bin/python
+
+fail() {
+    echo "build: $*" >&2
+    exit 1
+}
+
+require() {
+    command -v "$1" >/dev/null || fail "$1 is missing; run apt-get install $2"
+}
+
+# Installs the tools and the program's packages, by the hashes of the lock.
+make_environment() {
+    local lock=installer/requirements-build.lock state
+    state=$(sha256sum <"$lock")
+    [[ -x $python && $(cat "$work/venv/state" 2>/dev/null) == "$state" ]] && return
+    "${PYTHON:-python3}" -m venv --clear "$work/venv"
+    "$python" -m pip --disable-pip-version-check --quiet install --require-hashes -r "$lock" ||
+        fail "the packages could not be installed; is this computer online?"
+    echo "$state" >"$work/venv/state"
+}
+
+build_wheel() {
+    rm -f dist/handcal-*.whl
+    "$python" -m hatchling build -t wheel -d dist
+    wheel=$(echo dist/handcal-*.whl)
+    version=$("$python" -m hatchling version)
+}
+
+build_deb() {
+    require objdump binutils
+    local root=$work/deb depends size
+    "$python" -m pip --quiet install --no-deps --force-reinstall "$wheel"
+    # Elsewhere, so that it finds the installed program and not the checkout.
+    (cd "$work" && "$python" -m PyInstaller --noconfirm --log-level WARN --distpath "$work" \
+        --workpath "$work/pyinstaller" "$OLDPWD/installer/linux/handcal.spec")
+    rm -rf "$root"
+    install -d "$root"/{DEBIAN,opt,usr/bin,usr/share/doc/handcal}
+    cp -a "$work/handcal" "$root/opt/handcal"
+    "$python" installer/licences.py "$root/opt/handcal/licences"
+    ln -s /opt/handcal/handcal-gui "$root/usr/bin/handcal-gui"
+    ln -s /opt/handcal/handcal-gui "$root/usr/bin/handcal" # the name makes it the command line
+    install -Dm644 installer/linux/handcal.desktop -t "$root/usr/share/applications"
+    install -Dm644 resources/icons/handcal.svg -t "$root/usr/share/icons/hicolor/scalable/apps"
+    install -Dm644 installer/linux/60-handcal-realsense.rules -t "$root/lib/udev/rules.d"
+    cat LICENSE THIRD-PARTY.md >"$root/usr/share/doc/handcal/copyright"
+    depends=$(system_packages "$root/opt/handcal")
+    size=$(du -sk "$root" | cut -f1)
+    cat >"$root/DEBIAN/control" <<CONTROL
+Package: handcal
+Version: $version
+Architecture: amd64
+Maintainer: the handcal authors <handcal@localhost>
+Installed-Size: $size
+Depends: $depends, libgl1, libegl1, fonts-dejavu-core
+Section: science
+Priority: optional
+Description: calibrate an optical see-through headset with the wearer's bare hand
+ A window (handcal-gui) and a command line (handcal), with a simulator that needs no hardware.
+CONTROL
+    dpkg-deb --root-owner-group -Zzstd -z9 --build "$root" "dist/handcal_${version}_amd64.deb"
+}
+
+# Prints the packages of the system's libraries that the bundle loads, for the control file.
+system_packages() {
+    local files glibc needed packages
+    files=$(find "$1" -type f \( -name '*.so*' -o -name handcal-gui \))
+    glibc=$(objdump -T $files | grep -o 'GLIBC_2\.[0-9.]*' | sort -uV | tail -1)
+    needed=$(objdump -p $files | awk '$1 == "NEEDED" { print $2 }' | sort -u)
+    packages=$(for library in $needed; do
+        [[ -n $(find "$1" -name "$library" -print -quit) || $library == ld-linux* ]] && continue
+        path=$(ldconfig -p | awk -v name="$library" '$1 == name { print $NF; exit }')
+        dpkg-query -S "*/${path##*/}" 2>/dev/null | grep -m1 -o '^[^:]*' ||
+            fail "$library is missing; install it, so that its package becomes a dependency"
+    done | sort -u | grep -vx libc6)
+    echo "libc6 (>= ${glibc#GLIBC_}), $(echo "$packages" | paste -sd, | sed 's/,/, /g')"
+}
+
+build_windows() {
+    require makensis nsis
+    require unzip unzip
+    local root=$work/windows
+    rm -rf "$root"
+    mkdir -p "$root/wheels"
+    "$python" installer/windows/requirements.py installer/requirements-build.lock "$root"
+    "$python" -m pip --disable-pip-version-check --quiet download --no-deps --require-hashes \
+        --only-binary=:all: --platform win_amd64 --python-version 3.13 \
+        -r "$root/requirements.txt" -d "$root/wheels"
+    "$python" -m pip --disable-pip-version-check --quiet download --no-deps --require-hashes \
+        --only-binary=:all: --platform win_amd64 -r "$root/tools.txt" -d "$root"
+    cp "$wheel" "$root/wheels"
+    "$python" installer/licences.py "$root/licences" "$root"/wheels/*.whl "$root"/uv-*.whl
+    unzip -qjo "$root"/uv-*.whl '*/scripts/uv.exe' -d "$root"
+    rm "$root"/uv-*.whl "$root/tools.txt"
+    cp installer/windows/setup-environment.cmd "$root"
+    QT_QPA_PLATFORM=offscreen "$python" -c "$(printf '%s\n' \
+        'import sys' 'from PySide6.QtGui import QGuiApplication, QIcon' \
+        'app = QGuiApplication([])' \
+        'sys.exit(not QIcon(sys.argv[1]).pixmap(256, 256).save(sys.argv[2]))')" \
+        resources/icons/handcal.svg "$root/handcal.ico"
+    makensis -V2 -DVERSION="$version" -DPAYLOAD="$root" -DOUTPUT="$PWD/dist/handcal-setup-$version.exe" \
+        installer/windows/handcal.nsi
+}
+
+case ${1:-} in
+wheel | deb | windows) wanted=(wheel "$1") ;;
+all) wanted=(wheel deb windows) ;;
+*) fail "say what to build: wheel, deb, windows or all" ;;
+esac
+mkdir -p "$work"
+make_environment
+for one in $(printf '%s\n' "${wanted[@]}" | awk '!seen[$0]++'); do
+    "build_$one"
+done
+ls -l dist/handcal*

@@ -1,0 +1,81 @@
+"""What the Windows setup carries by the lock, and the licences of everything that is shipped."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.helpers import ROOT
+
+LOCK = ROOT / "installer/requirements-build.lock"
+
+
+@pytest.fixture
+def requirements(tmp_path: Path) -> dict[str, str]:
+    script = ROOT / "installer/windows/requirements.py"
+    subprocess.run([sys.executable, script, LOCK, tmp_path], check=True)
+    text = "".join((tmp_path / name).read_text() for name in ("requirements.txt", "tools.txt"))
+    blocks = re.findall(r"^([\w.-]+)==(\S+) \\\n((?: +--hash.*\n)+)", text, re.MULTILINE)
+    assert len(blocks) == len(re.findall(r"^\S+==", text, re.MULTILINE))
+    return {name: version for name, version, _ in blocks}
+
+
+@pytest.mark.process
+def test_the_setup_has_every_package_that_the_program_needs_and_no_tool(
+    requirements: dict[str, str],
+) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    for requirement in project["dependencies"]:
+        name = re.split(r"[^\w.-]", requirement)[0].lower().replace("_", "-")
+        assert name in requirements
+    assert {"hatchling", "pyinstaller", "macholib", "pefile"}.isdisjoint(requirements)
+    assert {"uv", "shiboken6", "flatbuffers"} <= set(requirements)
+
+
+@pytest.mark.process
+def test_of_two_versions_it_takes_that_of_its_python(requirements: dict[str, str]) -> None:
+    (newer,) = re.findall(
+        r"^numpy==(\S+) ; python_full_version >= ", LOCK.read_text(), re.MULTILINE
+    )
+    assert requirements["numpy"] == newer
+
+
+def make_wheel(folder: Path, name: str, files: dict[str, str]) -> Path:
+    wheel = folder / f"{name}-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for path, text in files.items():
+            archive.writestr(path, text)
+    return wheel
+
+
+def test_licences_are_collected_from_wheels(tmp_path: Path) -> None:
+    script = runpy.run_path(str(ROOT / "installer/licences.py"))
+    wheel = make_wheel(
+        tmp_path,
+        "good",
+        {
+            "good-1.0.dist-info/licenses/LICENSE": "the licence",
+            "good/vendor/COPYING.txt": "another",
+            "good/licence.py": "code",
+            "good-1.0.dist-info/licenses/parts/": "",
+        },
+    )
+    script["collect"](tmp_path / "found", script["of_wheels"]([wheel]))
+    found = {path.name: path.read_text() for path in (tmp_path / "found/good").iterdir()}
+    assert found == {"LICENSE": "the licence", "good-vendor-COPYING.txt": "another"}
+    assert (tmp_path / "found/LICENSE").read_text() == (ROOT / "LICENSE").read_text()
+    assert "LGPL" in (tmp_path / "found/README.txt").read_text()
+
+
+def test_a_package_without_a_licence_is_refused(tmp_path: Path) -> None:
+    script = runpy.run_path(str(ROOT / "installer/licences.py"))
+    wheel = make_wheel(tmp_path, "bad", {"bad/__init__.py": ""})
+    with pytest.raises(SystemExit, match="no licence was found of bad"):
+        script["collect"](tmp_path / "found", script["of_wheels"]([wheel]))
