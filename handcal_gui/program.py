@@ -11,9 +11,11 @@ from PySide6.QtCore import QByteArray, QObject, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
-from handcal.errors import FileError
+from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings
 from handcal.link.pairing import Pairings
+from handcal.link.server import HeadsetServer
+from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
@@ -22,6 +24,7 @@ from handcal_gui.control.compare import Comparison
 from handcal_gui.control.inspection import Inspection
 from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
+from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
@@ -170,6 +173,23 @@ class Program(QObject):
         self.window.banner.show_message("The 3D window opens in a few seconds.")
         self.inspection.start(record)
 
+    def connect_headset(self) -> ConnectDialog | None:
+        """Open the dialog that pairs and tries a headset; return None if it cannot be opened."""
+        settings, snapshot = self.start.new.settings, self.live.snapshot
+        link = self.live.link
+        try:
+            rig = snapshot.record.rig if snapshot else read_rig(settings.rig_path)
+            server = link or HeadsetServer(self._pairings, (settings.host, settings.port))
+        except HandcalError as error:
+            self.window.banner.show_message(str(error))
+            return None
+        dialog = ConnectDialog(server, rig, is_calibrating=link is not None, parent=self.window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.finished.connect(self.start.new.check)
+        dialog.open()
+        keep_on_screen(dialog)
+        return dialog
+
     def calibrate_rig(self) -> RigWizard | None:
         """Open the wizard of the offline calibration; return None if its folder cannot be used."""
         try:
@@ -216,6 +236,8 @@ class Program(QObject):
         )
         for dialog in self.window.findChildren(ExportDialog):
             dialog.stop()
+        for connecting in self.window.findChildren(ConnectDialog):
+            connecting.stop()
         for wizard in self.window.findChildren(RigWizard):
             wizard.accept()
         for evaluation in self.window.findChildren(EvaluationWindow):
@@ -232,6 +254,7 @@ class Program(QObject):
         self.start.open_requested.connect(self.open_session)
         self.start.example_requested.connect(self.open_example)
         self.start.rig_wanted.connect(self.calibrate_rig)
+        self.start.connect_wanted.connect(self.connect_headset)
         self.start.evaluation_wanted.connect(self.evaluate)
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
@@ -258,6 +281,7 @@ class Program(QObject):
         panels.session.inspect_requested.connect(self.inspect)
         self.inspection.failed.connect(self.window.banner.show_message)
         panels.link.new_key_requested.connect(self._renew_key)
+        panels.link.connect_requested.connect(self.connect_headset)
         self.window.closing.connect(self.close)
 
     def _make_menus(self) -> None:
@@ -266,6 +290,7 @@ class Program(QObject):
         add("File", "&Open session…", "Ctrl+O", self._browse)
         add("File", "&Export…", "Ctrl+E", self.export)
         add("File", "&Inspect in 3D", "", self.inspect)
+        add("File", "Connect a &headset…", "", self.connect_headset)
         add("File", "&Calibrate a rig…", "", self.calibrate_rig)
         add("File", "E&valuate…", "", self.evaluate)
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)

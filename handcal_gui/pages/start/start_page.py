@@ -40,8 +40,8 @@ class StartPage(QWidget):
         The settings of a station that has just passed its checks, and the wearer.
     open_requested, resume_requested : Signal(Path)
         The session's folder.
-    rig_wanted, evaluation_wanted : Signal()
-        The user wants to calibrate a rig, or to run studies and tests.
+    rig_wanted, connect_wanted, evaluation_wanted : Signal()
+        The user wants to calibrate a rig, to connect a headset, or to run studies and tests.
     cancel_requested : Signal()
         The user cancels the opening of the station.
     example_requested : Signal(Path)
@@ -52,6 +52,7 @@ class StartPage(QWidget):
     open_requested = Signal(object)
     resume_requested = Signal(object)
     rig_wanted = Signal()
+    connect_wanted = Signal()
     evaluation_wanted = Signal()
     cancel_requested = Signal()
     example_requested = Signal(object)
@@ -97,6 +98,7 @@ class StartPage(QWidget):
         self._find.answered.connect(self._show_sessions)
         self.new.start_requested.connect(self.start_requested)
         self.new.rig_wanted.connect(self.rig_wanted)
+        self.new.connect_wanted.connect(self.connect_wanted)
         self.new.cancel_requested.connect(self.cancel_requested)
         self.new.changed.connect(self._look_in_another_folder)
         self._unfinished.chosen.connect(self.resume_requested)

@@ -36,12 +36,13 @@ class StationForm(QWidget):
     Attributes
     ----------
     changed : Signal()
-    rig_wanted : Signal()
-        The user wants to calibrate a rig.
+    rig_wanted, connect_wanted : Signal()
+        The user wants to calibrate a rig, or to connect a headset.
     """
 
     changed = Signal()
     rig_wanted = Signal()
+    connect_wanted = Signal()
 
     def __init__(
         self,
@@ -55,6 +56,7 @@ class StationForm(QWidget):
         self._settings = settings
         self._camera = CameraField()
         self._headset = HeadsetField(pairing_key)
+        self._headset.connect_wanted.connect(self.connect_wanted)
         self._rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "Example rig")
         self._rig.setToolTip(
             "The offline calibration of headset and camera; the virtual headset accepts any."
