@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QMessageBox
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from handcal.errors import FileError, HandcalError
-from handcal.export.export import ExportSettings
+from handcal.export.export import ExportSettings, export_session
+from handcal.export.many import export_sessions
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer
+from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
-from handcal.session.session import SessionRecord
+from handcal.session.session import Session, SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX
@@ -25,7 +27,7 @@ from handcal_gui.control.inspection import Inspection
 from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
 from handcal_gui.dialogs.connect import ConnectDialog
-from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.dialogs.export import Export, ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.keys import keys_html
@@ -48,6 +50,7 @@ from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from handcal_gui.windows.library.window import LibraryWindow
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.wizard import RigWizard
 
@@ -157,7 +160,41 @@ class Program(QObject):
             self.window.banner.show_message("There is no alignment to export yet.")
             return None
         folder = folder or Path(self._preferences.export_folder or record.path.parent)
-        dialog = ExportDialog(record, self._preferences.export, folder, self.window)
+        return self._open_export(record, folder, self.window, export_session, "")
+
+    def show_library(self, folder: Path | None = None) -> LibraryWindow:
+        """Show the sessions of a folder, by default of the session folder."""
+        folder = folder or Path(self.start.new.settings.sessions)
+        window = LibraryWindow(folder, self.window)
+        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        window.open_requested.connect(self.open_session)
+        window.resume_requested.connect(self.resume_session)
+        window.export_requested.connect(lambda paths: self.export_many(paths, window))
+        window.finished.connect(self.start.look_for_sessions)
+        window.open()
+        keep_on_screen(window)
+        return window
+
+    def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog | None:
+        """Open the export dialog for several sessions, each to a folder of its own."""
+        try:
+            first = Session.open(paths[0])
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return None
+
+        def export(
+            _: SessionRecord, target: Path, settings: ExportSettings, progress: Progress
+        ) -> tuple[Path, ...]:
+            return export_sessions(paths, target, settings, progress)
+
+        folder = Path(self._preferences.export_folder or paths[0].parent)
+        return self._open_export(first, folder, parent, export, f"{len(paths)} sessions")
+
+    def _open_export(
+        self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
+    ) -> ExportDialog:
+        dialog = ExportDialog(record, self._preferences.export, folder, parent, export, name)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.remembered.connect(self._remember_export)
         dialog.open()
@@ -236,6 +273,8 @@ class Program(QObject):
         )
         for dialog in self.window.findChildren(ExportDialog):
             dialog.stop()
+        for library in self.window.findChildren(LibraryWindow):
+            library.stop()
         for connecting in self.window.findChildren(ConnectDialog):
             connecting.stop()
         for wizard in self.window.findChildren(RigWizard):
@@ -253,6 +292,7 @@ class Program(QObject):
         self.start.resume_requested.connect(self.resume_session)
         self.start.open_requested.connect(self.open_session)
         self.start.example_requested.connect(self.open_example)
+        self.start.library_requested.connect(self.show_library)
         self.start.rig_wanted.connect(self.calibrate_rig)
         self.start.connect_wanted.connect(self.connect_headset)
         self.start.evaluation_wanted.connect(self.evaluate)
@@ -288,6 +328,7 @@ class Program(QObject):
         add = self.window.add_action
         add("File", "&Next wearer", "Ctrl+N", self.show_start)
         add("File", "&Open session…", "Ctrl+O", self._browse)
+        add("File", "&Sessions…", "Ctrl+L", self.show_library)
         add("File", "&Export…", "Ctrl+E", self.export)
         add("File", "&Inspect in 3D", "", self.inspect)
         add("File", "Connect a &headset…", "", self.connect_headset)

@@ -44,6 +44,8 @@ class StartPage(QWidget):
         The user wants to calibrate a rig, to connect a headset, or to run studies and tests.
     cancel_requested : Signal()
         The user cancels the opening of the station.
+    library_requested : Signal(Path)
+        The user wants to see all sessions in a folder.
     example_requested : Signal(Path)
         The user wants to open the example; the session folder to copy it to.
     """
@@ -56,6 +58,7 @@ class StartPage(QWidget):
     evaluation_wanted = Signal()
     cancel_requested = Signal()
     example_requested = Signal(object)
+    library_requested = Signal(object)
 
     def __init__(
         self,
@@ -85,7 +88,8 @@ class StartPage(QWidget):
         example = button("example", "Example", "Open the example session")
         example.setToolTip("A simulated wearer's session, copied to the session folder")
         browse = button("browse", "Choose folder…")
-        for added in (browse, example):
+        library = button("library", "All sessions…", "Search, compare, export and repair sessions")
+        for added in (browse, example, library):
             self._opened.add_button(added)
         self._open.body.addWidget(self._opened, 1)
         self._evaluate = Card(
@@ -105,6 +109,7 @@ class StartPage(QWidget):
         self._opened.chosen.connect(self.open_requested)
         browse.clicked.connect(self.browse)
         example.clicked.connect(lambda: self.example_requested.emit(self._folder))
+        library.clicked.connect(lambda: self.library_requested.emit(self._folder))
         evaluate.clicked.connect(self.evaluation_wanted)
         self.show_preferences(preferences)
 
@@ -112,7 +117,7 @@ class StartPage(QWidget):
         """Show the preferences, for the next wearer."""
         self._recent = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
-        self._look_for_sessions()
+        self.look_for_sessions()
 
     def set_rig(self, path: Path) -> None:
         """Show another rig file; other entries stay as they are."""
@@ -142,13 +147,14 @@ class StartPage(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Search for sessions again."""
         super().showEvent(event)
-        self._look_for_sessions()
+        self.look_for_sessions()
 
     def _look_in_another_folder(self) -> None:
         if Path(self.new.settings.sessions) != self._folder:
-            self._look_for_sessions()
+            self.look_for_sessions()
 
-    def _look_for_sessions(self) -> None:
+    def look_for_sessions(self) -> None:
+        """Search for sessions again."""
         self._folder = Path(self.new.settings.sessions)
         self._find.ask((self._folder, self._recent))
 

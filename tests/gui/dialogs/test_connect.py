@@ -7,7 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QCheckBox, QLabel, QMessageBox, QPushButton, QTableWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QLabel,
+    QMessageBox,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.link.client import HeadsetClient
@@ -63,6 +70,17 @@ def button(dialog: ConnectDialog, name: str) -> QPushButton:
     return child(dialog, QPushButton, name)
 
 
+def cell(table: QTableWidget, row: int, column: int) -> QTableWidgetItem:
+    found = table.item(row, column)
+    assert found is not None
+    return found
+
+
+def eye_of_square(client: HeadsetClient) -> str:
+    target = client.state().target
+    return "" if target is None else target.eye
+
+
 def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog) -> None:
     assert text(dialog, "headsetFound").startswith("No headset is connected yet")
     assert child(dialog, QLabel, "headsetHealth").accessibleName() == "Note"
@@ -86,7 +104,7 @@ def test_a_headset_pairs_by_the_code_once(
     assert "App 1.2" in found
     assert "It sends no poses" in found
     table = child(dialog, QTableWidget, "pairedDevices")
-    assert table.item(0, 1).text() == f"{DEVICE}, connected"
+    assert cell(table, 0, 1).text() == f"{DEVICE}, connected"
     button(dialog, "invite").click()
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
 
@@ -111,7 +129,7 @@ def test_the_square_is_acknowledged_before_it_can_be_seen(
     assert set(client.state().projections) == {"right"}
     seen.setChecked(True)
     button(dialog, "square-left").click()
-    qtbot.waitUntil(lambda: client.state().target.eye == "left", timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: eye_of_square(client) == "left", timeout=PATIENCE_MS)
     assert seen.isChecked()  # the wearer's word stays
     client.close()
     qtbot.waitUntil(lambda: not seen.isChecked(), timeout=PATIENCE_MS)
@@ -127,11 +145,11 @@ def test_a_headset_is_renamed_and_revoked(
     client, _ = connect()
     dialog.refresh()
     table = child(dialog, QTableWidget, "pairedDevices")
-    table.item(0, 0).setText("Ward 3")
+    cell(table, 0, 0).setText("Ward 3")
     assert [one.name for one in pairings.all] == ["Ward 3"]
-    table.item(0, 0).setText("x" * 41)
+    cell(table, 0, 0).setText("x" * 41)
     assert "at most 40 characters" in text(dialog, "connectProblem")
-    assert table.item(0, 0).text() == "Ward 3"
+    assert cell(table, 0, 0).text() == "Ward 3"
     table.selectRow(0)
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
     button(dialog, "revokeDevice").click()
