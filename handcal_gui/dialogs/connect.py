@@ -107,6 +107,7 @@ class ConnectDialog(QDialog):
         self._invited_s = time.monotonic()
         self._known = self._paired()
         self._qr.show_text(invitation.text)
+        self._qr.show()
         self._code.setText(f"{invitation.digits[:4]} {invitation.digits[4:]}")
         self._how.setText(
             "Scan the code with the headset's app. Without a camera: choose this computer "
@@ -158,6 +159,7 @@ class ConnectDialog(QDialog):
 
     def _end_invitation(self, why: str) -> None:
         self._invitation = None
+        self._qr.hide()
         self._qr.show_text("")
         self._code.clear()
         self._how.setText(why)
@@ -194,6 +196,7 @@ class ConnectDialog(QDialog):
             (self._qr, 1),
             hbox(self._code, 1, self._invite, spacing=SPACING_PX),
             self._how,
+            0,
             spacing=SPACING_PX,
         )
         right = vbox(

@@ -72,6 +72,7 @@ class LibraryWindow(QDialog):
         self.setWindowTitle("Sessions")
         self._folder = folder
         self._deleted: tuple[Path, ...] = ()
+        self._is_read = False
         self._job: Job | None = None
         self._sessions = SessionsModel()
         self._filter = SessionsFilter(self._sessions)
@@ -127,7 +128,7 @@ class LibraryWindow(QDialog):
 
     def _show(self, entries: tuple[LibraryEntry, ...], deleted: tuple[Path, ...]) -> None:
         chosen = {entry.path for entry in self.chosen}
-        self._deleted = deleted
+        self._deleted, self._is_read = deleted, True
         if entries != self._sessions.entries:
             self._sessions.show_entries(entries)
             self._choose(chosen)
@@ -168,7 +169,8 @@ class LibraryWindow(QDialog):
         shown, total = self._filter.rowCount(), self._sessions.rowCount()
         count = pluralize(total, "session") if shown == total else f"{shown} of {total} sessions"
         selected = f", {len(chosen)} selected" if chosen else ""
-        self._count.setText(f"{count} in {self._folder}{selected}")
+        shown_count = f"{count} in {self._folder}{selected}"
+        self._count.setText(shown_count if self._is_read else f"Reading {self._folder}…")
         self._show_trend(chosen[0].wearer if chosen else "")
 
     def _show_trend(self, wearer: str) -> None:
