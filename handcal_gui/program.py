@@ -21,6 +21,7 @@ from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
+from handcal.station.support import SupportSettings
 from handcal_gui import FIRST_SIZE_PX
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.inspection import Inspection
@@ -28,7 +29,9 @@ from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
 from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.dialogs.export import Export, ExportDialog
+from handcal_gui.dialogs.guide import GuideDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.dialogs.support import SupportDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.keys import keys_html
 from handcal_gui.pages.review_page import ReviewPage
@@ -273,6 +276,8 @@ class Program(QObject):
         )
         for dialog in self.window.findChildren(ExportDialog):
             dialog.stop()
+        for support in self.window.findChildren(SupportDialog):
+            support.stop()
         for library in self.window.findChildren(LibraryWindow):
             library.stop()
         for connecting in self.window.findChildren(ConnectDialog):
@@ -337,6 +342,8 @@ class Program(QObject):
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
         add("File", "&Quit", "Ctrl+Q", self.window.close)
         add("View", "&Reset layout", "", self.window.reset_layout)
+        add("Help", "&Guide", "Shift+F1", self.show_guide)
+        add("Help", "&Support bundle…", "", self.make_support_bundle)
         add("Help", "&Keys", "F1", self._show_keys)
         add("Help", "&About handcal", "", self._show_about)
 
@@ -399,6 +406,29 @@ class Program(QObject):
             "New pairing key created. Enter it in the headset; all others are disconnected, and "
             "the key is used from the next calibration on."
         )
+
+    def show_guide(self) -> GuideDialog | None:
+        """Show the guide, which needs no network; return None if it is not installed."""
+        try:
+            guide = GuideDialog(self.window)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return None
+        guide.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        guide.show()
+        keep_on_screen(guide)
+        return guide
+
+    def make_support_bundle(self) -> SupportDialog:
+        """Open the dialog that writes a file to send with a bug report."""
+        sessions = Path(self.start.new.settings.sessions)
+        folder = self._file.path.parent
+        settings = SupportSettings(folder, (sessions,), self._preferences.wearers)
+        dialog = SupportDialog(settings, Path.home(), self.window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+        keep_on_screen(dialog)
+        return dialog
 
     def _edit_preferences(self) -> None:
         dialog = PreferencesDialog(self._preferences, self.window)
