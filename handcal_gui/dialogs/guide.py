@@ -79,11 +79,11 @@ class _Page(QTextBrowser):
         """Show a page."""
         self.setSource(page, QTextDocument.ResourceType.MarkdownResource)
 
-    def loadResource(self, kind: int, name: QUrl) -> object:
+    def loadResource(self, kind: int, name: QUrl | str) -> object:
         """Return a picture no wider than the window, or a page."""
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
-        image = QImage(self.source().resolved(name).toLocalFile())
+        image = QImage(self.source().resolved(QUrl(name)).toLocalFile())
         if image.width() <= _PICTURE_PX:
             return image
         ratio = self.devicePixelRatioF()

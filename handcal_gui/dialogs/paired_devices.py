@@ -111,7 +111,9 @@ class PairedDevices(QWidget):
         return self._shown[0][rows[0].row()] if rows else None
 
     def _edit_name(self) -> None:
-        self._table.editItem(self._table.item(self._table.currentRow(), _NAME))
+        item = self._table.item(self._table.currentRow(), _NAME)
+        if item is not None:
+            self._table.editItem(item)
 
     def _take_name(self, item: QTableWidgetItem) -> None:
         if self._is_filling or item.column() != _NAME:

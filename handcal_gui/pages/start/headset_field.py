@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from handcal.station.settings import HeadsetKind, StationSettings
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, choice, fill_row, whole_number, with_name
+from handcal_gui.widgets.fields import choice, fill_row, whole_number, with_name
 from handcal_gui.widgets.key_field import KeyField
 
 _HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
@@ -26,12 +26,9 @@ class HeadsetField(QWidget):
     Attributes
     ----------
     changed : Signal()
-    connect_wanted : Signal()
-        The user wants to pair or try a headset.
     """
 
     changed = Signal()
-    connect_wanted = Signal()
 
     def __init__(self, pairing_key: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -49,9 +46,7 @@ class HeadsetField(QWidget):
         self._key = KeyField()
         self._key.set_key(pairing_key)
         self._pairing = QWidget()
-        connect = button("connect", "Connect…", "Pair a headset by QR code, and try it")
-        connect.clicked.connect(self.connect_wanted)
-        fill_row(self._pairing, connect, QLabel("or key"), self._key, grows=self._key)
+        fill_row(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)

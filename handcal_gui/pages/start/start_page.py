@@ -89,9 +89,10 @@ class StartPage(QWidget):
         example.setToolTip("A simulated wearer's session, copied to the session folder")
         browse = button("browse", "Choose folder…")
         library = button("library", "All sessions…", "Search, compare, export and repair sessions")
-        for added in (browse, example, library):
+        for added in (browse, example):
             self._opened.add_button(added)
         self._open.body.addWidget(self._opened, 1)
+        self._open.body.addWidget(library, 0, Qt.AlignmentFlag.AlignRight)
         self._evaluate = Card(
             "Evaluate", "Simulated studies, the cube test, and the user test.", "check"
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -56,7 +56,6 @@ class StationForm(QWidget):
         self._settings = settings
         self._camera = CameraField()
         self._headset = HeadsetField(pairing_key)
-        self._headset.connect_wanted.connect(self.connect_wanted)
         self._rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "Example rig")
         self._rig.setToolTip(
             "The offline calibration of headset and camera; the virtual headset accepts any."
@@ -100,7 +99,11 @@ class StationForm(QWidget):
         """Show the finding about each part, with a button if one click can fix it."""
         for part, finding in findings.items():
             fix, changes = _fix(part, finding, self.settings)
-            self._findings[part].show_finding(finding, fix, partial(self._change, changes))
+            mend: Callable[[], object] = partial(self._change, changes)
+            is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
+            if part == "headset" and is_awaited and not fix:
+                fix, mend = "Connect…", self.connect_wanted.emit
+            self._findings[part].show_finding(finding, fix, mend)
 
     def _change(self, changes: Mapping[str, Any]) -> None:
         self.show_settings(replace(self.settings, **changes))

@@ -43,7 +43,8 @@ from handcal_gui.windows.library.sessions_model import (
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
 _MOST_NAMED = 3
-_MOST_SHOWN_PX = 240
+_MOST_SHOWN_PX = 150
+_TREND_PX = 20 * SPACING_PX
 
 
 class LibraryWindow(QDialog):
@@ -83,14 +84,16 @@ class LibraryWindow(QDialog):
         self._table = _table(self._filter)
         self._count = paragraph("count")
         self._trend = TrendPlot()
+        self._trend.setMinimumHeight(_TREND_PX)
         self._trend_title = paragraph("trendTitle")
         self._message = paragraph("message")
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._message.hide()  # until there is one
         self._make_buttons()
         self._lay_out()
         self._find = LatestJob(lambda known: self._read(known), self)
         self._find.answered.connect(lambda _, found: self._show(*found))
-        self._find.failed.connect(self._message.setText)
+        self._find.failed.connect(self._say)
         self._search.textChanged.connect(self._search_again)
         self._kind.currentIndexChanged.connect(self._search_again)
         self._table.selectionModel().selectionChanged.connect(self._refresh)
@@ -146,7 +149,7 @@ class LibraryWindow(QDialog):
         self._table.resizeColumnsToContents()
         for column in range(len(COLUMNS)):
             width = self._table.columnWidth(column)
-            self._table.setColumnWidth(column, min(width + SPACING_PX, _MOST_SHOWN_PX))
+            self._table.setColumnWidth(column, min(width, _MOST_SHOWN_PX))
 
     def _search_again(self) -> None:
         self._filter.search(self._search.text(), self._kind.currentData())
@@ -246,7 +249,7 @@ class LibraryWindow(QDialog):
         if self._job is not None:
             return
         self._job = Job(work)
-        self._job.progressed.connect(lambda doing, _: self._message.setText(f"{doing}…"))
+        self._job.progressed.connect(lambda doing, _: self._say(f"{doing}…"))
         self._job.succeeded.connect(self._end)
         self._job.failed.connect(self._end)
         self._job.cancelled.connect(self._end)
@@ -257,9 +260,13 @@ class LibraryWindow(QDialog):
         assert self._job is not None
         self._job.wait()
         self._job = None
-        self._message.setText(str(said))
+        self._say(str(said))
         self.reload()
         self._refresh()
+
+    def _say(self, message: str) -> None:
+        self._message.setText(message)
+        self._message.setVisible(bool(message))
 
     def _make_buttons(self) -> None:
         made: list[tuple[str, str, str, Callable[[], None]]] = [
