@@ -34,6 +34,7 @@ from handcal_gui.pages.wizard.steps import Action, Step
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.theme import use_theme
+from tests.gui.helpers import child, text
 
 KEY = "a pairing key of the tests"
 PATIENCE_MS = 20_000
@@ -164,10 +165,10 @@ def test_the_dialogs_of_the_menus_end_with_the_program(
 def test_connect_shows_the_headset_of_a_calibration_and_leaves_it_alone(live: Technician) -> None:
     dialog = live.program.connect_headset()
     assert dialog is not None
-    live.wait(lambda: live.child(QLabel, "headsetFound").text().startswith("Headset of the tests"))
-    assert live.child(QLabel, "digits").text() == ""
-    live.child(QPushButton, "square-left").click()
-    live.wait(lambda: live.child(QCheckBox, "squareSeen-left").isEnabled())
+    live.wait(lambda: text(dialog, "headsetFound").startswith("Headset of the tests"))
+    assert text(dialog, "digits") == ""
+    child(dialog, QPushButton, "square-left").click()
+    live.wait(lambda: child(dialog, QCheckBox, "squareSeen-left").isEnabled())
     dialog.accept()
     number = live.snapshot.number
     live.wait(lambda: live.snapshot.number > number + 2)
