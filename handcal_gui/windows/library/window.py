@@ -44,6 +44,7 @@ from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
 _MOST_NAMED = 3
 _MOST_SHOWN_PX = 150
+_LONG_NAMES_PX = {"Rig": 100, "Headset": 100}
 _TREND_PX = 20 * SPACING_PX
 
 
@@ -147,9 +148,9 @@ class LibraryWindow(QDialog):
 
     def _fit_columns(self) -> None:
         self._table.resizeColumnsToContents()
-        for column in range(len(COLUMNS)):
-            width = self._table.columnWidth(column)
-            self._table.setColumnWidth(column, min(width, _MOST_SHOWN_PX))
+        for number, column in enumerate(COLUMNS):
+            most_px = _LONG_NAMES_PX.get(column.title, _MOST_SHOWN_PX)
+            self._table.setColumnWidth(number, min(self._table.columnWidth(number), most_px))
 
     def _search_again(self) -> None:
         self._filter.search(self._search.text(), self._kind.currentData())
