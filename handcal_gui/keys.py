@@ -16,7 +16,7 @@ _NOT_ACTIONS = {
         ("Esc", "Close the message at the top"),
         ("Tab", "Move to the next button or field"),
     ),
-    "Fine-tune": (("Arrows, PgUp, PgDown", "Move φ of the chosen eye"),),
+    "Fine-tune": (("Arrows, PgUp, PgDown", "Move what the chosen eye sees, as the key points"),),
 }
 """Keys that widgets handle themselves, as their meaning depends on the focus."""
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import dataclass, field, is_dataclass, replace
 from pathlib import Path
-from typing import Literal, Self, TypeAlias
+from typing import Any, Literal, Self, TypeAlias, get_type_hints
 
 from PySide6.QtCore import QStandardPaths
 
@@ -19,7 +21,11 @@ from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
+PREFERENCES_VERSION = 2
+"""Version 1 had no number."""
 _MOST_SESSIONS = 8
+_OLD_ERROR_MAX_ARCMIN = 15.0
+"""Default of version 1, which nobody chose."""
 
 
 def _default_station() -> StationSettings:
@@ -79,14 +85,22 @@ class PreferencesFile:
     def load(self) -> tuple[Preferences, str]:
         """Return the preferences and a message for the user, empty if nothing went wrong.
 
-        A file that cannot be read is renamed to end in ``.bad``.
+        Those of older versions are upgraded. A file that cannot be read is renamed to end in
+        ``.bad``; one of a newer version is copied to end in ``.newer``, and read as far as known.
         """
         if not self.path.exists():
             return Preferences(), ""
         try:
-            stored = read_json(self.path)
-            stored.pop("wearers", None)  # names of wearers, which were stored here once
-            return read_settings(Preferences, stored, "preferences"), ""
+            data = read_json(self.path)
+            version = data.pop("version", 1)
+            if type(version) is not int or version < 1:
+                raise FileError(f"preferences.version is a whole number, not {version!r:.40}")
+            said = ""
+            if version > PREFERENCES_VERSION:
+                data, said = _known(Preferences, data), self._keep_newer()
+            elif version == 1:
+                data = _upgraded(data)
+            return read_settings(Preferences, data, "preferences"), said
         except FileError as error:
             bad = self.path.with_name(f"{self.path.name}.bad")
             with suppress(OSError):
@@ -99,7 +113,17 @@ class PreferencesFile:
     def save(self, preferences: Preferences) -> None:
         """Write the preferences, or raise FileError."""
         make_folder(self.path.parent)
-        write_json(self.path, settings_json(preferences))
+        write_json(self.path, {"version": PREFERENCES_VERSION, **settings_json(preferences)})
+
+    def _keep_newer(self) -> str:
+        """Copy the file, which the next change replaces; return a message for the user."""
+        kept = self.path.with_name(f"{self.path.name}.newer")
+        with suppress(OSError):
+            shutil.copyfile(self.path, kept)
+        return (
+            "The preferences are of a newer version of handcal. Settings that this one does not "
+            f"know are left out; they are kept in {kept}."
+        )
 
     def pairings(self) -> Pairings:
         """Return the paired headsets, with a key for the next one.
@@ -129,3 +153,38 @@ class PreferencesFile:
 def _default_path() -> Path:
     config = QStandardPaths.StandardLocation.AppConfigLocation
     return Path(QStandardPaths.writableLocation(config)) / "preferences.json"
+
+
+def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
+    """Return preferences of version 1 with the names of today.
+
+    A lab's own limit of the expected error becomes its target. The solver's settings, which the
+    program never offered to change, take their present defaults.
+    """
+    upgraded = deepcopy(data)
+    upgraded.pop("wearers", None)  # names of wearers are only in the sessions
+    solve: Any = upgraded
+    for name in ("station", "calibration", "solve"):
+        solve = solve.get(name) if isinstance(solve, dict) else None
+    if not isinstance(solve, dict):
+        return upgraded
+    fuse, verdict = solve.get("fuse"), solve.get("verdict")
+    if isinstance(fuse, dict) and "eye_box_sigma_m" in fuse:
+        del solve["fuse"]
+    if isinstance(verdict, dict) and "error_max_arcmin" in verdict:
+        limit_arcmin = verdict.pop("error_max_arcmin")
+        if limit_arcmin != _OLD_ERROR_MAX_ARCMIN:
+            verdict.setdefault("target_arcmin", limit_arcmin)
+    return upgraded
+
+
+def _known(kind: Any, data: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings in `data` that a dataclass has, also in the dataclasses inside it."""
+    hints = get_type_hints(kind)
+    return {
+        name: _known(hints[name], value)
+        if is_dataclass(hints[name]) and isinstance(value, dict)
+        else value
+        for name, value in data.items()
+        if name in hints
+    }

@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QMessageBox
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
-from handcal.errors import FileError
-from handcal.export.export import ExportSettings
+from handcal.errors import FileError, HandcalError
+from handcal.export.export import ExportSettings, export_session
+from handcal.export.many import export_sessions
 from handcal.io.resources import resource_path
 from handcal.link.pairing import Pairings
-from handcal.session.session import SessionRecord
+from handcal.link.server import HeadsetServer
+from handcal.progress import Progress
+from handcal.rig.rig_file import read_rig
+from handcal.session.session import Session, SessionRecord
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
+from handcal.station.support import SupportSettings
 from handcal_gui import FIRST_SIZE_PX
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.inspection import Inspection
 from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
-from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.dialogs.connect import ConnectDialog
+from handcal_gui.dialogs.export import Export, ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.dialogs.support import SupportDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.keys import keys_html
 from handcal_gui.pages.review_page import ReviewPage
@@ -46,6 +53,7 @@ from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from handcal_gui.windows.library.window import LibraryWindow
 from handcal_gui.windows.manual import Manual
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.wizard import RigWizard
@@ -158,7 +166,41 @@ class Program(QObject):
             self.window.banner.show_message("There is no alignment to export yet.")
             return None
         folder = folder or Path(self._preferences.export_folder or record.path.parent)
-        dialog = ExportDialog(record, self._preferences.export, folder, self.window)
+        return self._open_export(record, folder, self.window, export_session, "")
+
+    def show_library(self, folder: Path | None = None) -> LibraryWindow:
+        """Show the sessions of a folder, by default of the session folder."""
+        folder = folder or Path(self.start.new.settings.sessions)
+        window = LibraryWindow(folder, self.window)
+        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        window.open_requested.connect(self.open_session)
+        window.resume_requested.connect(self.resume_session)
+        window.export_requested.connect(lambda paths: self.export_many(paths, window))
+        window.finished.connect(self.start.look_for_sessions)
+        window.open()
+        keep_on_screen(window)
+        return window
+
+    def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog | None:
+        """Open the export dialog for several sessions, each to a folder of its own."""
+        try:
+            first = Session.open(paths[0])
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return None
+
+        def export(
+            _: SessionRecord, target: Path, settings: ExportSettings, progress: Progress
+        ) -> tuple[Path, ...]:
+            return export_sessions(paths, target, settings, progress)
+
+        folder = Path(self._preferences.export_folder or paths[0].parent)
+        return self._open_export(first, folder, parent, export, f"{len(paths)} sessions")
+
+    def _open_export(
+        self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
+    ) -> ExportDialog:
+        dialog = ExportDialog(record, self._preferences.export, folder, parent, export, name)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.remembered.connect(self._remember_export)
         dialog.open()
@@ -173,6 +215,23 @@ class Program(QObject):
             return
         self.window.banner.show_message("The 3D window opens in a few seconds.")
         self.inspection.start(record)
+
+    def connect_headset(self) -> ConnectDialog | None:
+        """Open the dialog that pairs and tries a headset; return None if it cannot be opened."""
+        settings, snapshot = self.start.new.settings, self.live.snapshot
+        link = self.live.link
+        try:
+            rig = snapshot.record.rig if snapshot else read_rig(settings.rig_path)
+            server = link or HeadsetServer(self._pairings, (settings.host, settings.port))
+        except HandcalError as error:
+            self.window.banner.show_message(str(error))
+            return None
+        dialog = ConnectDialog(server, rig, is_calibrating=link is not None, parent=self.window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.finished.connect(self.start.new.check)
+        dialog.open()
+        keep_on_screen(dialog)
+        return dialog
 
     def calibrate_rig(self) -> RigWizard | None:
         """Open the wizard of the offline calibration; return None if its folder cannot be used."""
@@ -220,6 +279,12 @@ class Program(QObject):
         )
         for dialog in self.window.findChildren(ExportDialog):
             dialog.stop()
+        for support in self.window.findChildren(SupportDialog):
+            support.stop()
+        for library in self.window.findChildren(LibraryWindow):
+            library.stop()
+        for connecting in self.window.findChildren(ConnectDialog):
+            connecting.stop()
         for wizard in self.window.findChildren(RigWizard):
             wizard.accept()
         for evaluation in self.window.findChildren(EvaluationWindow):
@@ -235,7 +300,9 @@ class Program(QObject):
         self.start.resume_requested.connect(self.resume_session)
         self.start.open_requested.connect(self.open_session)
         self.start.example_requested.connect(self.open_example)
+        self.start.library_requested.connect(self.show_library)
         self.start.rig_wanted.connect(self.calibrate_rig)
+        self.start.connect_wanted.connect(self.connect_headset)
         self.start.evaluation_wanted.connect(self.evaluate)
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
@@ -262,23 +329,28 @@ class Program(QObject):
         panels.session.inspect_requested.connect(self.inspect)
         self.inspection.failed.connect(self.window.banner.show_message)
         panels.link.new_key_requested.connect(self._renew_key)
+        panels.link.connect_requested.connect(self.connect_headset)
         self.window.closing.connect(self.close)
 
     def _make_menus(self) -> None:
         add = self.window.add_action
         add("File", "&Next wearer", "Ctrl+N", self.show_start)
         add("File", "&Open session…", "Ctrl+O", self._browse)
+        add("File", "&Sessions…", "Ctrl+L", self.show_library)
         add("File", "&Export…", "Ctrl+E", self.export)
         add("File", "&Inspect in 3D", "", self.inspect)
+        add("File", "Connect a &headset…", "", self.connect_headset)
         add("File", "&Calibrate a rig…", "", self.calibrate_rig)
         add("File", "E&valuate…", "", self.evaluate)
         add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
         add("File", "&Quit", "Ctrl+Q", self.window.close)
         add("View", "&Reset layout", "", self.window.reset_layout)
+        add("Help", "&Guide", "Shift+F1", lambda: self._read("docs/guide.md"))
         add("Help", "&Manual", "", lambda: self._read("docs/index.md"))
         add("Help", "Headset &protocol", "", lambda: self._read("docs/protocol.md"))
         add("Help", "&Examples in Python", "", lambda: self._show_folder("examples"))
         add("Help", "&Unity package", "", lambda: self._show_folder("unity"))
+        add("Help", "&Support bundle…", "", self.make_support_bundle)
         add("Help", "&Keys", "F1", self._show_keys)
         add("Help", "&Licences", "", lambda: self._read("THIRD-PARTY.md"))
         add("Help", "&About handcal", "", self._show_about)
@@ -342,6 +414,17 @@ class Program(QObject):
             "New pairing key created. Enter it in the headset; all others are disconnected, and "
             "the key is used from the next calibration on."
         )
+
+    def make_support_bundle(self) -> SupportDialog:
+        """Open the dialog that writes a file to send with a bug report."""
+        sessions = Path(self.start.new.settings.sessions)
+        folder = self._file.path.parent
+        settings = SupportSettings(folder, (sessions,))
+        dialog = SupportDialog(settings, Path.home(), self.window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+        keep_on_screen(dialog)
+        return dialog
 
     def _edit_preferences(self) -> None:
         dialog = PreferencesDialog(self._preferences, self.window)

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,38 @@ def doctor(arguments: argparse.Namespace) -> None:
         console.print(f"{finding.health.value:8} {finding.what}: {finding.found}{advice}")
     if any(finding.health is Health.BROKEN for finding in findings):
         raise HandcalError("fix the problems listed above and try again")
+
+
+@command(
+    arg(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        default=Path("handcal-support.zip"),
+        help="ZIP file to write (default: handcal-support.zip)",
+    ),
+    arg(
+        "--sessions",
+        type=Path,
+        metavar="FOLDER",
+        action="append",
+        default=[],
+        help="further folder of sessions whose wearers' names are taken out; may be repeated",
+    ),
+    arg("--frames", type=Path, metavar="RECORDING", help="recording to add: a file or a folder"),
+)
+def support(arguments: argparse.Namespace) -> None:
+    """Write one file for a bug report: doctor, versions, log without names, frames if wanted."""
+    from handcal.station.support import default_settings, run_support
+
+    settings = default_settings()
+    sessions = (*settings.sessions, *arguments.sessions)
+    settings = replace(settings, sessions=sessions, frames=arguments.frames)
+    with show_progress() as progress:
+        written = run_support(arguments.output, settings, progress)
+    console.print(f"{arguments.output}: {', '.join(written[:4])}", markup=False)
+    if len(written) > 4:
+        console.print(f"and {len(written) - 4} more files", markup=False)
 
 
 def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:

@@ -173,6 +173,10 @@ COMMANDS: Mapping[str, Entry] = {
         "Check the installation, the camera and the headset, with advice for each problem.",
         "checks",
     ),
+    "support": Entry(
+        "Write one file for a bug report: doctor, versions, log without names, frames if wanted.",
+        "checks",
+    ),
 }
 
 

@@ -104,9 +104,7 @@ def _summary(outcome: SessionOutcome) -> Section:
                     "Rig": record.rig.name,
                     "Method": outcome.settings.method,
                     "Alignments": str(len(record.alignments)),
-                    "Confirmations refused": str(
-                        sum(event.name == "refused" for event in record.events)
-                    ),
+                    "Confirmations refused": str(record.refused),
                     "Trials of the user test": str(len(record.trials)),
                     **({"Damaged": printable(record.left_out)} if record.left_out else {}),
                     **made_with(),

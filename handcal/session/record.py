@@ -78,6 +78,11 @@ class SessionRecord:
     """Parts that are damaged; what they held is missing here, or was read from a copy."""
 
     @property
+    def refused(self) -> int:
+        """Number of confirmations refused, for any reason."""
+        return sum(event.name == "refused" for event in self.events)
+
+    @property
     def left_out(self) -> str:
         """The damage in one line; empty if the session is sound."""
         if not self.damaged:

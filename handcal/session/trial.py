@@ -159,6 +159,49 @@ def calibration_numbers(trials: Mapping[int, Trial]) -> dict[int, int]:
     }
 
 
+@dataclass(frozen=True, slots=True)
+class TrialSpread:
+    """Errors of trials, each trial counting once with the mean of its corners, in arcminutes."""
+
+    trials: int
+    calibrations: int
+    mean_arcmin: float
+    median_arcmin: float
+    max_arcmin: float
+    trial_sd_arcmin: float | None
+    """Standard deviation between trials; None for a single trial."""
+    calibration_sd_arcmin: float | None
+    """Standard deviation between the calibrations' means; None for a single calibration."""
+
+
+def trial_spread(trials: Mapping[int, Trial], chosen: Collection[int]) -> TrialSpread:
+    """Return the spread of some of a session's trials; ValueError if none is chosen.
+
+    Parameters
+    ----------
+    trials : mapping of int to Trial
+        All trials of the session, by number.
+    chosen : collection of int
+        Numbers of those to summarise.
+    """
+    calibrations = calibration_numbers(trials)
+    errors = {number: float(trials[number].error_arcmin.mean()) for number in chosen}
+    by_calibration: dict[int, list[float]] = {}
+    for number, error in errors.items():
+        by_calibration.setdefault(calibrations[number], []).append(error)
+    each = statistics.summarise(list(errors.values()))
+    means = statistics.summarise([float(np.mean(one)) for one in by_calibration.values()])
+    return TrialSpread(
+        trials=each.count,
+        calibrations=means.count,
+        mean_arcmin=each.mean,
+        median_arcmin=each.median,
+        max_arcmin=each.max,
+        trial_sd_arcmin=each.sd if each.count > 1 else None,
+        calibration_sd_arcmin=means.sd if means.count > 1 else None,
+    )
+
+
 def trial_json(trial: Trial) -> dict[str, Any]:
     """Return a trial, without its time, as JSON-able values."""
     arrays = {name: getattr(trial, name).tolist() for name in _SHAPES}

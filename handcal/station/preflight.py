@@ -147,7 +147,10 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
         host, port = reachable_address((str(address), settings.port))
     except LinkError:
         return _limited("this computer has no network", "connect it to the headset's network")
-    return _good(f"let it connect to {host}, UDP port {port}, with the pairing key")
+    return _limited(
+        f"not seen yet; it is awaited at {host}, UDP port {port}",
+        "pair and try it with Connect, or let it connect after the start",
+    )
 
 
 def _require_free(address: Address) -> None:

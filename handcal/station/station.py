@@ -177,6 +177,11 @@ class Station(Closable):
         return self._pairings
 
     @property
+    def link(self) -> HeadsetServer:
+        """The PC's end of the link; safe to use from several threads."""
+        return self._link
+
+    @property
     def headset(self) -> HeadsetIdentity | None:
         """The connected headset, as it introduced itself; None before it has."""
         return self._link.device

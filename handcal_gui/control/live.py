@@ -10,6 +10,7 @@ from functools import partial
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.errors import FileError
+from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
 from handcal.session.session import Session
 from handcal.station.procedure import Calibration, State
@@ -74,6 +75,7 @@ class CalibrationController(QObject):
         self._comparison = comparison
         self._solve_settings = SolveSettings()
         self._engine: EngineThread | None = None
+        self._link: HeadsetServer | None = None
         self._is_broken = False
         self._snapshot: Snapshot | None = None
         self._is_watching = False
@@ -95,6 +97,11 @@ class CalibrationController(QObject):
     def snapshot(self) -> Snapshot | None:
         """The snapshot shown; None while no calibration is running."""
         return self._snapshot
+
+    @property
+    def link(self) -> HeadsetServer | None:
+        """The link of the running calibration; None while none is running."""
+        return self._link
 
     def start(
         self, open_station: Callable[[], Station], plan: EyePlan, *, is_held: bool = True
@@ -129,7 +136,7 @@ class CalibrationController(QObject):
             engine.deleteLater()
         self._engine = None
         self._timer.stop()
-        self._snapshot = None
+        self._snapshot = self._link = None
         self._window.banner.show_condition("")
 
     def do(self, action: Action) -> None:
@@ -290,7 +297,7 @@ class CalibrationController(QObject):
             self._submit("watch", lambda station: setattr(station, "watch_views", wanted))
 
     def _on_opened(self, station: Station) -> None:
-        panels = self._window.panels
+        panels, self._link = self._window.panels, station.link
         self._solve_settings = station.settings.calibration.solve
         host, port = station.address
         host = f"[{host}]" if ":" in host else host

@@ -33,6 +33,8 @@ class ExportDialog(QDialog):
         Parent of the export's folder.
     export : callable
         As `export_session`.
+    name : str
+        Subject of the export, and name of its folder; by default those of the session.
 
     Attributes
     ----------
@@ -54,15 +56,16 @@ class ExportDialog(QDialog):
         folder: Path,
         parent: QWidget | None = None,
         export: Export = export_session,
+        name: str = "",
     ) -> None:
         super().__init__(parent)
         self.setObjectName("exportDialog")
-        self.setWindowTitle(f"Export {record.wearer or record.path.name}")
+        self.setWindowTitle(f"Export {name or record.wearer or record.path.name}")
         self._record = record
         self._export_session = export
         self._job: Job | None = None
         self._is_closing = False
-        self._choices = ExportChoices(settings, folder, f"{record.path.name}-export")
+        self._choices = ExportChoices(settings, folder, f"{name or record.path.name}-export")
         self._progress = ExportProgress()
         self._pages = QStackedWidget()
         self._pages.addWidget(self._choices)

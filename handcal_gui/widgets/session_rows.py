@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +11,10 @@ import numpy as np
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
-from handcal.session.trial import ErrorStatistics, TrialStatistics
+from handcal.session.trial import Trial, TrialSpread, trial_spread
 from handcal.types import EYES, Eye, EyeShift
 from handcal_gui.widgets.number_table import Row
-from handcal_gui.widgets.numbers import signed
+from handcal_gui.widgets.numbers import pluralize, signed
 from handcal_gui.widgets.record_table import RecordColumn
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
@@ -41,7 +41,20 @@ TRIAL_COLUMNS = (
     RecordColumn("Error ′", "Mean over the target's four corners, in arcminutes"),
     RecordColumn("Time", "Time of the recording"),
 )
-STATISTICS_COLUMNS = ("n", "Mean ± SD ′", "Median ′", "Max ′", "Mean ± SD px")
+STATISTICS_COLUMNS = (
+    "Calibrations",
+    "Trials",
+    "Mean ′",
+    "SD of trials ′",
+    "SD of calibrations ′",
+    "Median ′",
+    "Max ′",
+)
+_SPREAD_HELP = (
+    "Each trial counts once, with the mean of its corners, in arcminutes. Trials of one\n"
+    "calibration are not independent: only the spread between calibrations tells how the next\n"
+    "one turns out."
+)
 
 _CLOCK = "%H:%M:%S"
 _DELETED: dict[str, Kind] = {
@@ -126,38 +139,49 @@ def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:
     }
 
 
-def statistics_rows(statistics: TrialStatistics) -> list[Row]:
+def statistics_rows(trials: Mapping[int, Trial]) -> list[Row]:
     """Return rows for `STATISTICS_COLUMNS`: all trials, each eye, each distance."""
-    groups: list[tuple[str, ErrorStatistics | None]] = [("All", statistics.total)]
-    groups += [(EYE_NAMES[eye], errors) for eye, errors in statistics.by_eye.items()]
-    groups += [(f"{depth_m:g} m", errors) for depth_m, errors in statistics.by_depth_m.items()]
-    tooltip = "Over all corners of all targets, in arcminutes and in pixels of the display"
+    groups = {"All": list(trials)}
+    for eye in EYES:
+        groups[EYE_NAMES[eye]] = [number for number, one in trials.items() if one.eye == eye]
+    for depth_m in sorted({one.target_depth_m for one in trials.values()}):
+        groups[f"{depth_m:g} m"] = [
+            number for number, one in trials.items() if one.target_depth_m == depth_m
+        ]
     return [
-        Row(
-            name,
-            (
-                str(errors.trials),
-                f"{errors.arcmin.mean:.1f} ± {errors.arcmin.sd:.1f}",
-                f"{errors.arcmin.median:.1f}",
-                f"{errors.arcmin.max:.1f}",
-                f"{errors.px.mean:.1f} ± {errors.px.sd:.1f}",
-            ),
-            tooltip,
-        )
-        for name, errors in groups
-        if errors is not None
+        Row(name, _spread_cells(trial_spread(trials, chosen)), _SPREAD_HELP)
+        for name, chosen in groups.items()
+        if chosen
     ]
 
 
-def statistics_text(statistics: TrialStatistics) -> str:
-    """Return the errors of all trials in one line."""
-    total = statistics.total
-    if total is None:
+def statistics_text(trials: Mapping[int, Trial]) -> str:
+    """Return the errors of all trials in one line, with what they cannot tell."""
+    if not trials:
         return "No trials yet"
-    trials = "1 trial" if total.trials == 1 else f"{total.trials} trials"
+    spread = trial_spread(trials, list(trials))
+    sd_arcmin = spread.trial_sd_arcmin
+    between = "" if sd_arcmin is None else f", SD between trials {sd_arcmin:.1f}′"
+    calibrations = pluralize(spread.calibrations, "calibration")
+    counts = f"{pluralize(spread.trials, 'trial')} of {calibrations}"
+    text = f"{counts}: mean {spread.mean_arcmin:.1f}′{between}."
+    if spread.calibration_sd_arcmin is None:
+        return f"{text} One calibration cannot tell how the next one turns out."
+    return f"{text} SD between calibrations {spread.calibration_sd_arcmin:.1f}′."
+
+
+def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
+    def text(sd_arcmin: float | None) -> str:
+        return NOTHING if sd_arcmin is None else f"{sd_arcmin:.1f}"
+
     return (
-        f"{trials}: {total.arcmin.mean:.1f} ± {total.arcmin.sd:.1f}′, "
-        f"median {total.arcmin.median:.1f}′ ({total.px.mean:.1f} ± {total.px.sd:.1f} px)"
+        str(spread.calibrations),
+        str(spread.trials),
+        f"{spread.mean_arcmin:.1f}",
+        text(spread.trial_sd_arcmin),
+        text(spread.calibration_sd_arcmin),
+        f"{spread.median_arcmin:.1f}",
+        f"{spread.max_arcmin:.1f}",
     )
 
 

@@ -265,7 +265,10 @@ def test_doctor_fails_only_for_what_must_be_mended(
         ("demo --alignments 0", "'0' is not a whole number from 1 to 20"),
         ("demo --loss nan", "'nan' is not a number from 0.0 to 1.0"),
         ("demo --loss 1.1", "'1.1' is not a number from 0.0 to 1.0"),
-        ("demo --eyes three", "invalid choice: 'three' (choose from 'both', 'each', 'left', 'right')"),
+        (
+            "demo --eyes three",
+            "invalid choice: 'three' (choose from 'both', 'each', 'left', 'right')",
+        ),
         ("demo --seed 1 --nonsense", "unrecognized arguments: --nonsense"),
         ("segment --color a.png", "required: --depth, --intrinsics, --output"),
         ("solve", "required: session"),

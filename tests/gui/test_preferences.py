@@ -17,7 +17,7 @@ from handcal.register.guard import GuardSettings
 from handcal.station.procedure import CalibrationSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
-from handcal_gui.preferences import Preferences, PreferencesFile
+from handcal_gui.preferences import PREFERENCES_VERSION, Preferences, PreferencesFile
 
 CHANGED = Preferences(
     station=StationSettings(
@@ -54,6 +54,68 @@ def test_the_first_start_has_defaults_in_the_users_own_folders(file: Preferences
 def test_preferences_come_back(file: PreferencesFile) -> None:
     file.save(CHANGED)
     assert file.load() == (CHANGED, "")
+
+
+def test_a_file_of_version_1_is_upgraded(file: PreferencesFile) -> None:
+    """Read a file that handcal wrote before preferences had a version."""
+    file.path.parent.mkdir()
+    stored = Path(__file__).parents[1] / "data" / "preferences_1.json"
+    file.path.write_bytes(stored.read_bytes())
+    preferences, said = file.load()
+    assert said == ""
+    assert preferences.theme == "dark"
+    assert not hasattr(preferences, "wearers"), "names of wearers are only in the sessions"
+    assert preferences.station.port == 50_000
+    assert preferences.sessions == ("/data/sessions/one",)
+    solve = preferences.station.calibration.solve
+    assert solve.verdict.target_arcmin == 12.0
+    assert solve.fuse == CalibrationSettings().solve.fuse
+    file.save(preferences)
+    assert json.loads(file.path.read_text())["version"] == PREFERENCES_VERSION
+    assert file.load() == (preferences, "")
+    assert [one.name for one in file.path.parent.iterdir()] == [file.path.name]
+
+
+def test_the_old_default_of_a_limit_is_no_choice(file: PreferencesFile) -> None:
+    file.path.parent.mkdir()
+    verdict = {"error_max_arcmin": 15.0}
+    file.path.write_text(json.dumps({"station": {"calibration": {"solve": {"verdict": verdict}}}}))
+    preferences, said = file.load()
+    assert said == ""
+    assert preferences.station.calibration == CalibrationSettings()
+
+
+@pytest.mark.parametrize("station", [3, None, {"calibration": []}, {"calibration": {"solve": 1}}])
+def test_a_strange_file_of_version_1_is_kept(file: PreferencesFile, station: object) -> None:
+    file.path.parent.mkdir()
+    file.path.write_text(json.dumps({"station": station}))
+    preferences, said = file.load()
+    assert preferences == Preferences()
+    assert "were reset" in said
+    assert file.path.with_name("preferences.json.bad").exists()
+
+
+def test_a_newer_file_is_read_as_far_as_known_and_kept(file: PreferencesFile) -> None:
+    file.save(CHANGED)
+    data = json.loads(file.path.read_text())
+    data |= {"version": PREFERENCES_VERSION + 1, "tomorrow": 1}
+    data["station"]["calibration"]["tomorrow"] = 2
+    newer = json.dumps(data)
+    file.path.write_text(newer)
+    preferences, said = file.load()
+    assert preferences == CHANGED
+    assert "newer version of handcal" in said
+    file.save(preferences)
+    assert file.path.with_name("preferences.json.newer").read_text() == newer
+    assert file.load() == (CHANGED, "")
+
+
+@pytest.mark.parametrize("version", [0, -1, "2", True, 1.0, None])
+def test_a_strange_version_is_no_version(file: PreferencesFile, version: object) -> None:
+    file.path.parent.mkdir()
+    file.path.write_text(json.dumps({"version": version}))
+    assert file.load()[0] == Preferences()
+    assert file.path.with_name("preferences.json.bad").exists()
 
 
 def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,6 +24,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.errors import LinkError
 from handcal.session.session import Session, SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
@@ -32,6 +34,7 @@ from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.theme import use_theme
+from tests.gui.helpers import child, text
 
 KEY = "a pairing key of the tests"
 PATIENCE_MS = 20_000
@@ -137,6 +140,42 @@ def live(technician: Technician, studio: Any) -> Technician:
     technician.wait_for_page("live")
     technician.wait(lambda: technician.snapshot.link.connected)
     return technician
+
+
+def test_the_dialogs_of_the_menus_end_with_the_program(
+    open_program: Callable[[], Technician], file: PreferencesFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal_gui.dialogs.connect.Announcement", _no_network)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    station = {"sessions": str(file.path.parent), "host": "127.0.0.1", "port": port}
+    file.path.write_text(json.dumps({"station": station}))
+    technician = open_program()
+    program = technician.program
+    first = program.connect_headset()
+    assert first is not None
+    first.accept()
+    assert program.connect_headset() is not None  # the port is free again
+    assert program.show_library().isVisible()
+    assert program.make_support_bundle().isVisible()
+
+
+def test_connect_shows_the_headset_of_a_calibration_and_leaves_it_alone(live: Technician) -> None:
+    dialog = live.program.connect_headset()
+    assert dialog is not None
+    live.wait(lambda: text(dialog, "headsetFound").startswith("Headset of the tests"))
+    assert text(dialog, "digits") == ""
+    child(dialog, QPushButton, "square-left").click()
+    live.wait(lambda: child(dialog, QCheckBox, "squareSeen-left").isEnabled())
+    dialog.accept()
+    number = live.snapshot.number
+    live.wait(lambda: live.snapshot.number > number + 2)
+    assert live.snapshot.link.connected
+
+
+def _no_network(_address: object) -> None:
+    raise LinkError("no multicast")
 
 
 def can_start(technician: Technician) -> bool:

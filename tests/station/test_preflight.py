@@ -168,7 +168,9 @@ def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: P
     assert find("headset", recorded).health is Health.LIMITED
     assert find("rig", recorded).health is Health.GOOD
     networked = replace(recorded, headset="network")
-    assert find("headset", networked).health is Health.GOOD
+    networked_finding = find("headset", networked)
+    assert networked_finding.health is Health.LIMITED
+    assert "not seen yet" in networked_finding.found
     assert str(settings.port) in find("headset", networked).found
     assert find("rig", networked).health is Health.LIMITED  # the example's
     own = replace(networked, rig=str(resource_path("example_rig.yaml")))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
-from PySide6.QtWidgets import QComboBox, QLineEdit
+from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit
 
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.doctor import Finding, Health
@@ -41,8 +41,8 @@ class NewCalibration(Card):
         The settings of a station that has just passed its checks, and the wearer.
     changed : Signal()
         The settings shown have changed.
-    rig_wanted : Signal()
-        The user wants to calibrate a rig.
+    rig_wanted, connect_wanted : Signal()
+        The user wants to calibrate a rig, or to connect a headset.
     cancel_requested : Signal()
         The user cancels the opening of the station.
     """
@@ -50,6 +50,7 @@ class NewCalibration(Card):
     start_requested = Signal(object, str)
     changed = Signal()
     rig_wanted = Signal()
+    connect_wanted = Signal()
     cancel_requested = Signal()
 
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
@@ -88,6 +89,7 @@ class NewCalibration(Card):
         self._form.changed.connect(self._settle.start)
         self._form.changed.connect(self.changed)
         self._form.rig_wanted.connect(self.rig_wanted)
+        self._form.connect_wanted.connect(self.connect_wanted)
         self._button.clicked.connect(self.start)
         self._cancel.clicked.connect(self._cancel_opening)
         self.show_preferences(preferences)
@@ -124,8 +126,12 @@ class NewCalibration(Card):
         self.check()
 
     def check(self) -> None:
-        """Check the station with the settings shown, unless it may be in use or being opened."""
-        if self.isVisible() and not self._is_opening:
+        """Check the station with the settings shown, unless it may be in use or being opened.
+
+        A dialog may hold the headset's port.
+        """
+        is_covered = QApplication.activeModalWidget() is not None
+        if self.isVisible() and not self._is_opening and not is_covered:
             self._check.ask(self._question())
 
     def start(self) -> None:

@@ -40,10 +40,12 @@ class StartPage(QWidget):
         The settings of a station that has just passed its checks, and the wearer.
     open_requested, resume_requested : Signal(Path)
         The session's folder.
-    rig_wanted, evaluation_wanted : Signal()
-        The user wants to calibrate a rig, or to run studies and tests.
+    rig_wanted, connect_wanted, evaluation_wanted : Signal()
+        The user wants to calibrate a rig, to connect a headset, or to run studies and tests.
     cancel_requested : Signal()
         The user cancels the opening of the station.
+    library_requested : Signal(Path)
+        The user wants to see all sessions in a folder.
     example_requested : Signal(Path)
         The user wants to open the example; the session folder to copy it to.
     """
@@ -52,9 +54,11 @@ class StartPage(QWidget):
     open_requested = Signal(object)
     resume_requested = Signal(object)
     rig_wanted = Signal()
+    connect_wanted = Signal()
     evaluation_wanted = Signal()
     cancel_requested = Signal()
     example_requested = Signal(object)
+    library_requested = Signal(object)
 
     def __init__(
         self,
@@ -83,8 +87,9 @@ class StartPage(QWidget):
         )
         example = button("example", "Example", "Open the example session")
         example.setToolTip("A simulated wearer's session, copied to the session folder")
-        browse = button("browse", "Choose folder…")
-        for added in (browse, example):
+        browse = button("browse", "Folder…", "Choose a session's folder")
+        library = button("library", "All…", "Search, compare, export and repair sessions")
+        for added in (browse, example, library):
             self._opened.add_button(added)
         self._open.body.addWidget(self._opened, 1)
         self._evaluate = Card(
@@ -97,12 +102,14 @@ class StartPage(QWidget):
         self._find.answered.connect(self._show_sessions)
         self.new.start_requested.connect(self.start_requested)
         self.new.rig_wanted.connect(self.rig_wanted)
+        self.new.connect_wanted.connect(self.connect_wanted)
         self.new.cancel_requested.connect(self.cancel_requested)
         self.new.changed.connect(self._look_in_another_folder)
         self._unfinished.chosen.connect(self.resume_requested)
         self._opened.chosen.connect(self.open_requested)
         browse.clicked.connect(self.browse)
         example.clicked.connect(lambda: self.example_requested.emit(self._folder))
+        library.clicked.connect(lambda: self.library_requested.emit(self._folder))
         evaluate.clicked.connect(self.evaluation_wanted)
         self.show_preferences(preferences)
 
@@ -110,7 +117,7 @@ class StartPage(QWidget):
         """Show the preferences, for the next wearer."""
         self._recent = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
-        self._look_for_sessions()
+        self.look_for_sessions()
 
     def set_rig(self, path: Path) -> None:
         """Show another rig file; other entries stay as they are."""
@@ -140,13 +147,14 @@ class StartPage(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Search for sessions again."""
         super().showEvent(event)
-        self._look_for_sessions()
+        self.look_for_sessions()
 
     def _look_in_another_folder(self) -> None:
         if Path(self.new.settings.sessions) != self._folder:
-            self._look_for_sessions()
+            self.look_for_sessions()
 
-    def _look_for_sessions(self) -> None:
+    def look_for_sessions(self) -> None:
+        """Search for sessions again."""
         self._folder = Path(self.new.settings.sessions)
         self._find.ask((self._folder, self._recent))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -36,12 +36,13 @@ class StationForm(QWidget):
     Attributes
     ----------
     changed : Signal()
-    rig_wanted : Signal()
-        The user wants to calibrate a rig.
+    rig_wanted, connect_wanted : Signal()
+        The user wants to calibrate a rig, or to connect a headset.
     """
 
     changed = Signal()
     rig_wanted = Signal()
+    connect_wanted = Signal()
 
     def __init__(
         self,
@@ -98,7 +99,11 @@ class StationForm(QWidget):
         """Show the finding about each part, with a button if one click can fix it."""
         for part, finding in findings.items():
             fix, changes = _fix(part, finding, self.settings)
-            self._findings[part].show_finding(finding, fix, partial(self._change, changes))
+            mend: Callable[[], object] = partial(self._change, changes)
+            is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
+            if part == "headset" and is_awaited and not fix:
+                fix, mend = "Connect…", self.connect_wanted.emit
+            self._findings[part].show_finding(finding, fix, mend)
 
     def _change(self, changes: Mapping[str, Any]) -> None:
         self.show_settings(replace(self.settings, **changes))
@@ -123,6 +128,7 @@ class StationForm(QWidget):
             _add_row(grid, title, fields[part])
             grid.addWidget(self._findings[part], grid.rowCount(), 1)
         grid.addWidget(self._advanced, grid.rowCount(), 1)
+        grid.setRowStretch(grid.rowCount(), 1)  # or the fields move apart on a tall page
 
 
 def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:

@@ -36,15 +36,17 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 _STEPS_MM = (0.1, 0.5, 1.0)
 _MOVES: dict[int, tuple[int, int]] = {
-    Qt.Key.Key_Left: (0, -1),
-    Qt.Key.Key_Right: (0, 1),
-    Qt.Key.Key_Up: (1, -1),
-    Qt.Key.Key_Down: (1, 1),
+    Qt.Key.Key_Left: (0, 1),
+    Qt.Key.Key_Right: (0, -1),
+    Qt.Key.Key_Up: (1, 1),
+    Qt.Key.Key_Down: (1, -1),
     Qt.Key.Key_PageDown: (2, -1),
     Qt.Key.Key_PageUp: (2, 1),
 }
+"""Axis and direction of φ, opposite to the picture's, which moves as the key points."""
 _KEYS = (
-    "Arrow keys move the eye: ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3. Click here first; E changes the eye."
+    "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
+    "Click here first; E changes the eye."
 )
 _OBSTACLES = {
     State.ALIGN: "Confirm the alignment, solve and apply it first.",

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QGroupBox, QLabel, QPushButton, QWidg
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.key_field import KeyField
+from handcal_gui.widgets.layouts import hbox
 
 _RENEWING = "The new key must then be entered in the headset."
 
@@ -19,9 +20,12 @@ class PairingBox(QGroupBox):
     ----------
     new_key_requested : Signal()
         The user requests another key.
+    connect_requested : Signal()
+        The user wants to pair or try a headset.
     """
 
     new_key_requested = Signal()
+    connect_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Pairing", parent)
@@ -37,14 +41,16 @@ class PairingBox(QGroupBox):
         self._key = KeyField()
         renew = button("newKey", "New key…", "Make a new pairing key", _RENEWING)
         renew.clicked.connect(self.new_key_requested)
-        self._lay_out(renew)
+        connect = button("connect", "Connect…", "Pair a headset by QR code, and try it")
+        connect.clicked.connect(self.connect_requested)
+        self._lay_out(connect, renew)
 
     def show_pairing(self, address: str, key: str) -> None:
         """Show an address, as host:port, and a key, hidden at first."""
         self._address.setText(address)
         self._key.set_key(key)
 
-    def _lay_out(self, renew: QPushButton) -> None:
+    def _lay_out(self, connect: QPushButton, renew: QPushButton) -> None:
         grid = QGridLayout(self)
         grid.setSpacing(SPACING_PX)
         key_label = QLabel("&Key")
@@ -53,5 +59,5 @@ class PairingBox(QGroupBox):
         grid.addWidget(self._address, 0, 1)
         grid.addWidget(key_label, 1, 0)
         grid.addWidget(self._key, 1, 1)
-        grid.addWidget(renew, 2, 1, Qt.AlignmentFlag.AlignRight)
+        grid.addLayout(hbox(1, connect, renew, spacing=SPACING_PX), 2, 1)
         grid.setColumnStretch(1, 1)

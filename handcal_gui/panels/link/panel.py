@@ -36,11 +36,14 @@ class LinkPanel(QWidget):
     ----------
     new_key_requested : Signal()
         The user requests another pairing key.
+    connect_requested : Signal()
+        The user wants to pair or try a headset.
     restart_headset_requested : Signal()
         The user requests a restart of the virtual headset.
     """
 
     new_key_requested = Signal()
+    connect_requested = Signal()
     restart_headset_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -60,6 +63,7 @@ class LinkPanel(QWidget):
         self._history = LinkHistory()
         self._pairing = PairingBox()
         self._pairing.new_key_requested.connect(self.new_key_requested)
+        self._pairing.connect_requested.connect(self.connect_requested)
         self._pairing.hide()
         self._lay_out()
         self._show_state(is_connected=False, problem="Open a session on the start page.")

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from handcal.register.guard import turn_advice
 from handcal.station.hands import PlacedHand
 from handcal.station.procedure import Observation, State
-from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal.types import Float64
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.turning_hand import TurningHand
@@ -61,7 +61,7 @@ class RotationPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the rotation of a snapshot; without a new frame the angle stays."""
         procedure, observation = snapshot.procedure, snapshot.observation
-        self._show_refusals(procedure)
+        self._show_refusals(snapshot.record.refused, procedure.refusal)
         self._show_limit(procedure.guard_limit_rad)
         if procedure.cursor is not self._cursor:
             self._cursor = procedure.cursor
@@ -125,13 +125,13 @@ class RotationPanel(QWidget):
         self._plot.item.getAxis("left").setTicks([[(0.0, "0°"), (limit_deg, f"{limit_deg:g}°")]])
         self._limit_line.setData([-_HISTORY_S, 0.0], [limit_deg, limit_deg])
 
-    def _show_refusals(self, procedure: Procedure) -> None:
-        if not procedure.refused and not procedure.refusal:
+    def _show_refusals(self, count: int, last: str) -> None:
+        """Show the count of the journal, which the report shows too, and the last reason."""
+        if not count and not last:
             self._refusals.setText("No confirmation refused.")
         else:
-            # A refusal by other evidence than the guard's is not counted.
-            count = f": {procedure.refused}" if procedure.refused else ""
-            self._refusals.setText(f"Refused{count}. {procedure.refusal}")
+            # The journal may follow the refusal by a frame.
+            self._refusals.setText(f"Refused: {max(count, 1)}. {last}")
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)

@@ -44,6 +44,10 @@ _HOW = (
     "the solved φ relative to the fine-tuned one."
 )
 
+_UNTOUCHED = (
+    "φ of the {} has not been touched since its last trial at this distance. "
+    "Press T again if this is a trial of its own."
+)
 _ZERO = (
     "φ of the {} is still the solved one: the error would be 0 px. "
     "Press T again if the wearer sees no error."
@@ -116,8 +120,8 @@ class TrialsPanel(QWidget):
         if before is None or trials_id(before) != trials_id(record):
             statistics = summarise_trials(record.trials.values())
             self._table.show_rows(trial_rows(record))
-            self._summary.setText(statistics_text(statistics))
-            self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(statistics))
+            self._summary.setText(statistics_text(record.trials))
+            self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
             self._plot.show_trials(record.trials.values(), statistics)
         self._show_deletions()
 
@@ -158,9 +162,30 @@ class TrialsPanel(QWidget):
         solved_m = procedure.results.rendered_shift_m[eye]
         return bool(np.allclose(procedure.applied_shift_m[eye], solved_m, rtol=0.0, atol=1e-6))
 
+    def _is_untouched(self) -> bool:
+        """Return whether the next trial would repeat the last one of its eye and distance."""
+        procedure = self._snapshot.procedure if self._snapshot else None
+        if self._obstacle() or procedure is None or self._record is None:
+            return False
+        eye, depth_m = self._next_eye(), self._depth.currentData()
+        before = [
+            trial
+            for trial in self._record.trials.values()
+            if trial.eye == eye and trial.target_depth_m == depth_m
+        ]
+        applied_m = procedure.applied_shift_m[eye]
+        return bool(before) and bool(
+            np.allclose(applied_m, before[-1].adjusted_shift_m, rtol=0.0, atol=1e-6)
+        )
+
+    def _doubt(self) -> str:
+        """Return the reason why the next trial may be a mistake; empty if there is none."""
+        doubt = _ZERO if self._is_zero() else _UNTOUCHED if self._is_untouched() else ""
+        return doubt.format(EYE_NAMES[self._next_eye()].lower())
+
     def _refresh(self) -> None:
         obstacle = self._obstacle()
-        self._is_doubtful = self._is_doubtful and self._is_zero()
+        self._is_doubtful = self._is_doubtful and bool(self._doubt())
         self.record_action.setEnabled(not obstacle)
         self._message.setText(obstacle or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
         can_show = not (obstacle or (self._record and self._record.is_finished))
@@ -187,10 +212,11 @@ class TrialsPanel(QWidget):
         self._strip.show_deletions([deletion for deletion in found if deletion.kind == "trial"])
 
     def _ask(self) -> None:
-        """Request a trial; a trial of 0 px may be a mistake and must be requested twice."""
-        self._is_doubtful = self._is_zero() and not self._is_doubtful
+        """Request a trial; one that may be a mistake must be requested twice."""
+        doubt = self._doubt()
+        self._is_doubtful = bool(doubt) and not self._is_doubtful
         if self._is_doubtful:
-            self.doubted.emit(_ZERO.format(EYE_NAMES[self._next_eye()].lower()))
+            self.doubted.emit(doubt)
         else:
             self.trial_requested.emit(self._next_eye(), self._depth.currentData())
 

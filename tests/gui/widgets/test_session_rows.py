@@ -9,7 +9,7 @@ import pytest
 from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
-from handcal.session.trial import Trial, make_trial, summarise_trials
+from handcal.session.trial import Trial, make_trial
 from handcal.types import Alignment, Eye
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
@@ -85,20 +85,35 @@ def test_trials_as_text(record: SessionRecord) -> None:
 
 
 def test_statistics_as_text() -> None:
-    trials = [trial("left", 0.4, 0.001), trial("right", 0.6, 0.002)]
-    statistics = summarise_trials(trials)
-    rows = {row.label: row.cells for row in statistics_rows(statistics)}
+    trials = {1: trial("left", 0.4, 0.001), 3: trial("right", 0.6, 0.002)}
+    rows = {row.label: row.cells for row in statistics_rows(trials)}
     assert list(rows) == ["All", "Left eye", "Right eye", "0.4 m", "0.6 m"]
     assert {len(cells) for cells in rows.values()} == {len(STATISTICS_COLUMNS)}
-    assert rows["All"][0] == "2"
-    mean = np.concatenate([one.error_arcmin for one in trials]).mean()
-    assert rows["All"][1].startswith(f"{mean:.1f} ±")
-    assert statistics_text(statistics).startswith(f"2 trials: {mean:.1f} ±")
+    means = [one.error_arcmin.mean() for one in trials.values()]
+    sd = f"{np.std(means, ddof=1):.1f}"
+    assert rows["All"][:5] == ("1", "2", f"{np.mean(means):.1f}", sd, "–")
+    assert rows["Left eye"][3] == "–"  # one trial has no spread, whatever its corners
+    assert statistics_text(trials).startswith("2 trials of 1 calibration: mean")
+
+
+def test_statistics_of_several_calibrations() -> None:
+    display = example_rig().eyes["left"]
+    shifts_m = [np.zeros(3), np.zeros(3), np.full(3, 1e-3)]
+    trials = {
+        number: make_trial(display, "left", 0.5, shift_m, shift_m + off_m * np.eye(3)[0])
+        for number, (shift_m, off_m) in enumerate(zip(shifts_m, (1e-3, 2e-3, 5e-3), strict=True))
+    }
+    first, second, third = (one.error_arcmin.mean() for one in trials.values())
+    [row, *_] = statistics_rows(trials)
+    between = np.std([(first + second) / 2, third], ddof=1)
+    assert row.cells[0:2] == ("2", "3")
+    assert row.cells[4] == f"{between:.1f}"
+    assert statistics_text(trials).endswith(f"SD between calibrations {between:.1f}′.")
 
 
 def test_statistics_of_nothing() -> None:
-    assert statistics_rows(summarise_trials([])) == []
-    assert statistics_text(summarise_trials([])) == "No trials yet"
+    assert statistics_rows({}) == []
+    assert statistics_text({}) == "No trials yet"
 
 
 def test_deletions_in_their_order(record: SessionRecord) -> None:

@@ -115,6 +115,16 @@ def wearer(page: QWidget) -> QComboBox:
     return find(page, QComboBox, "wearer")
 
 
+def test_a_headset_that_is_awaited_can_be_connected(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    inspector.healths["headset"] = Health.LIMITED
+    page = open_page(source="realsense", headset="network")
+    qtbot.waitUntil(lambda: button(page, "headsetFix").text() == "Connect…")
+    with qtbot.waitSignal(page.connect_wanted):
+        button(page, "headsetFix").click()
+
+
 def test_typing_a_name_and_enter_starts(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
 ) -> None:

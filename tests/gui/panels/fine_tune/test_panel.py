@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.display import effect_at
+from handcal.display import DrawnMove, effect_at
 from handcal.register.results import Results
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
@@ -137,10 +137,10 @@ def test_cannot_be_used_without_a_headset(panel: FineTunePanel, show: Show) -> N
 @pytest.mark.parametrize(
     ("key", "axis", "sign"),
     [
-        (Qt.Key.Key_Right, 0, 1),
-        (Qt.Key.Key_Left, 0, -1),
-        (Qt.Key.Key_Down, 1, 1),
-        (Qt.Key.Key_Up, 1, -1),
+        (Qt.Key.Key_Right, 0, -1),
+        (Qt.Key.Key_Left, 0, 1),
+        (Qt.Key.Key_Down, 1, -1),
+        (Qt.Key.Key_Up, 1, 1),
         (Qt.Key.Key_PageUp, 2, 1),
         (Qt.Key.Key_PageDown, 2, -1),
     ],
@@ -163,6 +163,33 @@ def test_arrow_keys_move_the_chosen_eye(
     expected_m[axis] += sign * 0.001
     np.testing.assert_allclose(changed.args[0]["right"], expected_m, atol=1e-12)
     np.testing.assert_array_equal(changed.args[0]["left"], results.eyes["left"].shift_m)
+
+
+@pytest.mark.parametrize(
+    ("key", "points"),
+    [
+        (Qt.Key.Key_Right, lambda move: move.right_px > 0.0),
+        (Qt.Key.Key_Left, lambda move: move.right_px < 0.0),
+        (Qt.Key.Key_Up, lambda move: move.up_px > 0.0),
+        (Qt.Key.Key_Down, lambda move: move.up_px < 0.0),
+        (Qt.Key.Key_PageUp, lambda move: move.size_ratio > 1.0),
+        (Qt.Key.Key_PageDown, lambda move: move.size_ratio < 1.0),
+    ],
+)
+def test_the_picture_moves_as_the_key_points(
+    qtbot: QtBot,
+    panel: FineTunePanel,
+    show: Show,
+    results: Results,
+    rig: Rig,
+    key: Qt.Key,
+    points: Callable[[DrawnMove], bool],
+) -> None:
+    show()
+    with qtbot.waitSignal(panel.shift_changed) as changed:
+        QTest.keyClick(panel, key)
+    before_m, after_m = results.eyes["left"].shift_m, changed.args[0]["left"]
+    assert points(effect_at(rig.eyes["left"], before_m, after_m, 0.5))
 
 
 def test_both_eyes_move_together(
@@ -191,7 +218,7 @@ def test_no_eye_passes_the_limit_of_the_engine(
 ) -> None:
     show()
     field(panel, "left", 1).setValue(29.95)
-    QTest.keyClick(panel, Qt.Key.Key_Right)
+    QTest.keyClick(panel, Qt.Key.Key_Left)
     qtbot.waitUntil(lambda: bool(sent))
     assert sent[-1]["left"][0] == MAX_HAND_SET_SHIFT_M
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.guard import turn_advice
+from handcal.session.journal import Event
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.rotation.dial import RotationDial
@@ -137,10 +139,14 @@ def test_after_the_alignment_it_asks_for_nothing(panel: RotationPanel, snapshot:
 def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(snapshot())
     assert text(panel, "refusals") == "No confirmation refused."
-    panel.show_snapshot(snapshot(procedure={"refused": 2, "refusal": "Your hand is turned."}))
+    record = snapshot().record
+    refused = [Event(90 + number, "", "refused", {}) for number in range(2)]
+    counted = replace(record, events=(*record.events, *refused))
+    turned = {"refusal": "Your hand is turned."}
+    panel.show_snapshot(snapshot(procedure=turned, record=counted))
     assert text(panel, "refusals") == "Refused: 2. Your hand is turned."
     panel.show_snapshot(snapshot(procedure={"refusal": "The headset draws something else."}))
-    assert text(panel, "refusals") == "Refused. The headset draws something else."
+    assert text(panel, "refusals") == "Refused: 1. The headset draws something else."
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:

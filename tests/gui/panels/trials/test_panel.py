@@ -185,13 +185,36 @@ def test_the_target_goes_with_its_session(
     assert not box.isEnabled()
 
 
+def test_a_trial_without_a_touch_since_the_last_is_doubted(
+    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot], rig: Rig
+) -> None:
+    there = tuned(snapshot)
+    applied_m = there.procedure.applied_shift_m["left"]
+    with Session(there.record.path) as session:
+        session.save_trial(make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), applied_m))
+    panel.show_snapshot(replace(there, record=Session.open(there.record.path)))
+    choose(panel, "Eye", "Left eye")
+    choose(panel, "Distance of the target", "0.4 m")
+    with qtbot.waitSignal(panel.doubted) as doubted:
+        panel.record_action.trigger()
+    assert "has not been touched since its last trial" in doubted.args[0]
+    with qtbot.waitSignal(panel.trial_requested):
+        panel.record_action.trigger()
+    choose(panel, "Distance of the target", "0.5 m")
+    with qtbot.waitSignal(panel.trial_requested):
+        panel.record_action.trigger()
+
+
 def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -> None:
     panel.show_record(tried)
     [table] = panel.findChildren(RecordTable)
     numbers = [table.model().index(row, 0).data() for row in range(table.model().rowCount())]
     assert numbers == ["1", "3"]
-    mean = np.concatenate([trial.error_arcmin for trial in tried.trials.values()]).mean()
-    assert text(panel, "summary").startswith(f"2 trials: {mean:.1f} ±")
+    means = [trial.error_arcmin.mean() for trial in tried.trials.values()]
+    assert text(panel, "summary") == (
+        f"2 trials of 1 calibration: mean {np.mean(means):.1f}′, SD between trials "
+        f"{np.std(means, ddof=1):.1f}′. One calibration cannot tell how the next one turns out."
+    )
     [statistics] = panel.findChildren(NumberTable)
     assert "0.4 m" in statistics.as_text()
     assert "0.5 m" not in statistics.as_text()

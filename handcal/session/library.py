@@ -1,0 +1,234 @@
+"""The sessions in a folder, as their journals tell; deleting them with a way back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from handcal.errors import FileError
+from handcal.io.files import make_folder, read_json, read_limited, sync_folder
+from handcal.io.lock import FileLock
+from handcal.progress import Progress
+from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
+from handcal.session.journal import JOURNAL, JOURNAL_VERSION
+from handcal.session.record import (
+    MAX_ALIGNMENT_BYTES,
+    Replayed,
+    alignment_path,
+    replay,
+    sha256,
+)
+from handcal.session.state import SessionState
+from handcal.session.trial import Trial
+from handcal.types import EYES, Eye
+
+DELETED = ".deleted"
+"""Folder, inside the folder of sessions, to which deleted sessions are moved."""
+
+
+@dataclass(frozen=True, slots=True)
+class EyeOutcome:
+    """The result of one eye as the session holds it."""
+
+    verdict: str
+    expected_arcmin: float | None
+    measured_arcmin: float | None
+    """Error after the wearer's check; None if the eye was not checked."""
+
+
+@dataclass(frozen=True, slots=True)
+class LibraryEntry:
+    """A session in the library."""
+
+    path: Path
+    stamp: tuple[int, int]
+    """Time of change (ns) and length of the journal when it was read."""
+    problem: str = ""
+    """Reason why nothing can be read; empty if something can."""
+    started: str = ""
+    """UTC, ISO 8601."""
+    wearer: str = ""
+    rig: str = ""
+    headset: str = ""
+    """Names; empty if unknown."""
+    eyes: Mapping[Eye, EyeOutcome] = field(default_factory=lambda: MappingProxyType({}))
+    """Of the newest results, if they are those of all alignments."""
+    alignments: int = 0
+    trials: int = 0
+    """Numbers of those that are not deleted."""
+    trials_arcmin: float | None = None
+    """Mean error of the trials, each trial counting once."""
+    is_finished: bool = False
+    damaged: int = 0
+    """Damaged parts of the journal, and alignments or a rig file that are not those it holds."""
+
+
+def read_library(
+    folder: Path, known: Collection[LibraryEntry] = (), progress: Progress = Progress()
+) -> tuple[LibraryEntry, ...]:
+    """Return the sessions in a folder, the newest first.
+
+    Parameters
+    ----------
+    folder : Path
+        Need not exist.
+    known : collection of LibraryEntry
+        Entries read before, which are kept if their journal has not changed.
+    progress : Progress
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    """
+    before = {(entry.path, entry.stamp): entry for entry in known}
+    journals = sorted(folder.glob(f"*/{JOURNAL}"))
+    entries = []
+    for done, journal in enumerate(journals):
+        progress.at(done / len(journals), "Reading sessions")
+        try:
+            status = journal.stat()
+        except OSError:  # it has just been moved away
+            continue
+        stamp = status.st_mtime_ns, status.st_size
+        entries.append(before.get((journal.parent, stamp)) or _read(journal.parent, stamp))
+    return tuple(sorted(entries, key=lambda one: (one.started, one.path.name), reverse=True))
+
+
+def delete_session(path: Path) -> Path:
+    """Move a session to the folder of deleted ones, and return its place there.
+
+    Raises
+    ------
+    FileError
+        If it is open in a program, or cannot be moved.
+    """
+    if not (path / JOURNAL).is_file():
+        raise FileError(f"{path} is not a session; nothing was deleted")
+    FileLock(path / "lock").release()  # only a test, or another program would lose its folder
+    bin_folder = make_folder(path.absolute().parent / DELETED)
+    names = (path.name, *(f"{path.name}-{number}" for number in range(2, 10_000)))
+    return _move(path, next(bin_folder / one for one in names if not (bin_folder / one).exists()))
+
+
+def restore_session(path: Path) -> Path:
+    """Move a deleted session back, and return its place.
+
+    Raises
+    ------
+    FileError
+        If there is another session of its name, or it cannot be moved.
+    """
+    target = path.parent.parent / path.name
+    if path.parent.name != DELETED:
+        raise FileError(f"{path} is not in a folder {DELETED}; nothing was restored")
+    if target.exists():
+        raise FileError(f"{target} exists; rename it, then restore again")
+    return _move(path, target)
+
+
+def deleted_sessions(folder: Path) -> tuple[Path, ...]:
+    """Return the deleted sessions of a folder, the one deleted last at the end."""
+    found = [journal.parent for journal in (folder / DELETED).glob(f"*/{JOURNAL}")]
+    return tuple(sorted(found, key=lambda path: (path.stat().st_ctime_ns, path.name)))
+
+
+def _move(path: Path, target: Path) -> Path:
+    try:
+        path.rename(target)
+        sync_folder(target.parent)
+        sync_folder(path.absolute().parent)
+    except OSError as error:
+        raise FileError(f"cannot move {path}: {error.strerror or error}") from error
+    return target
+
+
+def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
+    try:
+        replayed = replay(path)
+    except FileError as error:
+        return LibraryEntry(path, stamp, problem=str(error))
+    state = replayed.state
+    trials = tuple(state.trials.active.values())
+    return LibraryEntry(
+        path,
+        stamp,
+        started=replayed.journal.events[0].time,
+        wearer=state.wearer,
+        rig=_rig_name(path, state),
+        headset=state.facts.headset.name if state.facts.headset else "",
+        eyes=MappingProxyType(_outcomes(_results(path, replayed))),
+        alignments=len(state.alignments.active),
+        trials=len(trials),
+        trials_arcmin=_mean_arcmin(trials),
+        is_finished=state.is_finished,
+        damaged=len(replayed.damaged) + _damaged_files(path, state),
+    )
+
+
+def _damaged_files(path: Path, state: SessionState) -> int:
+    """Return the number of files whose checksum is not the journal's, without decoding them."""
+    checksums = {**state.alignments.active, **state.alignments.deleted}
+    files = {alignment_path(path, number): one for number, one in checksums.items()}
+    if state.rig_sha256:
+        files[path / "rig.yaml"] = state.rig_sha256
+    return sum(not _is_sound(file, checksum) for file, checksum in files.items())
+
+
+def _is_sound(file: Path, checksum: str) -> bool:
+    try:
+        return sha256(read_limited(file, MAX_ALIGNMENT_BYTES)) == checksum
+    except FileError:
+        return False
+
+
+def _mean_arcmin(trials: Sequence[Trial]) -> float | None:
+    return float(np.mean([trial.error_arcmin.mean() for trial in trials])) if trials else None
+
+
+def _rig_name(path: Path, state: SessionState) -> str:
+    try:
+        content = state.rig.encode() or read_limited(path / "rig.yaml", MAX_RIG_BYTES)
+        return parse_rig(content).name
+    except (FileError, ValueError):
+        return ""
+
+
+def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
+    """Return the results that hold; those of older versions are in a file."""
+    state = replayed.state
+    if not state.is_solved:
+        return {}
+    if state.results is None and replayed.journal.version < JOURNAL_VERSION:
+        try:
+            return read_json(path / "results.json")
+        except FileError:
+            return {}
+    return state.results or {}
+
+
+def _outcomes(results: Mapping[str, Any]) -> dict[Eye, EyeOutcome]:
+    found = results.get("eyes")
+    eyes = found if isinstance(found, dict) else {}
+    return {eye: _outcome(eyes[eye]) for eye in EYES if isinstance(eyes.get(eye), dict)}
+
+
+def _outcome(one: Mapping[str, Any]) -> EyeOutcome:
+    """Return an eye's result; whatever is missing or not a number is unknown."""
+    benefit, measured = one.get("benefit"), one.get("measured_arcmin")
+    return EyeOutcome(
+        str(one.get("verdict", "")),
+        _number(benefit.get("after_arcmin")) if isinstance(benefit, dict) else None,
+        _number(measured[1]) if isinstance(measured, list) and len(measured) == 2 else None,
+    )
+
+
+def _number(value: object) -> float | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number and math.isfinite(value) else None  # type: ignore[arg-type]

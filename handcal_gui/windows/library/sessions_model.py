@@ -1,0 +1,245 @@
+"""The table of the library: one row for each session, searched, filtered and sorted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, cast
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSortFilterProxyModel,
+    Qt,
+)
+
+from handcal.session.library import LibraryEntry
+from handcal.types import EYES, VerdictName
+from handcal_gui.theme import number_font
+from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
+from handcal_gui.widgets.times import local_time
+
+Filter: TypeAlias = Literal["all", "accepted", "repeat", "unfinished", "damaged"]
+FILTERS: Mapping[Filter, str] = {
+    "all": "All sessions",
+    "accepted": "Accepted",
+    "repeat": "Not accepted",
+    "unfinished": "Unfinished",
+    "damaged": "Damaged",
+}
+_Index: TypeAlias = QModelIndex | QPersistentModelIndex
+_NO_INDEX = QModelIndex()
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    title: str
+    tooltip: str
+    text: Callable[[LibraryEntry], str]
+    key: Callable[[LibraryEntry], object]
+    is_number: bool = False
+
+
+def is_damaged(entry: LibraryEntry) -> bool:
+    """Return whether a part of a session, or all of it, cannot be read."""
+    return bool(entry.problem or entry.damaged)
+
+
+def is_accepted(entry: LibraryEntry) -> bool:
+    """Return whether every solved eye is accepted."""
+    return bool(entry.eyes) and all(one.verdict == "accept" for one in entry.eyes.values())
+
+
+def worst_arcmin(entry: LibraryEntry, kind: Literal["measured", "expected"]) -> float | None:
+    """Return the error of the worse eye; None unless it is known of every solved eye."""
+    outcomes = entry.eyes.values()
+    errors = [
+        one.measured_arcmin if kind == "measured" else one.expected_arcmin for one in outcomes
+    ]
+    known = [error for error in errors if error is not None]
+    return max(known) if known and len(known) == len(errors) else None
+
+
+def _state(entry: LibraryEntry) -> str:
+    if entry.problem:
+        return "Unreadable"
+    if entry.damaged:
+        return f"Damaged: {pluralize(entry.damaged, 'part')}"
+    return "Finished" if entry.is_finished else "Unfinished"
+
+
+def _verdicts(entry: LibraryEntry) -> str:
+    words = {
+        eye: VERDICT_WORDS.get(cast(VerdictName, one.verdict), one.verdict)
+        for eye, one in entry.eyes.items()
+    }
+    if len(words) == len(EYES) and len(set(words.values())) == 1:
+        return words[EYES[0]]
+    return ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items()) or (
+        NOTHING if entry.problem else "Not solved"
+    )
+
+
+def _errors(kind: Literal["measured", "expected"]) -> Callable[[LibraryEntry], str]:
+    def text(entry: LibraryEntry) -> str:
+        errors = [
+            entry.eyes[eye].measured_arcmin
+            if kind == "measured"
+            else entry.eyes[eye].expected_arcmin
+            for eye in EYES
+            if eye in entry.eyes
+        ]
+        return " / ".join(NOTHING if one is None else f"{one:.1f}" for one in errors) or NOTHING
+
+    return text
+
+
+def _trials(entry: LibraryEntry) -> str:
+    if entry.trials_arcmin is None:
+        return NOTHING
+    return f"{entry.trials_arcmin:.1f} (n = {entry.trials})"
+
+
+def _known_first(value: float | None) -> float:
+    return float("inf") if value is None else value
+
+
+COLUMNS = (
+    _Column("Wearer", "Name or code", lambda e: e.wearer or NOTHING, lambda e: e.wearer.casefold()),
+    _Column(
+        "Date", "Start, local time", lambda e: local_time(e.started) or NOTHING, lambda e: e.started
+    ),
+    _Column("Rig", "Name of the rig", lambda e: e.rig or NOTHING, lambda e: e.rig.casefold()),
+    _Column("Headset", "Name of the headset", lambda e: e.headset or NOTHING, lambda e: e.headset),
+    _Column("Verdict", "Of the newest results", _verdicts, _verdicts),
+    _Column(
+        "Measured ′",
+        "Error that is left after the wearer's check, left / right, in arcminutes;\n"
+        "– was not measured",
+        _errors("measured"),
+        lambda e: _known_first(worst_arcmin(e, "measured")),
+        is_number=True,
+    ),
+    _Column(
+        "Expected ′",
+        "Error that the solver expects, left / right, in arcminutes; not a measurement",
+        _errors("expected"),
+        lambda e: _known_first(worst_arcmin(e, "expected")),
+        is_number=True,
+    ),
+    _Column(
+        "Trials ′",
+        "Mean error of the user test in arcminutes, each trial counting once, and their number",
+        _trials,
+        lambda e: _known_first(e.trials_arcmin),
+        is_number=True,
+    ),
+    _Column("State", "Check names what is damaged; Repair copies the rest", _state, _state),
+)
+
+
+class SessionsModel(QAbstractTableModel):
+    """The sessions as rows.
+
+    Attributes
+    ----------
+    entries : tuple of LibraryEntry
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.entries: tuple[LibraryEntry, ...] = ()
+        self._font = number_font()
+
+    def show_entries(self, entries: Sequence[LibraryEntry]) -> None:
+        """Replace the rows."""
+        self.beginResetModel()
+        self.entries = tuple(entries)
+        self.endResetModel()
+
+    def rowCount(self, parent: _Index = _NO_INDEX) -> int:
+        """Return the number of sessions."""
+        return 0 if parent.isValid() else len(self.entries)
+
+    def columnCount(self, parent: _Index = _NO_INDEX) -> int:
+        """Return the number of columns."""
+        return 0 if parent.isValid() else len(COLUMNS)
+
+    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        """Return a cell's text, key for sorting, tooltip, font or alignment."""
+        entry, column = self.entries[index.row()], COLUMNS[index.column()]
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return column.text(entry)
+            case Qt.ItemDataRole.UserRole:
+                return column.key(entry)
+            case Qt.ItemDataRole.ToolTipRole:
+                return entry.problem or str(entry.path)
+            case Qt.ItemDataRole.FontRole if column.is_number:
+                return self._font
+            case Qt.ItemDataRole.TextAlignmentRole:
+                return _alignment(column)
+        return None
+
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> object:
+        """Return a column's title or its meaning."""
+        if orientation == Qt.Orientation.Vertical:
+            return None
+        column = COLUMNS[section]
+        texts = {
+            Qt.ItemDataRole.DisplayRole: column.title,
+            Qt.ItemDataRole.ToolTipRole: column.tooltip,
+            Qt.ItemDataRole.TextAlignmentRole: _alignment(column),
+        }
+        return texts.get(Qt.ItemDataRole(role))
+
+
+class SessionsFilter(QSortFilterProxyModel):
+    """Shows the sessions of a kind that contain every word searched."""
+
+    def __init__(self, sessions: SessionsModel) -> None:
+        super().__init__()
+        self._sessions = sessions
+        self._words: tuple[str, ...] = ()
+        self._filter: Filter = "all"
+        self.setSourceModel(sessions)
+        self.setSortRole(Qt.ItemDataRole.UserRole)
+
+    def search(self, text: str, kind: Filter) -> None:
+        """Show other sessions."""
+        self._words, self._filter = tuple(text.casefold().split()), kind
+        self.invalidate()
+
+    def filterAcceptsRow(self, row: int, _parent: _Index) -> bool:
+        """Return whether a session is shown."""
+        entry = self._sessions.entries[row]
+        text = " ".join(
+            (entry.wearer, entry.rig, entry.headset, entry.path.name, local_time(entry.started))
+        )
+        return _is_of(entry, self._filter) and all(word in text.casefold() for word in self._words)
+
+
+def _is_of(entry: LibraryEntry, kind: Filter) -> bool:
+    match kind:
+        case "all":
+            return True
+        case "accepted":
+            return is_accepted(entry)
+        case "repeat":
+            return bool(entry.eyes) and not is_accepted(entry)
+        case "unfinished":
+            return not (entry.is_finished or entry.problem)
+        case "damaged":
+            return is_damaged(entry)
+
+
+def _alignment(column: _Column) -> Qt.AlignmentFlag:
+    side = Qt.AlignmentFlag.AlignRight if column.is_number else Qt.AlignmentFlag.AlignLeft
+    return side | Qt.AlignmentFlag.AlignVCenter

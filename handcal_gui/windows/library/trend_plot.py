@@ -1,0 +1,54 @@
+"""The errors of one wearer's calibrations, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from PySide6.QtWidgets import QWidget
+
+from handcal.session.library import LibraryEntry
+from handcal.types import EYES, Eye
+from handcal_gui.widgets.plots import Plot
+from handcal_gui.widgets.result_rows import EYE_NAMES
+
+_SYMBOLS: dict[Eye, str] = {"left": "o", "right": "t1"}
+
+
+class TrendPlot(Plot):
+    """Shows measured errors by filled symbols, and those only expected by hollow ones."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Trend", "Calibration of this wearer, oldest first", "Error (′)", parent)
+        self.show_legend()
+        self.item.setLimits(yMin=0.0)
+        self._measured = {
+            eye: self.add_line(eye, name=f"{EYE_NAMES[eye]}, measured", symbol=_SYMBOLS[eye])
+            for eye in EYES
+        }
+        self._expected = {
+            eye: self.add_line(
+                eye, name=f"{EYE_NAMES[eye]}, expected", dashed=True, symbol=_SYMBOLS[eye]
+            )
+            for eye in EYES
+        }
+
+    def show_calibrations(self, entries: Sequence[LibraryEntry]) -> None:
+        """Show the solved sessions of one wearer, the oldest first."""
+        numbers = np.arange(1.0, len(entries) + 1.0)
+        for eye in EYES:
+            outcomes = [entry.eyes.get(eye) for entry in entries]
+            measured = [None if one is None else one.measured_arcmin for one in outcomes]
+            expected = [None if one is None else one.expected_arcmin for one in outcomes]
+            for line, errors in ((self._measured, measured), (self._expected, expected)):
+                known = [np.nan if error is None else error for error in errors]
+                line[eye].setData(numbers, np.array(known, dtype=np.float64))
+        count = max(len(entries), 2)
+        self.item.setXRange(0.8, count + 0.2 + 0.3 * count)  # the legend is at the right
+        self.item.getAxis("bottom").setTicks([[(number, f"{number:g}") for number in numbers]])
+
+
+def calibrations_of(wearer: str, entries: Sequence[LibraryEntry]) -> list[LibraryEntry]:
+    """Return the solved sessions of a wearer, the oldest first; none of a wearer without a name."""
+    found = [entry for entry in entries if wearer and entry.wearer == wearer and entry.eyes]
+    return sorted(found, key=lambda entry: (entry.started, entry.path.name))

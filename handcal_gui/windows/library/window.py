@@ -1,0 +1,366 @@
+"""The library: the sessions of a folder, found again, compared, exported, checked, deleted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QItemSelectionModel, Qt, Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QDialog,
+    QHeaderView,
+    QLineEdit,
+    QSplitter,
+    QTableView,
+    QWidget,
+)
+
+from handcal.progress import Progress
+from handcal.session.library import (
+    LibraryEntry,
+    delete_session,
+    deleted_sessions,
+    read_library,
+    restore_session,
+)
+from handcal.session.repair import check_session, repair_session
+from handcal_gui.engine.jobs import Job, Work
+from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.keys import add_action
+from handcal_gui.theme import SPACING_PX, flat_header
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import button, choice, paragraph, with_name
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.windows.library.sessions_model import (
+    COLUMNS,
+    FILTERS,
+    SessionsFilter,
+    SessionsModel,
+)
+from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
+
+_MOST_NAMED = 3
+_MOST_SHOWN_PX = 150
+_LONG_NAMES_PX = {"Rig": 100, "Headset": 100}
+_TREND_PX = 20 * SPACING_PX
+
+
+class LibraryWindow(QDialog):
+    """Shows the sessions of a folder; nothing is read or written in the window's thread.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of sessions.
+
+    Attributes
+    ----------
+    open_requested, resume_requested : Signal(Path)
+        A session to open, or to resume.
+    export_requested : Signal(object)
+        The sessions to export, a list of Path.
+    """
+
+    open_requested = Signal(object)
+    resume_requested = Signal(object)
+    export_requested = Signal(object)
+
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("library")
+        self.setWindowTitle("Sessions")
+        self._folder = folder
+        self._deleted: tuple[Path, ...] = ()
+        self._is_read = False
+        self._job: Job | None = None
+        self._sessions = SessionsModel()
+        self._filter = SessionsFilter(self._sessions)
+        self._search = with_name(QLineEdit(), "search", "Search")
+        self._search.setPlaceholderText("Search wearer, date, rig, headset")
+        self._search.setClearButtonEnabled(True)
+        self._kind = choice("kind", "Sessions shown", FILTERS)
+        self._table = _table(self._filter)
+        self._count = paragraph("count")
+        self._trend = TrendPlot()
+        self._trend.setMinimumHeight(_TREND_PX)
+        self._trend_title = paragraph("trendTitle")
+        self._message = paragraph("message")
+        self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._message.hide()  # until there is one
+        self._make_buttons()
+        self._lay_out()
+        self._find = LatestJob(lambda known: self._read(known), self)
+        self._find.answered.connect(lambda _, found: self._show(*found))
+        self._find.failed.connect(self._say)
+        self._search.textChanged.connect(self._search_again)
+        self._kind.currentIndexChanged.connect(self._search_again)
+        self._table.selectionModel().selectionChanged.connect(self._refresh)
+        self._table.doubleClicked.connect(self._open_chosen)
+        self.finished.connect(self.stop)
+        self._refresh()
+
+    @property
+    def chosen(self) -> list[LibraryEntry]:
+        """The sessions that are selected, in the order shown."""
+        rows = self._table.selectionModel().selectedRows()
+        sources = (self._filter.mapToSource(one).row() for one in sorted(rows, key=_row))
+        return [self._sessions.entries[row] for row in sources]
+
+    def reload(self) -> None:
+        """Read the folder again."""
+        self._find.ask(self._sessions.entries)
+
+    def stop(self) -> None:
+        """Cancel what is running; safe to call twice."""
+        self._find.stop()
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Read the folder."""
+        super().showEvent(event)
+        self.reload()
+
+    def _read(
+        self, known: Sequence[LibraryEntry]
+    ) -> tuple[tuple[LibraryEntry, ...], tuple[Path, ...]]:
+        return read_library(self._folder, known), deleted_sessions(self._folder)
+
+    def _show(self, entries: tuple[LibraryEntry, ...], deleted: tuple[Path, ...]) -> None:
+        chosen = {entry.path for entry in self.chosen}
+        self._deleted, self._is_read = deleted, True
+        if entries != self._sessions.entries:
+            self._sessions.show_entries(entries)
+            self._choose(chosen)
+            self._fit_columns()
+        self._refresh()
+
+    def _choose(self, paths: set[Path]) -> None:
+        flags = QItemSelectionModel.SelectionFlag
+        for row, entry in enumerate(self._sessions.entries):
+            if entry.path in paths:
+                place = self._filter.mapFromSource(self._sessions.index(row, 0))
+                self._table.selectionModel().select(place, flags.Select | flags.Rows)
+
+    def _fit_columns(self) -> None:
+        self._table.resizeColumnsToContents()
+        for number, column in enumerate(COLUMNS):
+            most_px = _LONG_NAMES_PX.get(column.title, _MOST_SHOWN_PX)
+            self._table.setColumnWidth(number, min(self._table.columnWidth(number), most_px))
+
+    def _search_again(self) -> None:
+        self._filter.search(self._search.text(), self._kind.currentData())
+        self._refresh()
+
+    def _refresh(self) -> None:
+        chosen = self.chosen
+        readable = [entry for entry in chosen if not entry.problem]
+        is_free = self._job is None
+        self._open.setEnabled(len(chosen) == len(readable) == 1)
+        can_resume = len(readable) == 1 and not readable[0].is_finished
+        self._resume.setEnabled(can_resume)
+        self._export.setEnabled(any(entry.alignments for entry in readable))
+        self._check.setEnabled(is_free and bool(chosen))
+        self._repair.setEnabled(is_free and len(chosen) == 1)
+        self._delete.setEnabled(is_free and bool(chosen))
+        self._undo.setVisible(bool(self._deleted))
+        last = self._deleted[-1].name if self._deleted else ""
+        self._deleted_text.setText(f"{last} deleted." if last else "")
+        shown, total = self._filter.rowCount(), self._sessions.rowCount()
+        count = pluralize(total, "session") if shown == total else f"{shown} of {total} sessions"
+        selected = f", {len(chosen)} selected" if chosen else ""
+        shown_count = f"{count} in {self._folder}{selected}"
+        self._count.setText(shown_count if self._is_read else f"Reading {self._folder}…")
+        self._show_trend(chosen[0].wearer if chosen else "")
+
+    def _show_trend(self, wearer: str) -> None:
+        found = calibrations_of(wearer, self._sessions.entries)
+        self._trend.setVisible(len(found) > 1)
+        if len(found) > 1:
+            self._trend_title.setText(f"{wearer}: {len(found)} calibrations")
+            self._trend.show_calibrations(found)
+        else:
+            self._trend_title.setText(
+                "Select a wearer with several calibrations to see how their errors went on."
+            )
+
+    def _open_chosen(self) -> None:
+        if self._open.isEnabled():
+            self.open_requested.emit(self.chosen[0].path)
+            self.accept()
+
+    def _resume_chosen(self) -> None:
+        self.resume_requested.emit(self.chosen[0].path)
+        self.accept()
+
+    def _export_chosen(self) -> None:
+        paths = [entry.path for entry in self.chosen if entry.alignments and not entry.problem]
+        self.export_requested.emit(paths)
+
+    def _check_chosen(self) -> None:
+        paths = [entry.path for entry in self.chosen]
+
+        def work(progress: Progress) -> str:
+            lines = []
+            for done, path in enumerate(paths):
+                progress.at(done / len(paths), f"Checking {path.name}")
+                found = check_session(path)
+                if found.state == "sound":
+                    continue
+                named = "; ".join(map(str, found.damaged[:_MOST_NAMED]))
+                more = len(found.damaged) - _MOST_NAMED
+                lines.append(f"{path.name}: {named}{f' (and {more} more)' if more > 0 else ''}")
+            sound = len(paths) - len(lines)
+            return "\n".join((f"{pluralize(sound, 'session')} sound, every file read.", *lines))
+
+        self._start(work)
+
+    def _repair_chosen(self) -> None:
+        path = self.chosen[0].path
+        output = _free(path.with_name(f"{path.name}-repaired"))
+
+        def work(progress: Progress) -> str:
+            progress.at(0.0, f"Repairing {path.name}")
+            made = repair_session(path, output)
+            kept = pluralize(len(made.alignments), "alignment")
+            return f"{output.name}: a copy with {kept} and {pluralize(len(made.trials), 'trial')}."
+
+        self._start(work)
+
+    def _delete_chosen(self) -> None:
+        paths = [entry.path for entry in self.chosen]
+
+        def work(progress: Progress) -> str:
+            for done, path in enumerate(paths):
+                progress.at(done / len(paths), f"Deleting {path.name}")
+                delete_session(path)
+            return f"{pluralize(len(paths), 'session')} deleted; Restore brings the last one back."
+
+        self._start(work)
+
+    def _restore_last(self) -> None:
+        last = self._deleted[-1]
+        self._start(lambda _: f"{restore_session(last).name} is back.")
+
+    def _start(self, work: Work) -> None:
+        if self._job is not None:
+            return
+        self._job = Job(work)
+        self._job.progressed.connect(lambda doing, _: self._say(f"{doing}…"))
+        self._job.succeeded.connect(self._end)
+        self._job.failed.connect(self._end)
+        self._job.cancelled.connect(self._end)
+        self._job.start()
+        self._refresh()
+
+    def _end(self, said: object = "") -> None:
+        assert self._job is not None
+        self._job.wait()
+        self._job = None
+        self._say(str(said))
+        self.reload()
+        self._refresh()
+
+    def _say(self, message: str) -> None:
+        self._message.setText(message)
+        self._message.setVisible(bool(message))
+
+    def _make_buttons(self) -> None:
+        made: list[tuple[str, str, str, Callable[[], None]]] = [
+            ("openSession", "Open", "Review the selected session", self._open_chosen),
+            ("resumeSession", "Resume", "Continue the selected session", self._resume_chosen),
+            ("exportSessions", "Export…", "Export the selected sessions", self._export_chosen),
+            ("checkSessions", "Check", "Read every file of the selected", self._check_chosen),
+            (
+                "repairSession",
+                "Repair",
+                "Copy what is sound to a new one",
+                self._repair_chosen,
+            ),
+            ("deleteSessions", "Delete", "Move the selected away (Del)", self._delete_chosen),
+            ("restoreSession", "Restore", "Bring the last deleted back", self._restore_last),
+        ]
+        found = []
+        for name, text, help_text, do in made:
+            one = button(name, text, help_text=help_text)
+            one.setAutoDefault(False)
+            one.clicked.connect(do)
+            found.append(one)
+        self._open, self._resume, self._export, self._check, self._repair = found[:5]
+        self._delete, self._undo = found[5:]
+        add_action(self._table, "Delete sessions", "Del", self._delete.click)
+        add_action(self._table, "Open the session", "Return", self._open_chosen)
+
+    def _lay_out(self) -> None:
+        self._deleted_text = ElidedLabel()
+        below = QWidget()
+        vbox(self._trend_title, (self._trend, 1), on=below, margins=0, spacing=0)
+        halves = QSplitter(Qt.Orientation.Vertical)
+        halves.addWidget(self._table)
+        halves.addWidget(below)
+        halves.setStretchFactor(0, 3)
+        halves.setStretchFactor(1, 1)
+        halves.setChildrenCollapsible(False)
+        top = hbox((self._search, 1), self._kind, spacing=SPACING_PX)
+        actions = hbox(
+            (self._deleted_text, 1),
+            self._undo,
+            self._delete,
+            self._repair,
+            self._check,
+            self._export,
+            self._resume,
+            self._open,
+            spacing=SPACING_PX,
+        )
+        vbox(
+            top,
+            (halves, 1),
+            self._count,
+            self._message,
+            actions,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=SPACING_PX,
+        )
+        self.resize(130 * SPACING_PX, 84 * SPACING_PX)
+
+
+def _table(model: SessionsFilter) -> QTableView:
+    table = with_name(QTableView(), "sessionTable", "Sessions")
+    table.setModel(model)
+    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+    table.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+    table.setTabKeyNavigation(False)
+    table.setWordWrap(False)
+    table.setShowGrid(False)
+    table.setAlternatingRowColors(True)
+    table.setSortingEnabled(True)
+    table.sortByColumn(1, Qt.SortOrder.DescendingOrder)
+    table.setMinimumHeight(12 * SPACING_PX)
+    table.verticalHeader().hide()
+    table.verticalHeader().setDefaultSectionSize(table.fontMetrics().height() + SPACING_PX // 2)
+    across = table.horizontalHeader()
+    flat_header(across)
+    across.setHighlightSections(False)
+    across.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+    across.setStretchLastSection(True)
+    return table
+
+
+def _row(index: object) -> int:
+    return index.row()  # type: ignore[attr-defined,no-any-return]
+
+
+def _free(path: Path) -> Path:
+    """Return a path that does not exist, with a number if needed."""
+    number = 2
+    found = path
+    while found.exists():
+        found, number = path.with_name(f"{path.name}-{number}"), number + 1
+    return found

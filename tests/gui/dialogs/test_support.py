@@ -1,0 +1,27 @@
+"""The support bundle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal.station import support
+from handcal.station.support import SupportSettings
+from handcal_gui.dialogs.support import SupportDialog
+from tests.gui.helpers import child, text
+
+
+def test_the_dialog_writes_a_bundle(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(support, "examine", list)
+    dialog = SupportDialog(SupportSettings(tmp_path), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    child(dialog, QPushButton, "writeBundle").click()
+    qtbot.waitUntil(lambda: "is written" in text(dialog, "supportSaid"), timeout=10_000)
+    assert len(list(tmp_path.glob("handcal-support-*.zip"))) == 1
+    dialog.stop()

@@ -1,0 +1,199 @@
+"""The library window: found, compared, checked, repaired, deleted and restored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QComboBox, QLineEdit, QPushButton, QTableView
+from pytestqt.qtbot import QtBot
+
+from handcal.rig.example import example_rig
+from handcal.session.session import Session
+from handcal.types import Alignment
+from handcal_gui.windows.library.sessions_model import FILTERS
+from handcal_gui.windows.library.trend_plot import TrendPlot
+from handcal_gui.windows.library.window import LibraryWindow
+from tests.gui.helpers import child, text
+
+PATIENCE_MS = 10_000
+
+
+def results(verdict: str, expected: float, measured: float | None = None) -> dict[str, Any]:
+    one: dict[str, Any] = {"verdict": verdict, "benefit": {"after_arcmin": expected}}
+    if measured is not None:
+        one["measured_arcmin"] = [2.0 * measured, measured]
+    return {"version": 2, "eyes": {"left": one, "right": one}}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, alignment: Alignment) -> Path:
+    """Return a folder with two sessions of Ada, one of Bea and one of Cid that is damaged."""
+
+    def make(name: str, wearer: str, solved: dict[str, Any] | None) -> Path:
+        with Session.create(tmp_path, example_rig(), {}, name=name, wearer=wearer) as session:
+            session.save_alignment(alignment)
+            if solved is not None:
+                session.save_results(solved)
+                session.finish()
+        return session.path
+
+    make("ada-1", "Ada", results("accept", 9.0, 4.0))
+    make("ada-2", "Ada", results("accept", 8.0))
+    make("bea", "Bea", results("repeat", 17.0))
+    path = make("cid", "Cid", None)
+    (path / "alignments" / "1.npz").write_bytes(b"nonsense")
+    return tmp_path
+
+
+@pytest.fixture
+def window(qtbot: QtBot, folder: Path) -> Iterator[LibraryWindow]:
+    window = LibraryWindow(folder)
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitUntil(lambda: table(window).model().rowCount() == 4, timeout=PATIENCE_MS)
+    yield window
+    window.stop()
+
+
+def table(window: LibraryWindow) -> QTableView:
+    return child(window, QTableView, "sessionTable")
+
+
+def rows(window: LibraryWindow) -> list[list[str]]:
+    model = table(window).model()
+    return [
+        [model.index(row, column).data() for column in range(model.columnCount())]
+        for row in range(model.rowCount())
+    ]
+
+
+def wearers(window: LibraryWindow) -> list[str]:
+    return [row[0] for row in rows(window)]
+
+
+def choose(window: LibraryWindow, *wearer: str) -> None:
+    table(window).clearSelection()
+    table(window).setSelectionMode(QTableView.SelectionMode.MultiSelection)
+    for number, row in enumerate(rows(window)):
+        if row[0] in wearer:
+            table(window).selectRow(number)
+
+
+def press(window: LibraryWindow, name: str) -> None:
+    found = child(window, QPushButton, name)
+    assert found.isEnabled()
+    found.click()
+
+
+def test_the_newest_is_first_and_measured_is_not_expected(window: LibraryWindow) -> None:
+    assert wearers(window) == ["Cid", "Bea", "Ada", "Ada"]
+    newer, older = rows(window)[2:]
+    assert older[4:9] == ["✓ Accept", "4.0 / 4.0", "9.0 / 9.0", "–", "Finished"]
+    assert newer[5:7] == ["– / –", "8.0 / 8.0"]
+    assert rows(window)[0][4] == "Not solved"
+    assert rows(window)[0][8] == "Damaged: 1 part"
+
+
+def test_search_filter_and_sorting(window: LibraryWindow) -> None:
+    QTest.keyClicks(child(window, QLineEdit, "search"), "ada EXAMPLE")
+    assert wearers(window) == ["Ada", "Ada"]
+    assert "2 of 4 sessions" in text(window, "count")
+    child(window, QLineEdit, "search").clear()
+    kinds = child(window, QComboBox, "kind")
+    expected = {"all": 4, "accepted": 2, "repeat": 1, "unfinished": 1, "damaged": 1}
+    for kind in FILTERS:
+        kinds.setCurrentIndex(kinds.findData(kind))
+        assert len(rows(window)) == expected[kind]
+    kinds.setCurrentIndex(0)
+    table(window).sortByColumn(5, Qt.SortOrder.AscendingOrder)  # the unmeasured follow
+    assert rows(window)[0][5] == "4.0 / 4.0"
+
+
+def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
+    plot = child(window, TrendPlot)
+    choose(window, "Bea")
+    assert plot.isHidden()
+    choose(window, "Ada")
+    assert not plot.isHidden()
+    assert text(window, "trendTitle") == "Ada: 2 calibrations"
+    measured, expected = plot._measured["left"].getData(), plot._expected["left"].getData()
+    assert list(measured[1][:1]) == [4.0]
+    assert list(expected[1]) == [9.0, 8.0]
+
+
+def test_buttons_fit_the_choice(window: LibraryWindow) -> None:
+    enabled = {
+        (): set(),
+        ("Bea",): {"openSession", "exportSessions", "checkSessions"},
+        ("Cid",): {"openSession", "resumeSession", "exportSessions", "checkSessions"},
+        ("Ada", "Bea"): {"exportSessions", "checkSessions"},
+    }
+    names = ("openSession", "resumeSession", "exportSessions", "checkSessions")
+    for wearer, expected in enabled.items():
+        choose(window, *wearer)
+        assert {name for name in names if child(window, QPushButton, name).isEnabled()} == expected
+
+
+def test_open_and_export_ask_for_what_is_chosen(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada")
+    with qtbot.waitSignal(window.export_requested) as asked:
+        press(window, "exportSessions")
+    assert asked.args[0] == [folder / "ada-2", folder / "ada-1"]
+    choose(window, "Bea")
+    with qtbot.waitSignal(window.open_requested) as opened:
+        press(window, "openSession")
+    assert opened.args == [folder / "bea"]
+
+
+def wait_for(qtbot: QtBot, window: LibraryWindow, said: str) -> None:
+    qtbot.waitUntil(lambda: said in text(window, "message"), timeout=PATIENCE_MS)
+
+
+def test_check_names_the_damage_and_repair_copies_the_rest(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada", "Bea", "Cid")
+    press(window, "checkSessions")
+    wait_for(qtbot, window, "3 sessions sound, every file read.")
+    assert "cid: alignments/1.npz" in text(window, "message")
+    choose(window, "Cid")
+    press(window, "repairSession")
+    wait_for(qtbot, window, "cid-repaired: a copy with 0 alignments")
+    qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
+    assert (folder / "cid-repaired").is_dir()
+    assert not Session.open(folder / "cid-repaired").damaged
+
+
+def test_delete_and_restore(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    assert child(window, QPushButton, "restoreSession").isHidden()
+    choose(window, "Bea")
+    table(window).setFocus()
+    QTest.keyClick(table(window), Qt.Key.Key_Delete)
+    qtbot.waitUntil(lambda: "Bea" not in wearers(window), timeout=PATIENCE_MS)
+    assert not (folder / "bea").exists()
+    press(window, "restoreSession")
+    qtbot.waitUntil(lambda: "Bea" in wearers(window), timeout=PATIENCE_MS)
+    qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
+
+
+def test_an_open_session_stays(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    choose(window, "Bea")
+    with Session(folder / "bea"):
+        press(window, "deleteSessions")
+        wait_for(qtbot, window, "is in use by process")
+    assert (folder / "bea").is_dir()
+
+
+def test_an_empty_folder(qtbot: QtBot, tmp_path_factory: pytest.TempPathFactory) -> None:
+    window = LibraryWindow(tmp_path_factory.mktemp("empty"))
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitUntil(lambda: text(window, "count").startswith("0 sessions"), timeout=PATIENCE_MS)
+    window.stop()

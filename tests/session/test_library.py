@@ -1,0 +1,152 @@
+"""The library of sessions: what each holds, unharmed by what is damaged; deleting and restoring."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handcal.errors import FileError
+from handcal.rig.example import example_rig
+from handcal.session.library import (
+    DELETED,
+    delete_session,
+    deleted_sessions,
+    read_library,
+    restore_session,
+)
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
+from handcal.types import Alignment, HeadsetIdentity
+
+RESULTS = {
+    "version": 2,
+    "eyes": {
+        "left": {
+            "verdict": "accept",
+            "benefit": {"after_arcmin": 7.5},
+            "measured_arcmin": [11.0, 4.5],
+        },
+        "right": {"verdict": "repeat", "benefit": {"after_arcmin": 16.0}},
+    },
+}
+
+
+@pytest.fixture
+def make(tmp_path: Path, alignment: Alignment) -> Callable[..., Path]:
+    def make(name: str, wearer: str, *, solved: bool = True) -> Path:
+        rig = example_rig()
+        with Session.create(tmp_path, rig, {}, name=name, wearer=wearer) as session:
+            session.save_facts(headset=HeadsetIdentity("00000000000000aa", "Lab 9"))
+            session.save_alignment(alignment)
+            if solved:
+                session.save_results(RESULTS)
+            for x_m in (1e-3, 3e-3):
+                shift_m = np.array([x_m, 0.0, 0.0])
+                session.save_trial(make_trial(rig.eyes["left"], "left", 0.5, np.zeros(3), shift_m))
+            session.finish()
+        return session.path
+
+    return make
+
+
+def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_path: Path) -> None:
+    path = make("one", "Ada")
+    (entry,) = read_library(tmp_path)
+    assert (entry.path, entry.wearer, entry.headset) == (path, "Ada", "Lab 9")
+    assert entry.rig == example_rig().name
+    assert (entry.alignments, entry.trials, entry.is_finished) == (1, 2, True)
+    left, right = entry.eyes["left"], entry.eyes["right"]
+    assert (left.verdict, left.expected_arcmin, left.measured_arcmin) == ("accept", 7.5, 4.5)
+    assert (right.verdict, right.expected_arcmin, right.measured_arcmin) == ("repeat", 16.0, None)
+    trials = Session.open(path).trials.values()
+    means = [trial.error_arcmin.mean() for trial in trials]
+    assert entry.trials_arcmin == pytest.approx(np.mean(means))
+    assert not entry.problem
+    assert not entry.damaged
+
+
+def test_results_that_no_longer_hold_are_not_shown(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    with Session(make("one", "Ada")) as session:
+        session.delete("alignment", 1)
+    (entry,) = read_library(tmp_path)
+    assert entry.eyes == {}
+    assert not entry.is_finished
+
+
+def test_a_damaged_session_says_so_and_spares_the_others(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    sound, torn, lost = make("sound", "A"), make("torn", "B"), make("lost", "C")
+    lines = (torn / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    lines[2] = lines[2].replace(b"sha256", b"sha255")
+    (torn / "journal.jsonl").write_bytes(b"".join(lines))
+    (lost / "journal.jsonl").write_bytes(b"nonsense\n")
+    other = make("other", "D")
+    (other / "alignments" / "1.npz").unlink()
+    (other / "rig.yaml").write_text("nonsense")
+    found = {entry.path: entry for entry in read_library(tmp_path)}
+    assert set(found) == {sound, torn, lost, other}
+    assert found[other].damaged == 2
+    assert found[other].rig == example_rig().name  # the journal's copy
+    assert found[sound].damaged == 0
+    assert found[torn].damaged > 0
+    assert found[torn].wearer == "B"
+    assert "does not begin as the journal" in found[lost].problem
+
+
+@pytest.mark.parametrize(
+    "eyes", [None, [], {"left": 1}, {"left": {"benefit": [], "measured_arcmin": [1, True]}}]
+)
+def test_strange_results_are_no_obstacle(
+    make: Callable[..., Path], tmp_path: Path, eyes: object
+) -> None:
+    with Session(make("one", "Ada", solved=False)) as session:
+        session.save_results({"eyes": eyes})
+    (entry,) = read_library(tmp_path)
+    for outcome in entry.eyes.values():
+        assert outcome.measured_arcmin is None
+        assert outcome.expected_arcmin is None
+
+
+def test_only_changed_sessions_are_read_again(make: Callable[..., Path], tmp_path: Path) -> None:
+    make("one", "Ada"), make("two", "Bea")
+    before = read_library(tmp_path)
+    with Session(tmp_path / "two") as session:
+        session.save_notes("changed")
+    after = {entry.path.name: entry for entry in read_library(tmp_path, before)}
+    kept = {entry.path.name: entry for entry in before}
+    assert after["one"] is kept["one"]
+    assert after["two"] is not kept["two"]
+
+
+def test_a_deleted_session_can_be_restored(make: Callable[..., Path], tmp_path: Path) -> None:
+    path = make("one", "Ada")
+    gone = delete_session(path)
+    assert gone == tmp_path / DELETED / "one"
+    assert read_library(tmp_path) == ()
+    assert deleted_sessions(tmp_path) == (gone,)
+    make("one", "Bea")
+    second = delete_session(tmp_path / "one")
+    assert second.name == "one-2"
+    assert deleted_sessions(tmp_path) == (gone, second)
+    make("one", "Cid")
+    with pytest.raises(FileError, match="exists; rename it"):
+        restore_session(gone)
+    assert restore_session(second) == tmp_path / "one-2"
+    assert {entry.wearer for entry in read_library(tmp_path)} == {"Bea", "Cid"}
+    with pytest.raises(FileError, match="not in a folder"):
+        restore_session(tmp_path / "one")
+
+
+def test_an_open_session_is_not_deleted(make: Callable[..., Path], tmp_path: Path) -> None:
+    path = make("one", "Ada")
+    with Session(path), pytest.raises(FileError):
+        delete_session(path)
+    assert len(read_library(tmp_path)) == 1
+    with pytest.raises(FileError, match="not a session"):
+        delete_session(tmp_path)
