@@ -127,6 +127,7 @@ class StationForm(QWidget):
             _add_row(grid, title, fields[part])
             grid.addWidget(self._findings[part], grid.rowCount(), 1)
         grid.addWidget(self._advanced, grid.rowCount(), 1)
+        grid.setRowStretch(grid.rowCount(), 1)
 
 
 def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:
