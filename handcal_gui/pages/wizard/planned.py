@@ -210,13 +210,11 @@ class PlannedWizard(Wizard):
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
-        view = self._save(snapshot)
+        view = replace(self._save(snapshot), fact=_drawn_otherwise(snapshot.procedure))
         if not snapshot.record.is_finished:
             return view
         slipped = ButtonSpec(Action.SLIPPED, "Headset &slipped")
-        return replace(
-            view, others=(*view.others, slipped), fact=_drawn_otherwise(snapshot.procedure)
-        )
+        return replace(view, others=(*view.others, slipped))
 
     def _take_step(self, label: str, can_do: bool) -> ButtonSpec:
         """Return the main button, which works only while the plan is held."""
