@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.station.preflight import check_station
 from handcal_gui.engine.latest_job import LatestJob
@@ -165,6 +165,7 @@ class StartPage(QWidget):
         right.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         room_px = cards.minimumSizeHint().width() + right.verticalScrollBar().sizeHint().width()
         right.setMinimumWidth(room_px)
+        right.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         grid = QGridLayout(self)
         grid.setContentsMargins(*4 * (3 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)

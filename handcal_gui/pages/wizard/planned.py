@@ -120,7 +120,7 @@ class PlannedWizard(Wizard):
         return self._raise(snapshot)
 
     def _raise(self, snapshot: Snapshot) -> WizardView:
-        others = (ButtonSpec(Action.BACK, "&Back"),)
+        others: tuple[ButtonSpec, ...] = (ButtonSpec(Action.BACK, "&Back"),)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             others += (ButtonSpec(Action.SOLVE, "Keep the alignments &so far"),)
         return WizardView(
