@@ -174,6 +174,8 @@ class _Measurement(QObject):
             self.started_s = time.perf_counter()
         if self._seen > _WARM_UP + 100 * len(self.memory_mb):
             self.memory_mb.append(_resident_mb())
+            sys.stderr.write(f"frames seen: {self._seen - _WARM_UP}\n")
+            sys.stderr.flush()
         if self._seen > _WARM_UP + self._frames:
             self.ended_s = time.perf_counter()
             QApplication.quit()
@@ -228,7 +230,7 @@ def measure(frames: int) -> list[BenchFigure]:
 
 
 def main() -> None:
-    """Measure, and print the figures as JSON."""
+    """Measure; print progress to stderr, and at the end the figures as JSON."""
     parser = argparse.ArgumentParser(prog="handcal_gui.benchmark", description=__doc__)
     parser.add_argument("--frames", type=int, default=20_000)
     arguments = parser.parse_args()

@@ -16,6 +16,7 @@ from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
 from handcal.io.settings import read_settings, settings_json
 from handcal.link.pairing import Pairings
+from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
@@ -31,7 +32,8 @@ _OLD_ERROR_MAX_ARCMIN = 15.0
 def _default_station() -> StationSettings:
     documents = QStandardPaths.StandardLocation.DocumentsLocation
     folder = Path(QStandardPaths.writableLocation(documents)) / "handcal sessions"
-    return StationSettings(sessions=str(folder))
+    plan = PlanSettings("recommended", is_automatic=True)
+    return StationSettings(sessions=str(folder), plan=plan)
 
 
 @dataclass(frozen=True, slots=True)

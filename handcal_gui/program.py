@@ -132,6 +132,18 @@ class Program(QObject):
         settings = self._preferences.station
         self._run(lambda: Station(settings, resume=path, pairings=self._pairings))
 
+    def begin_from(self, path: Path) -> None:
+        """Begin a session from a stored one of the same wearer, whose φ is verified first."""
+        station = self._preferences.station
+        plan = replace(station.plan, name="recommended", is_automatic=True)
+        settings = replace(station, plan=plan)
+        try:
+            wearer = Session.open(path).wearer
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return
+        self._run(lambda: Station(settings, wearer, pairings=self._pairings, former=path))
+
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""
         self.live.stop()
@@ -314,6 +326,8 @@ class Program(QObject):
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.export())
         review_page.resume_requested.connect(self._resume_reviewed)
+        review_page.again_requested.connect(self._begin_from_shown)
+        self.live.slipped.connect(self._begin_from_shown)
         review_page.close_requested.connect(self.show_start)
         self.wizard_panel.plan_changed.connect(
             lambda plan: self._remember(replace(self._preferences, plan=plan))
@@ -393,6 +407,11 @@ class Program(QObject):
     def _resume_reviewed(self) -> None:
         if self.review.record is not None:
             self.resume_session(self.review.record.path)
+
+    def _begin_from_shown(self) -> None:
+        record = self._record()
+        if record is not None:
+            self.begin_from(record.path)
 
     def _record(self) -> SessionRecord | None:
         """Return the session shown, as stored on the disk."""

@@ -17,6 +17,7 @@ from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import HandcalError
 
 if TYPE_CHECKING:
+    from handcal.progress import Progress
     from handcal.station.doctor import Finding
 
 
@@ -37,7 +38,8 @@ def bench(arguments: argparse.Namespace) -> None:
     if arguments.only not in ("", *PARTS):
         fail(f"unknown part {arguments.only!r}; choose from {', '.join(PARTS)}", 2)
     if arguments.gui:
-        result = _bench_window(300 if arguments.quick else 20_000)
+        with show_progress() as progress:
+            result = _bench_window(300 if arguments.quick else 20_000, progress)
     else:
         with show_progress() as progress:
             result = run_bench(
@@ -139,12 +141,22 @@ def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:
         return examine_headset(server, rig, camera, arguments.patience_s, progress)
 
 
-def _bench_window(frames: int) -> dict[str, Any]:
+def _bench_window(frames: int, progress: Progress) -> dict[str, Any]:
     """Measure the desktop program in a separate process, since the engine may not import it."""
     command = [sys.executable, "-m", "handcal_gui.benchmark", "--frames", str(frames)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
-    if done.returncode != 0:
-        last = (done.stderr.strip().splitlines() or ["no reason was given"])[-1]
+    last = "no reason was given"
+    with subprocess.Popen(  # noqa: S603
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        progress.at(0.0, f"{frames:,} frames, {frames / 30 / 60:.1f} minutes at 30 frames a second")
+        for line in process.stderr:
+            last = line.strip() or last
+            if (seen := last.removeprefix("frames seen: ")) != last:
+                progress.at(int(seen) / frames, "frames of the window")
+        output = process.stdout.read()  # a line, written at the end
+    if process.returncode != 0:
         raise HandcalError(f"cannot measure the desktop program; it needs a display: {last}")
-    measured: dict[str, Any] = json.loads(done.stdout)
+    measured: dict[str, Any] = json.loads(output)
     return measured

@@ -94,6 +94,7 @@ class Plan:
         self._checks_first = checks_first
         self._decided: tuple[object, Planned | None] | None = None
         self._is_over = False
+        self._skipped: set[Eye] = set()
 
     def next_step(self, is_steady: bool) -> NextStep:
         """Return the next step; nothing changes. `is_steady`: the hand is in view and still."""
@@ -147,6 +148,19 @@ class Plan:
         self._is_over = step.name is StepName.DONE
         return step
 
+    def skip(self) -> None:
+        """End the verification without a result; the plan does not verify this eye again.
+
+        Raises
+        ------
+        ProcedureError
+            Unless an eye is being verified.
+        FileError
+            If the session cannot be written; the verification ends anyway.
+        """
+        self._skipped |= {*self._calibration.eyes} if self._calibration.verifying else set()
+        self._calibration.skip_verification()
+
     def _make_cursor(self, planned: Planned) -> None:
         is_moved = self.settings.name == "recommended"
         self._calibration.make_cursor(planned.eyes, planned.displacement_W_m if is_moved else None)
@@ -182,7 +196,7 @@ class Plan:
         return self._decided[1]
 
     def _unverified(self) -> tuple[Eye, ...]:
-        done = self._calibration.verifications
+        done = {*self._calibration.verifications, *self._skipped}
         return tuple(eye for eye in self.settings.usable_eyes if eye not in done)
 
     def _reason_to_end(self, unverified: tuple[Eye, ...]) -> str | None:
@@ -208,7 +222,7 @@ class Plan:
         return next_check(
             self._calibration.results,
             self._calibration.verifications,
-            usable_eyes=self.settings.usable_eyes,
+            usable_eyes=tuple(e for e in self.settings.usable_eyes if e not in self._skipped),
             settings=self.settings.placement,
         )
 

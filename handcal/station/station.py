@@ -39,7 +39,7 @@ from handcal.sim.wearer import WearerSettings
 from handcal.station.former import Former, read_former
 from handcal.station.hands import PlacedHand
 from handcal.station.lab_prior import run_learn_prior
-from handcal.station.plan import NextStep, Plan
+from handcal.station.plan import NextStep, Plan, StepName
 from handcal.station.procedure import Calibration, Observation, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
@@ -112,6 +112,7 @@ class Station(Closable):
         self._watchers: list[Callable[[Snapshot], object]] = []
         self.holds_plan = False
         self._next_step: NextStep | None = None
+        self._observation: Observation | None = None
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
             self.session = stack.enter_context(_open_session(settings, wearer, resume))
@@ -221,6 +222,7 @@ class Station(Closable):
             if self.calibration.state is State.APPLYING:
                 self.calibration.poll_applied()
             if observation is not None:
+                self._observation = observation
                 self._next_step = self._follow_plan(observation)
         except LinkError as error:
             self._not_applied = str(error)
@@ -262,6 +264,24 @@ class Station(Closable):
         if self.plan.settings.is_automatic and not self.holds_plan:
             return self.plan.advance(observation)
         return self.plan.next_step(observation.is_steady)
+
+    def take_step(self) -> None:
+        """Do the next step of a plan that is held.
+
+        Raises
+        ------
+        ProcedureError
+            If it cannot be done yet.
+        LinkError
+            If the link is closed.
+        FileError
+            If the session cannot be written; the step is done anyway.
+        """
+        if self._observation is None:
+            raise ProcedureError("wait for the camera's first frame")
+        step = self.plan.advance(self._observation)
+        if step.name in (StepName.RAISE, StepName.WAIT):
+            raise ProcedureError(step.text)
 
     def finish(self) -> None:
         """Record the link statistics and finish the session; FileError if it cannot be written."""

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from typing import Literal
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
@@ -20,6 +21,7 @@ from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.engine.engine_thread import Command, EngineThread
+from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
@@ -57,7 +59,8 @@ class CalibrationController(QObject):
         The engine ended; the reason, empty if it was closed.
     polled : Signal(Snapshot)
         The snapshot now shown.
-    export_requested, next_wearer_requested : Signal()
+    export_requested, next_wearer_requested, slipped : Signal()
+        *slipped*: the headset has slipped; another session is to begin from this one.
     """
 
     opened = Signal(object)
@@ -65,6 +68,7 @@ class CalibrationController(QObject):
     polled = Signal(object)
     export_requested = Signal()
     next_wearer_requested = Signal()
+    slipped = Signal()
 
     def __init__(
         self, window: MainWindow, wizard_panel: WizardPanel, comparison: Comparison
@@ -78,7 +82,7 @@ class CalibrationController(QObject):
         self._link: HeadsetServer | None = None
         self._is_broken = False
         self._snapshot: Snapshot | None = None
-        self._is_watching = False
+        self._is_watching = self._is_plan_held = False
         self._conditions = Conditions()
         panels = window.panels
         self._turns: deque[Panel] = deque(
@@ -109,10 +113,11 @@ class CalibrationController(QObject):
         """End the present calibration and open a station; if held, no step runs by itself."""
         self.stop()
         self._is_watching = self._is_broken = False
+        self._is_plan_held = True
         self._doing = self._shown = 0
         self._conditions = Conditions()
         self._wizard_panel.start(Wizard(plan), is_held=is_held)
-        self._engine = EngineThread(open_station, self)
+        self._engine = EngineThread(lambda: _held(open_station()), self)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
         self._engine.failed.connect(self._on_command_failed)
@@ -145,6 +150,8 @@ class CalibrationController(QObject):
             self.export_requested.emit()
         elif action is Action.NEXT_WEARER:
             self.next_wearer_requested.emit()
+        elif action is Action.SLIPPED:
+            self.slipped.emit()
         elif self._snapshot is not None and self._shown >= self._doing:
             self._perform(action, self._snapshot)
 
@@ -162,14 +169,24 @@ class CalibrationController(QObject):
         unverified = self._wizard_panel.wizard.unverified(snapshot)
         if unverified:
             commands[Action.VERIFY] = lambda calibration: calibration.verify(unverified[0])
+        is_planned = isinstance(self._wizard_panel.wizard, PlannedWizard)
         if snapshot.procedure.state is State.VERIFY:
             commands[Action.SKIP] = _skip
-        if action is Action.SKIP:
+        if is_planned:
+            commands |= {
+                Action.ANOTHER: lambda calibration: calibration.make_cursor(eyes),
+                Action.CHECK_LEFT: lambda calibration: calibration.verify("left"),
+                Action.CHECK_RIGHT: lambda calibration: calibration.verify("right"),
+            }
+        stationwide: dict[Action, Command] = {Action.FINISH: Station.finish}
+        if is_planned:
+            stationwide |= {Action.TAKE_STEP: Station.take_step, Action.SKIP: _skip_planned}
+        if action is Action.SKIP and not is_planned:
             self._wizard_panel.wizard.move(action, snapshot)
-        if action in commands:
+        if action in stationwide:
+            self._doing = self._submit(action.value, stationwide[action])
+        elif action in commands:
             self._doing = self._calibrate(action.value, commands[action])
-        elif action is Action.FINISH:
-            self._doing = self._submit(action.value, Station.finish)
         else:
             if action is not Action.SKIP:
                 self._wizard_panel.wizard.move(action, snapshot)
@@ -184,10 +201,15 @@ class CalibrationController(QObject):
                 "move the outline", lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)
             )
 
+    def _go_back(self, to: Literal["offline", "former"]) -> None:
+        """Have the headset draw with another φ."""
+        self._calibrate("go back", lambda calibration: calibration.go_back(to))
+
     def _connect(self) -> None:
         panels = self._window.panels
         self._wizard_panel.asked.connect(self.do)
         self._wizard_panel.nudged.connect(self._nudge)
+        self._wizard_panel.went_back.connect(self._go_back)
         self._wizard_panel.step_changed.connect(
             lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
         )
@@ -278,6 +300,8 @@ class CalibrationController(QObject):
             if panel in always or is_due:
                 panel.show_snapshot(snapshot)
         self._window.banner.show_condition(condition)
+        wizard = self._wizard_panel.wizard
+        self._hold_plan(isinstance(wizard, PlannedWizard) and wizard.holds_plan)
         self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
 
@@ -296,8 +320,19 @@ class CalibrationController(QObject):
             self._is_watching = wanted
             self._submit("watch", lambda station: setattr(station, "watch_views", wanted))
 
+    def _hold_plan(self, wanted: bool) -> None:
+        """Have the station follow its plan by itself, or hold it."""
+        if wanted != self._is_plan_held:
+            self._is_plan_held = wanted
+            self._submit("hold", lambda station: setattr(station, "holds_plan", wanted))
+
     def _on_opened(self, station: Station) -> None:
-        panels, self._link = self._window.panels, station.link
+        self._link = station.link
+        plan = station.plan.settings
+        if plan.name == "recommended":
+            is_held = self._wizard_panel.wizard.is_held
+            self._wizard_panel.start(PlannedWizard(plan.usable_eyes), is_held=is_held)
+        panels = self._window.panels
         self._solve_settings = station.settings.calibration.solve
         host, port = station.address
         host = f"[{host}]" if ":" in host else host
@@ -341,6 +376,19 @@ def _confirm(calibration: Calibration) -> None:
     """Confirm for the wearer, who may have done so already."""
     if calibration.state is State.ALIGN:
         calibration.confirm()
+
+
+def _held(station: Station) -> Station:
+    """Hold the plan of a station that was just opened, until the guide lets it go."""
+    station.holds_plan = True
+    return station
+
+
+def _skip_planned(station: Station) -> None:
+    """Skip the verification, which the wearer may have ended already; the plan goes on."""
+    with suppress(FileError):
+        if station.calibration.state is State.VERIFY:
+            station.plan.skip()
 
 
 def _skip(calibration: Calibration) -> None:

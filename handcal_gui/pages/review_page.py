@@ -22,11 +22,13 @@ class ReviewPage(QWidget):
 
     Attributes
     ----------
-    export_requested, resume_requested, close_requested : Signal()
+    export_requested, resume_requested, again_requested, close_requested : Signal()
+        *again_requested*: the wearer is to be calibrated again, beginning from this session.
     """
 
     export_requested = Signal()
     resume_requested = Signal()
+    again_requested = Signal()
     close_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -40,11 +42,17 @@ class ReviewPage(QWidget):
         self._export = main_button("reviewExport", "&Export…")
         self._resume = button("reviewResume", "&Resume this session")
         self._resume.setToolTip("Open camera and headset to add alignments, fine-tuning or trials")
+        self._again = button("reviewAgain", "Calibrate a&gain")
+        self._again.setToolTip(
+            "The same wearer, or the headset has slipped: begins with this result, which each eye "
+            "checks first"
+        )
         close = button("reviewClose", "&Close session")
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)
+        self._again.clicked.connect(self.again_requested)
         close.clicked.connect(self.close_requested)
-        buttons = hbox(self._export, self._resume, 0, close)
+        buttons = hbox(self._export, self._resume, self._again, 0, close)
         vbox(
             self._title,
             self._facts,
@@ -68,6 +76,7 @@ class ReviewPage(QWidget):
         """
         self._title.setText(record.wearer or "Session without a name")
         self._export.setEnabled(bool(record.alignments))
+        self._again.setEnabled(results is not None)
         while self._facts.rowCount():
             self._facts.removeRow(0)
         for name, fact in _facts(record, results, note):

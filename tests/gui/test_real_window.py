@@ -13,16 +13,20 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from PySide6.QtGui import QImage
 
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.session.session import Session, SessionRecord
+from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES
 from handcal_gui.pages.start.session_entries import find_sessions
 from tests.helpers import ROOT, Patience, write_small_rig
 
 ARTEFACTS = ROOT / "artefacts"
 PATIENCE_S = 90.0
+_BUTTON_PX = 24, 28
+"""A place on the main button, from the lower right corner."""
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +51,7 @@ class Window(Closable):
 
     def __init__(self, display: str, *arguments: str | Path) -> None:
         self._environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+        self.pressed: list[str] = []
         command = [sys.executable, "-m", "handcal_gui", *map(str, arguments)]
         self.process = subprocess.Popen(
             command, env=self._environment, stderr=subprocess.PIPE, text=True
@@ -58,6 +63,7 @@ class Window(Closable):
         self._xdotool("windowfocus", "--sync", found.split()[0])
 
     def press(self, *keys: str) -> None:
+        self.pressed.extend(keys)
         self._xdotool("key", *keys)
 
     def hold(self, key: str, seconds: float) -> None:
@@ -69,7 +75,7 @@ class Window(Closable):
     def type(self, text: str) -> None:
         self._xdotool("type", text)
 
-    def shoot(self, name: str) -> None:
+    def shoot(self, name: str) -> Path:
         """Keep a picture of the whole screen."""
         ARTEFACTS.mkdir(exist_ok=True)
         code = (
@@ -78,6 +84,13 @@ class Window(Closable):
         )
         path = ARTEFACTS / f"{name}.png"
         subprocess.run([sys.executable, "-c", code, path], env=self._environment, check=True)
+        return path
+
+    def offers(self) -> bool:
+        """Return whether the main button, at the lower right of the screen, has its colour."""
+        image = QImage(str(self.shoot("real-now")))
+        seen = image.pixelColor(image.width() - _BUTTON_PX[0], image.height() - _BUTTON_PX[1])
+        return seen.hsvSaturation() > 100
 
     def end(self) -> tuple[int, str]:
         """Wait for the end; return the exit status and what was complained of."""
@@ -253,6 +266,46 @@ def test_begin_and_finish_are_all_that_is_pressed(
         window.shoot("real-9-station")
         window.press("ctrl+q")
         window.end_well()
+
+
+def test_three_presses_lead_from_the_start_page_to_a_verified_result(
+    display: str, tmp_path: Path, preferences: Path, record_property: Callable[..., None]
+) -> None:
+    """The recommended plan; each key is pressed once, when the button is offered."""
+    known = json.loads(preferences.read_text())
+    known["station"]["plan"] = {"name": "recommended", "is_automatic": True}
+    preferences.write_text(json.dumps(known | {"runs_itself": True}))
+    with Window(display, "--preferences", preferences) as window:
+        technician = Technician(window, tmp_path / "sessions", preferences)
+        window.find()
+        time.sleep(2.0)
+        started_s = time.monotonic()
+        technician.start("Ada")
+        wait_for("Begin", window.offers, window)
+        window.press("space")
+        technician.wait_until("cursor_made")
+
+        def is_over() -> bool:
+            session = technician.session()
+            is_verified = session is not None and set(session.facts.verified) == set(EYES)
+            is_sent = is_verified and session is not None and session.events[-1].name == "applied"
+            return is_sent and window.offers()
+
+        wait_for("the end of the plan", is_over, window)
+        record_property("seconds", round(time.monotonic() - started_s))
+        window.shoot("real-8-planned")
+        window.press("space")
+        technician.wait_until("finished")
+        window.shoot("real-9-planned")
+        assert window.pressed == ["Return", "space", "space"]
+        window.press("ctrl+q")
+        window.end_well()
+    session = technician.session()
+    assert session is not None
+    assert session.facts.plan == "recommended"
+    results = solve_again(session, stored_solve_settings(session))
+    assert results is not None
+    assert {one.name for one in results.verdicts.values()} == {"accept"}
 
 
 def calibrated_and_exported(window: Window, technician: Technician) -> SessionRecord:

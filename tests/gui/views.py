@@ -4,16 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
+from handcal.station.plan import NextStep, StepName
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
+from handcal.types import EYES, Eye
+from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView
 
 _ZERO = (0.0, 0.0, 0.0)
+_NUDGED = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
+PLANNED: dict[StepName, tuple[State, tuple[Eye, ...]]] = {
+    StepName.RAISE: (State.SHOW_HAND, ("left",)),
+    StepName.CURSOR: (State.APPLIED, ("right",)),
+    StepName.ALIGN: (State.ALIGN, ("left",)),
+    StepName.SOLVE: (State.ALIGNED, EYES),
+    StepName.APPLY: (State.SOLVED, EYES),
+    StepName.WAIT: (State.APPLYING, EYES),
+    StepName.VERIFY: (State.APPLIED, ("left",)),
+    StepName.NUDGE: (State.VERIFY, ("left",)),
+    StepName.DONE: (State.APPLIED, ()),
+}
+"""State and eyes with each next step of a plan."""
 
 
 def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[WizardView]:
@@ -32,8 +49,7 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
         wizard.view(snapshot(State.SOLVED))
         views.append(wizard.view(snapshot(State.APPLIED, procedure={"results": None})))
         views.append(wizard.view(snapshot(State.APPLIED, record=one)))
-        nudged = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
-        views.append(wizard.view(snapshot(State.VERIFY, procedure={"verifying": nudged})))
+        views.append(wizard.view(snapshot(State.VERIFY, procedure={"verifying": _NUDGED})))
         applied = snapshot(State.APPLIED)
         for _ in range(3):  # each eye in turn, then the result
             views.append(wizard.view(applied))
@@ -42,7 +58,37 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
         for is_finished in (False, True):
             finished = replace(record, is_finished=is_finished)
             views.append(wizard.view(snapshot(State.APPLIED, record=finished)))
+    for is_held in (False, True):
+        views.extend(_planned_views(snapshot, record, is_held=is_held))
     assert {view.step for view in views} == set(Step)
     offers = [offer for view in views for offer in (view.main, *view.others)]
     assert {offer.action for offer in offers} == set(Action)
     return list(dict.fromkeys(views))
+
+
+def planned_snapshot(
+    snapshot: Callable[..., Snapshot], name: StepName, **procedure: Any
+) -> Snapshot:
+    """Return a snapshot whose plan's next step has a name."""
+    state, eyes = PLANNED[name]
+    planned = {"plan": "recommended", "next_step": NextStep(name, eyes, "as told"), "eyes": eyes}
+    if name is StepName.NUDGE:
+        planned["verifying"] = _NUDGED
+    return snapshot(state, procedure={**planned, **procedure})
+
+
+def _planned_views(
+    snapshot: Callable[..., Snapshot], record: SessionRecord, *, is_held: bool
+) -> list[WizardView]:
+    """Return a view of every next step of a plan."""
+    wizard = PlannedWizard()
+    wizard.is_held = is_held
+    snapshots = [planned_snapshot(snapshot, name) for name in StepName]
+    views = [wizard.view(snapshots[0])]
+    wizard.move(Action.NEXT, snapshots[0])
+    views.extend(wizard.view(one) for one in snapshots)
+    wizard.move(Action.NEXT, snapshots[-1])
+    for is_finished in (False, True):
+        finished = replace(record, is_finished=is_finished)
+        views.append(wizard.view(replace(snapshots[-1], record=finished)))
+    return views

@@ -185,3 +185,14 @@ def test_asking_changes_nothing(make: Callable[..., Planned]) -> None:
     second = planned.plan.next_step(is_steady=True)
     assert first.name is second.name is StepName.CURSOR
     assert planned.stage.state() is State.SHOW_HAND
+
+
+def test_a_skipped_eye_is_not_verified_by_the_plan(make: Callable[..., Planned]) -> None:
+    planned = make(replace(RECOMMENDED, placement=ONCE, usable_eyes=("left",)))
+    planned.until(StepName.ALIGN)
+    planned.confirm()
+    planned.until(StepName.NUDGE)
+    planned.plan.skip()
+    assert planned.stage.state() is State.APPLIED
+    planned.until(StepName.DONE)
+    assert planned.stage.calibration.verifications == {}

@@ -11,7 +11,9 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import fill_row, number, whole_number, with_name
+from handcal_gui.widgets.fields import choice, fill_row, number, whole_number, with_name
+
+_SIDES = {"": "By the seed", "left": "Left", "right": "Right"}
 
 
 class AdvancedFields(QWidget):
@@ -45,6 +47,9 @@ class AdvancedFields(QWidget):
         )
         self._loss = number("loss", 0.0, 50.0, 1.0, " %", "Datagrams dropped in each direction.")
         self._reorder = number("reorder", 0.0, 50.0, 1.0, " %", "Datagrams delivered out of order.")
+        self._side = choice("side", "Simulated hand", _SIDES, "The hand that is raised.")
+        self._side.currentIndexChanged.connect(self.changed)
+        self._calibration.add_row("Simulated hand", self._side)
         for label, field in (
             ("Simulated wearer", self._seed),
             ("Simulated loss", self._loss),
@@ -69,6 +74,7 @@ class AdvancedFields(QWidget):
         self._real_time.setChecked(settings.playback.real_time)
         self._loop.setChecked(settings.playback.loop)
         self._seed.setValue(settings.seed)
+        self._side.setCurrentIndex(self._side.findData(settings.side or ""))
         self._loss.setValue(100 * settings.loss)
         self._reorder.setValue(100 * settings.reorder)
 
@@ -79,6 +85,7 @@ class AdvancedFields(QWidget):
             calibration=self._calibration.take(settings.calibration),
             playback=PlaybackSettings(self._real_time.isChecked(), self._loop.isChecked()),
             seed=self._seed.value(),
+            side=self._side.currentData() or None,
             loss=self._loss.value() / 100,
             reorder=self._reorder.value() / 100,
         )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit
+from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QSizePolicy
 
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.doctor import Finding, Health
@@ -211,5 +211,8 @@ class NewCalibration(Card):
 
     def _lay_out(self) -> None:
         last = hbox((self._problem, 1), self._cancel, self._button, spacing=SPACING_PX)
-        self.body.addWidget(scrollable(self._form), 1)
+        form = scrollable(self._form)
+        # Or the page around it would scroll, and hide the button.
+        form.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        self.body.addWidget(form, 1)
         self.body.addLayout(last)  # in sight, however long the form

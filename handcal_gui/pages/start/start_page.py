@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.station.preflight import check_station
 from handcal_gui.engine.latest_job import LatestJob
@@ -18,7 +18,7 @@ from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
@@ -167,7 +167,14 @@ class StartPage(QWidget):
     def _lay_out(self) -> None:
         title = QLabel("handcal")
         scale_font(title, 2.0, is_bold=True)
-        right = vbox((self._resume, 1), (self._open, 1), self._evaluate, spacing=2 * SPACING_PX)
+        cards = QWidget()
+        parts = (self._resume, 1), (self._open, 1), self._evaluate
+        vbox(*parts, on=cards, margins=0, spacing=2 * SPACING_PX)
+        right = scrollable(cards)  # or a small window hides the button that starts
+        right.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        room_px = cards.minimumSizeHint().width() + right.verticalScrollBar().sizeHint().width()
+        right.setMinimumWidth(room_px)
+        right.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         grid = QGridLayout(self)
         grid.setContentsMargins(*4 * (3 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)
@@ -176,5 +183,5 @@ class StartPage(QWidget):
         hint = QLabel("Calibrate a see-through headset with the wearer's bare hand.")
         grid.addLayout(hbox(title, hint, 0, spacing=2 * SPACING_PX), 0, 1, 1, 2)
         grid.addWidget(self.new, 1, 1)
-        grid.addLayout(right, 1, 2)
+        grid.addWidget(right, 1, 2)
         grid.setRowStretch(1, 1)

@@ -16,6 +16,7 @@ from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.advanced_fields import AdvancedFields
 from handcal_gui.pages.start.camera_field import CameraField
 from handcal_gui.pages.start.headset_field import HeadsetField
+from handcal_gui.pages.start.plan_field import PlanField
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import button, fill_row
 from handcal_gui.widgets.finding_line import FindingLine
@@ -64,25 +65,27 @@ class StationForm(QWidget):
         self._calibrate_rig.clicked.connect(self.rig_wanted)
         self._sessions = PathField("Session folder", "folder")
         self._sessions.setToolTip("Each calibration gets its own folder in this folder.")
+        self._plan = PlanField()
         self._advanced = AdvancedFields()
+        self._parts = self._plan, self._camera, self._headset, self._advanced
         self._findings = {part: FindingLine(part) for part in PARTS}
         self._lay_out(wearer)
         self.show_settings(settings)
-        for field in (self._camera, self._headset, self._rig, self._sessions, self._advanced):
+        for field in (self._rig, self._sessions, *self._parts):
             field.changed.connect(self.changed)
 
     @property
     def settings(self) -> StationSettings:
         """The settings as shown."""
         settings = replace(self._settings, rig=self._rig.path, sessions=self._sessions.path)
-        for field in (self._camera, self._headset, self._advanced):
+        for field in self._parts:
             settings = field.take(settings)
         return settings
 
     def show_settings(self, settings: StationSettings) -> None:
         """Show settings."""
         self._settings = settings
-        for field in (self._camera, self._headset, self._advanced):
+        for field in self._parts:
             field.show_settings(settings)
         self._rig.set_path(settings.rig)
         self._sessions.set_path(settings.sessions)
@@ -123,6 +126,7 @@ class StationForm(QWidget):
         grid.setVerticalSpacing(SPACING_PX // 2)
         grid.setColumnStretch(1, 1)
         _add_row(grid, "Wearer", wearer)
+        _add_row(grid, "Plan", self._plan)
         grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
         for part, title in PARTS.items():
             _add_row(grid, title, fields[part])

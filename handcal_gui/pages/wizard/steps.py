@@ -28,9 +28,9 @@ PLANS: dict[EyePlan, str] = {
     "left": "Left eye only",
     "right": "Right eye only",
 }
-_DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
+DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
 _LEAST_ALIGN_NS = 1_500_000_000
-_UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
+UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
 _MOST_BY_ITSELF = 2
@@ -60,10 +60,13 @@ class Wizard:
     Attributes
     ----------
     plan : EyePlan
+    is_held : bool
+        True if every step waits for a person.
     """
 
     def __init__(self, plan: EyePlan = "each") -> None:
         self.plan = plan
+        self.is_held = False
         self._repeat: tuple[Eye, ...] | None = None
         self._skipped: set[Eye] = set()
         self._free = Step.CONNECT
@@ -162,7 +165,7 @@ class Wizard:
             back = ButtonSpec(Action.SOLVE, "Keep the alignments &so far")
         return WizardView(
             Step.SHOW_HAND,
-            f"Raise one bare hand {_DISTANCE}, palm toward you and fingers a little apart.",
+            f"Raise one bare hand {DISTANCE}, palm toward you and fingers a little apart.",
             (hand_check(snapshot),),
             ButtonSpec(Action.NEXT, "Next", is_placed(snapshot)),
             (back,),
@@ -172,7 +175,7 @@ class Wizard:
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
         return WizardView(
             Step.MAKE_CURSOR,
-            f"Hold the hand still: it becomes the cursor for {_names(self.eyes(snapshot))}.",
+            f"Hold the hand still: it becomes the cursor for {eye_names(self.eyes(snapshot))}.",
             (hand_check(snapshot), still_check(snapshot)),
             ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady(snapshot)),
             (ButtonSpec(Action.BACK, "&Back"),),
@@ -228,15 +231,17 @@ class Wizard:
         send = ButtonSpec(Action.APPLY, "Send to the headset")
         instruction = "Send the corrected projections to the headset."
         kept = tuple(eye for eye, name in names.items() if name == "keep")
-        if _UNUSABLE.intersection(names.values()):
+        if UNUSABLE.intersection(names.values()):
             instruction = "Do not use this result. Follow the advice below, then repeat."
             send = ButtonSpec(Action.APPLY, "Send to the headset", False)
             others += (ButtonSpec(Action.APPLY, "Send &anyway", discards=_SENDS_UNUSABLE),)
         elif len(kept) == len(names):
-            instruction = f"Keep the offline calibration of {_names(kept)}."
+            instruction = f"Keep the offline calibration of {eye_names(kept)}."
             send = ButtonSpec(Action.APPLY, "Keep offline")
         elif kept:
-            instruction = f"Send the projections to the headset, those of {_names(kept)} offline."
+            instruction = (
+                f"Send the projections to the headset, those of {eye_names(kept)} offline."
+            )
         return WizardView(
             Step.SOLVE,
             instruction,
@@ -254,7 +259,7 @@ class Wizard:
             sending = ButtonSpec(Action.APPLY, "Sending…", False)
             return WizardView(Step.VERIFY, wait, checks, sending)
         if snapshot.procedure.verifying is not None:
-            return _nudge(snapshot, snapshot.procedure.verifying)
+            return nudge_view(snapshot, snapshot.procedure.verifying)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return WizardView(
                 Step.VERIFY,
@@ -264,7 +269,7 @@ class Wizard:
                 (ButtonSpec(Action.ANOTHER, "&Add alignment"),),
             )
         if not self._is_complete(snapshot):
-            eyes = _names(self.eyes(snapshot))
+            eyes = eye_names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
                 f"Now repeat this with {eyes}.",
@@ -277,7 +282,7 @@ class Wizard:
             ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
             ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
         )
-        is_usable = not any(check.verdict in _UNUSABLE for check in checks)
+        is_usable = not any(check.verdict in UNUSABLE for check in checks)
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
             return WizardView(
@@ -289,7 +294,7 @@ class Wizard:
                 runs_after_s=_STILL_S,
             )
         if advice := _advice(snapshot):
-            eyes = _names(advice.eyes or EYES)
+            eyes = eye_names(advice.eyes or EYES)
             few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
             return WizardView(
                 Step.VERIFY,
@@ -381,7 +386,7 @@ def _advice(snapshot: Snapshot) -> Advice | None:
     return None if worst is None else results.advice[worst]
 
 
-def _nudge(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
+def nudge_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
     """Return the view while an eye's outline is moved until it covers the hand."""
     eye, moved = verifying.eye, verifying.moved
     other = "right" if eye == "left" else "left"
@@ -404,5 +409,6 @@ def _nudge(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
     )
 
 
-def _names(eyes: Sequence[Eye]) -> str:
+def eye_names(eyes: Sequence[Eye]) -> str:
+    """Return eyes in words."""
     return "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"

@@ -22,6 +22,7 @@ from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.automatic import Automatic
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
+from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, Step, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
@@ -48,6 +49,11 @@ _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     ("Make the outline smaller", "-"): (0.0, 0.0, -_GROWTH),
 }
 """Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
+_GO_BACK = {
+    "former": ("Draw with φ before the newest, or with the newest again", "G"),
+    "offline": ("Draw with the offline calibration", "Shift+G"),
+}
+"""Name and key of each φ that the headset can go back to."""
 
 
 class WizardPanel(QWidget):
@@ -69,6 +75,9 @@ class WizardPanel(QWidget):
     nudged : Signal(float, float, float)
         The outline of a verification is to move to the right and down, in arcminutes, and to grow
         by a share.
+    went_back : Signal(str)
+        The headset is to draw with the φ before the newest, ``"former"``, or with the offline
+        calibration, ``"offline"``.
     step_changed : Signal(Step)
         Another step is shown.
     """
@@ -78,6 +87,7 @@ class WizardPanel(QWidget):
     plan_changed = Signal(str)
     hold_changed = Signal(bool)
     nudged = Signal(float, float, float)
+    went_back = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -89,6 +99,7 @@ class WizardPanel(QWidget):
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
         self._nudges = self._nudge_actions()
+        self._go_back = self._go_back_actions()
         self._rail = _Rail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True)
@@ -126,7 +137,7 @@ class WizardPanel(QWidget):
 
     def hold(self, is_held: bool) -> None:
         """Let every step wait for a person, or let steps run by themselves."""
-        self._automatic.is_held = is_held
+        self._automatic.is_held = self.wizard.is_held = is_held
         self._hold.setChecked(is_held)
 
     def fill_window(self, is_alone: bool) -> None:
@@ -165,6 +176,20 @@ class WizardPanel(QWidget):
             action.setEnabled(False)
             actions.append(action)
         return actions
+
+    def _go_back_actions(self) -> list[QAction]:
+        """Return the actions that have the headset draw with another φ; the guide is then held."""
+        actions = []
+        for to, (name, keys) in _GO_BACK.items():
+            action = add_action(self, name, keys, partial(self._ask_to_go_back, to))
+            action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+            action.setEnabled(False)
+            actions.append(action)
+        return actions
+
+    def _ask_to_go_back(self, to: str) -> None:
+        self.hold(True)  # or a plan would go on, and send another φ
+        self.went_back.emit(to)
 
     def _choose_hold(self, is_held: bool) -> None:
         self.hold(is_held)
@@ -224,7 +249,9 @@ class WizardPanel(QWidget):
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
         has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
-        self._choice.setVisible(view.step not in OF_THE_RESULT)
+        # The station's plan chooses the eyes by itself.
+        is_planned = isinstance(self.wizard, PlannedWizard)
+        self._choice.setVisible(view.step not in OF_THE_RESULT and not is_planned)
         self.picture.result.buttons.setVisible(has_card)
         checks = [check for check in view.checks if not (has_card and check.verdict)]
         for i, row in enumerate(self._checks):
@@ -236,6 +263,8 @@ class WizardPanel(QWidget):
         self._note.setVisible(bool(view.note))
         for action in self._nudges:
             action.setEnabled(view.main.action is Action.VERIFIED)
+        for action in self._go_back:
+            action.setEnabled(view.step is not Step.CONNECT)
         self.bar.show_view(view)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:

@@ -53,6 +53,7 @@ _OBSTACLES = {
     State.ALIGNED: "Solve and apply the alignment first.",
     State.SOLVED: "Apply the solved projections first.",
     State.APPLYING: "The headset is receiving the solved projections.",
+    State.VERIFY: "An eye is being verified; confirm or skip that first.",
 }
 _ARRIVALS = {
     Arrival.SENDING: ("wait", "Sending to the headset…"),

@@ -40,5 +40,10 @@ class ConvergencePlot(Plot):
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
                 self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))
-        lengths = [len(s.history_m2) for eyes in results.alignments.values() for s in eyes.values()]
-        self.item.setXRange(1, 1.1 * max(lengths, default=1))  # with space for the numbers
+        histories = [s.history_m2 for eyes in results.alignments.values() for s in eyes.values()]
+        longest = max(map(len, histories), default=1)
+        largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
+        self.item.setXRange(1, 1.1 * longest)  # with space for the numbers
+        self.item.setYRange(0.0, 1.4 * largest_mm)  # and for the legend
+        spacing = max(1, longest // 5)
+        self.item.getAxis("bottom").setTickSpacing(spacing, spacing)

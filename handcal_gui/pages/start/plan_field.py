@@ -1,0 +1,62 @@
+"""The choice of the plan that a session follows, and of the eyes that the wearer sees with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from handcal.station.settings import StationSettings
+from handcal.types import EYES, Eye, PlanName
+from handcal_gui.widgets.fields import choice, fill_row
+
+_PLANS: dict[PlanName, str] = {"recommended": "Recommended", "paper": "As in the paper"}
+_PLAN_HELP = (
+    "Recommended: the hand is raised once; its cursors are placed where they tell most,\n"
+    "and each eye is verified. The steps follow by themselves.\n"
+    "As in the paper: each cursor is the hand where it is held; you choose the eyes in the guide."
+)
+_EYES: dict[str, str] = {"both": "Both eyes", "left": "Left eye only", "right": "Right eye only"}
+_USABLE: dict[str, tuple[Eye, ...]] = {"both": EYES, "left": ("left",), "right": ("right",)}
+
+
+class PlanField(QWidget):
+    """Plan and usable eyes.
+
+    Attributes
+    ----------
+    changed : Signal()
+    """
+
+    changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._plan = choice("plan", "Plan", _PLANS, _PLAN_HELP)
+        self._eyes = choice("usableEyes", "Eyes", _EYES, "One eye for a wearer who sees with one.")
+        fill_row(self, self._plan, self._eyes, grows=self._eyes)
+        self.setFocusProxy(self._plan)
+        for field in (self._plan, self._eyes):
+            field.currentIndexChanged.connect(self._on_changed)
+
+    def show_settings(self, settings: StationSettings) -> None:
+        """Show the plan of a station."""
+        self._plan.setCurrentIndex(self._plan.findData(settings.plan.name))
+        name = next(
+            key for key, eyes in _USABLE.items() if set(eyes) == {*settings.plan.usable_eyes}
+        )
+        self._eyes.setCurrentIndex(self._eyes.findData(name))
+        self._eyes.setVisible(settings.plan.name == "recommended")
+
+    def take(self, settings: StationSettings) -> StationSettings:
+        """Return settings with the plan shown; the guide chooses the eyes of the paper's plan."""
+        name: PlanName = self._plan.currentData()
+        is_recommended = name == "recommended"
+        usable = _USABLE[self._eyes.currentData()] if is_recommended else EYES
+        plan = replace(settings.plan, name=name, usable_eyes=usable, is_automatic=is_recommended)
+        return replace(settings, plan=plan)
+
+    def _on_changed(self) -> None:
+        self._eyes.setVisible(self._plan.currentData() == "recommended")
+        self.changed.emit()

@@ -1,0 +1,232 @@
+"""The guide while the station follows the recommended plan: it shows the plan's next step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from handcal.station.plan import NextStep, StepName
+from handcal.station.procedure import State
+from handcal.station.snapshot import Procedure, Snapshot
+from handcal.types import EYES, Eye, EyePlan
+from handcal_gui.pages.wizard.checks import (
+    hand_check,
+    is_placed,
+    is_steady,
+    still_check,
+    verdict_checks,
+)
+from handcal_gui.pages.wizard.steps import DISTANCE, UNUSABLE, Wizard, eye_names, nudge_view
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
+from handcal_gui.widgets.sentence import sentence
+
+_STEPS = {
+    StepName.RAISE: Step.SHOW_HAND,
+    StepName.CURSOR: Step.MAKE_CURSOR,
+    StepName.ALIGN: Step.ALIGN,
+    StepName.SOLVE: Step.SOLVE,
+    StepName.APPLY: Step.SOLVE,
+    StepName.VERIFY: Step.VERIFY,
+    StepName.NUDGE: Step.VERIFY,
+    StepName.DONE: Step.VERIFY,
+}
+_STATES = {
+    State.ALIGN: Step.ALIGN,
+    State.ALIGNED: Step.SOLVE,
+    State.SOLVED: Step.SOLVE,
+    State.APPLYING: Step.SOLVE,
+    State.VERIFY: Step.VERIFY,
+}
+_FOLLOWS = Step.SHOW_HAND
+"""The guide's own place while the plan goes on."""
+_CHECKS: dict[Eye, ButtonSpec] = {
+    "left": ButtonSpec(Action.CHECK_LEFT, "Check l&eft eye"),
+    "right": ButtonSpec(Action.CHECK_RIGHT, "Check &right eye"),
+}
+
+
+class PlannedWizard(Wizard):
+    """The current step of a plan that the station follows by itself.
+
+    Parameters
+    ----------
+    usable_eyes : tuple of eye
+
+    The plan is held before *Begin* and after *Finish*, and while the guide is held: then the main
+    button takes its next step.
+    """
+
+    def __init__(self, usable_eyes: tuple[Eye, ...] = EYES) -> None:
+        plan: EyePlan = "each" if len(usable_eyes) > 1 else usable_eyes[0]
+        super().__init__(plan)
+        self.usable_eyes = usable_eyes
+        self._latest = _FOLLOWS
+
+    @property
+    def holds_plan(self) -> bool:
+        """True if the plan is to be held."""
+        return self.is_held or self._free is not _FOLLOWS
+
+    def step(self, snapshot: Snapshot) -> Step:
+        """Return the step of the guide that the plan's next step belongs to."""
+        if self._free is not _FOLLOWS:
+            return self._free
+        procedure = snapshot.procedure
+        step = _STATES.get(procedure.state)
+        if step is None and procedure.next_step is not None:
+            step = _STEPS.get(procedure.next_step.name)
+        # A verification is solved and sent at its own step.
+        is_of_check = step is Step.SOLVE and procedure.verifications
+        self._latest = Step.VERIFY if is_of_check else step or self._latest
+        return self._latest
+
+    def move(self, action: Action, snapshot: Snapshot) -> None:  # noqa: ARG002 (as in Wizard)
+        """Make a move that does not involve the engine."""
+        if action not in (Action.NEXT, Action.BACK):
+            raise ValueError(f"{action} is an action of the engine")
+        ends = {Action.NEXT: Step.SAVE, Action.BACK: Step.CONNECT}
+        self._free = ends[action] if self._free is _FOLLOWS else _FOLLOWS
+
+    def eyes(self, snapshot: Snapshot) -> tuple[Eye, ...]:
+        """Return the eyes that the next alignment is for."""
+        planned = snapshot.procedure.next_step
+        return (planned.eyes if planned is not None else ()) or self.usable_eyes
+
+    def view(self, snapshot: Snapshot) -> WizardView:
+        """Return the view of a snapshot."""
+        step, procedure = self.step(snapshot), snapshot.procedure
+        if step is Step.CONNECT:
+            return self._connect(snapshot)
+        if step is Step.SAVE:
+            return self._saved(snapshot)
+        if procedure.state is State.ALIGN:
+            view = self._align(snapshot)
+            return replace(view, sentence=f"{view.sentence} The hand stays up.")
+        if procedure.verifying is not None:
+            return nudge_view(snapshot, procedure.verifying)
+        planned = procedure.next_step
+        if planned is None or planned.name in (StepName.WAIT, StepName.ALIGN, StepName.NUDGE):
+            return self._wait(step, snapshot)
+        if procedure.state is State.APPLYING:
+            return self._wait(step, snapshot)
+        if procedure.state in (State.ALIGNED, State.SOLVED):
+            return self._solved(step, snapshot)
+        match planned.name:
+            case StepName.CURSOR:
+                return self._cursor(planned, snapshot)
+            case StepName.VERIFY:
+                return self._check(planned, snapshot)
+            case StepName.DONE:
+                return self._done(planned, snapshot)
+        return self._raise(snapshot)
+
+    def _raise(self, snapshot: Snapshot) -> WizardView:
+        others: tuple[ButtonSpec, ...] = (ButtonSpec(Action.BACK, "&Back"),)
+        if snapshot.procedure.results is None and snapshot.procedure.alignments:
+            others += (ButtonSpec(Action.SOLVE, "Keep the alignments &so far"),)
+        return WizardView(
+            Step.SHOW_HAND,
+            f"Raise one bare hand {DISTANCE}, palm toward you and fingers a little apart; hold it "
+            "still.",
+            (hand_check(snapshot), still_check(snapshot)),
+            ButtonSpec(Action.TAKE_STEP, "Next", False),
+            others,
+        )
+
+    def _cursor(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
+        names = eye_names(planned.eyes)
+        text = f"Hold the hand still: it becomes the cursor for {names}."
+        if snapshot.procedure.alignments:
+            text = f"Keep the hand up: the next cursor, for {names}, follows at once."
+        return WizardView(
+            Step.MAKE_CURSOR,
+            text,
+            (hand_check(snapshot), still_check(snapshot)),
+            self._take_step("Make cursor", is_placed(snapshot)),
+            (ButtonSpec(Action.BACK, "&Back"),),
+        )
+
+    def _solved(self, step: Step, snapshot: Snapshot) -> WizardView:
+        is_solved = snapshot.procedure.state is State.SOLVED
+        text = "Solve for the positions of the eyes; the hand stays up."
+        if is_solved:
+            text = "Send the corrected projections to the headset; the hand stays up."
+        redo = ButtonSpec(
+            Action.REDO,
+            "&Discard and repeat",
+            discards="Deletes the last alignment; the session panel can restore it",
+        )
+        return WizardView(
+            step,
+            text,
+            verdict_checks(snapshot),
+            self._take_step("Send to the headset" if is_solved else "Solve", True),
+            (redo,) if snapshot.procedure.alignments else (),
+            snapshot.problem,
+        )
+
+    def _check(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
+        eye = planned.eyes[0]
+        return WizardView(
+            Step.VERIFY,
+            f"Keep the hand up and still, to measure the error of the {eye} eye.",
+            (hand_check(snapshot), still_check(snapshot), *verdict_checks(snapshot)),
+            self._take_step(f"Verify the {eye} eye", is_steady(snapshot)),
+            (ButtonSpec(Action.BACK, "&Back"),),
+        )
+
+    def _wait(self, step: Step, snapshot: Snapshot) -> WizardView:
+        planned = snapshot.procedure.next_step
+        text = "The hand stays up while the headset receives its projections."
+        is_refused = planned is not None and planned.name is StepName.WAIT
+        if is_refused and planned is not None and snapshot.procedure.is_applied:
+            text = f"{sentence(planned.text)}."
+        main = ButtonSpec(Action.TAKE_STEP, "Sending…", False)
+        back = (ButtonSpec(Action.BACK, "&Back"),)
+        return WizardView(step, text, verdict_checks(snapshot), main, back, snapshot.problem)
+
+    def _done(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
+        procedure, checks = snapshot.procedure, verdict_checks(snapshot)
+        main = ButtonSpec(Action.NEXT, "Finish as it is")
+        if any(check.verdict in UNUSABLE for check in checks):
+            text = "Do not use this result. Follow the advice below, then add alignments."
+        elif any(check.verdict == "repeat" for check in checks) or not checks:
+            text = "Not accepted yet: add an alignment, or check an eye again."
+        elif set(procedure.verifications) >= set(self.usable_eyes):
+            text = "The wearer has verified the result. Finish, or check an eye again."
+            main = ButtonSpec(Action.NEXT, "Finish")
+        else:
+            text = "Nobody has verified every eye. Finish, or check an eye again."
+        return WizardView(
+            Step.VERIFY,
+            text if checks else f"{sentence(planned.text)}.",
+            checks,
+            main,
+            (
+                ButtonSpec(Action.ANOTHER, "&Add alignment"),
+                *(_CHECKS[eye] for eye in self.usable_eyes),
+            ),
+            snapshot.problem,
+            fact=_drawn_otherwise(procedure),
+        )
+
+    def _saved(self, snapshot: Snapshot) -> WizardView:
+        view = replace(self._save(snapshot), fact=_drawn_otherwise(snapshot.procedure))
+        if not snapshot.record.is_finished:
+            return view
+        slipped = ButtonSpec(Action.SLIPPED, "Headset &slipped")
+        return replace(view, others=(*view.others, slipped))
+
+    def _take_step(self, label: str, can_do: bool) -> ButtonSpec:
+        """Return the main button, which works only while the plan is held."""
+        return ButtonSpec(Action.TAKE_STEP, label, self.is_held and can_do)
+
+
+def _drawn_otherwise(procedure: Procedure) -> str:
+    """Return a note if the headset draws with another φ than the result's; else empty."""
+    results, drawn_m = procedure.results, procedure.applied_shift_m
+    if results is None or procedure.state is not State.APPLIED:
+        return ""
+    solved_m = results.rendered_shift_m
+    if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
+        return ""
+    return "The headset draws with another φ than this result: gone back, or set by hand."

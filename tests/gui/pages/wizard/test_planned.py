@@ -1,0 +1,146 @@
+"""The guide shows the plan's next step, and takes it only while the plan is held."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.station.plan import StepName
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal.types import EYES, Verdict, VerdictName, Verification
+from handcal_gui.pages.wizard.planned import PlannedWizard
+from handcal_gui.pages.wizard.view import Action, Step
+from tests.gui.views import planned_snapshot
+
+Maker = Callable[..., Snapshot]
+VERIFIED = dict.fromkeys(EYES, Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0)))
+
+
+def begun(snapshot: Maker) -> PlannedWizard:
+    wizard = PlannedWizard()
+    wizard.move(Action.NEXT, planned_snapshot(snapshot, StepName.RAISE))
+    return wizard
+
+
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [
+        (StepName.RAISE, Step.SHOW_HAND),
+        (StepName.CURSOR, Step.MAKE_CURSOR),
+        (StepName.ALIGN, Step.ALIGN),
+        (StepName.SOLVE, Step.SOLVE),
+        (StepName.APPLY, Step.SOLVE),
+        (StepName.WAIT, Step.SOLVE),
+        (StepName.VERIFY, Step.VERIFY),
+        (StepName.NUDGE, Step.VERIFY),
+        (StepName.DONE, Step.VERIFY),
+    ],
+)
+def test_the_plan_s_next_step_is_shown(snapshot: Maker, name: StepName, step: Step) -> None:
+    wizard = begun(snapshot)
+    for is_held in (False, True):
+        wizard.is_held = is_held
+        view = wizard.view(planned_snapshot(snapshot, name))
+        assert view.step is step
+        assert view.sentence.endswith(".")
+        assert view.runs_after_s is None  # the station does it, not the guide
+
+
+@pytest.mark.parametrize("name", [StepName.CURSOR, StepName.SOLVE, StepName.APPLY, StepName.VERIFY])
+def test_a_person_takes_a_step_only_of_a_held_plan(snapshot: Maker, name: StepName) -> None:
+    wizard = begun(snapshot)
+    main = wizard.view(planned_snapshot(snapshot, name)).main
+    assert (main.action, main.is_enabled) == (Action.TAKE_STEP, False)
+    wizard.is_held = True
+    assert wizard.view(planned_snapshot(snapshot, name)).main == replace(main, is_enabled=True)
+
+
+def test_the_plan_is_held_before_it_begins_and_after_it_ends(snapshot: Maker) -> None:
+    wizard = PlannedWizard()
+    done = planned_snapshot(snapshot, StepName.DONE)
+    holds = []
+    for action in (Action.NEXT, Action.NEXT, Action.BACK, Action.BACK):
+        holds.append(wizard.holds_plan)
+        wizard.move(action, done)
+    assert holds == [True, False, True, False]
+    assert wizard.step(done) is Step.CONNECT
+    wizard.move(Action.NEXT, done)
+    wizard.is_held = True
+    assert wizard.holds_plan
+
+
+def test_the_state_counts_if_the_plan_s_step_is_older(snapshot: Maker) -> None:
+    wizard = begun(snapshot)
+    cursor = planned_snapshot(snapshot, StepName.CURSOR)
+    aligning = replace(cursor, procedure=replace(cursor.procedure, state=State.ALIGN))
+    assert wizard.view(aligning).main.action is Action.CONFIRM
+
+
+def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
+    wizard = begun(snapshot)
+    assert wizard.view(planned_snapshot(snapshot, StepName.ALIGN)).sentence.endswith("stays up.")
+    assert wizard.view(planned_snapshot(snapshot, StepName.CURSOR)).sentence.startswith("Keep the")
+    first = planned_snapshot(snapshot, StepName.CURSOR, alignments={})
+    assert wizard.view(first).sentence.startswith("Hold the hand still")
+
+
+@pytest.mark.parametrize(
+    ("name", "is_verified", "label", "says"),
+    [
+        ("accept", True, "Finish", "has verified"),
+        ("keep", True, "Finish", "has verified"),
+        ("accept", False, "Finish as it is", "Nobody has verified"),
+        ("repeat", True, "Finish as it is", "Not accepted yet"),
+        ("contradicted", True, "Finish as it is", "Do not use"),
+    ],
+)
+def test_the_end_says_what_was_reached(
+    snapshot: Maker, name: VerdictName, is_verified: bool, label: str, says: str
+) -> None:
+    done = planned_snapshot(snapshot, StepName.DONE, verifications=VERIFIED if is_verified else {})
+    assert done.procedure.results is not None
+    verdicts = dict.fromkeys(EYES, Verdict(name, "as told"))
+    results = replace(done.procedure.results, verdicts=verdicts)
+    done = replace(done, procedure=replace(done.procedure, results=results))
+    view = begun(snapshot).view(done)
+    assert says in view.sentence
+    assert (view.main.action, view.main.label) == (Action.NEXT, label)
+    assert [one.action for one in view.others] == [
+        Action.ANOTHER,
+        Action.CHECK_LEFT,
+        Action.CHECK_RIGHT,
+    ]
+
+
+def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:
+    wizard = PlannedWizard(("right",))
+    done = planned_snapshot(snapshot, StepName.DONE)
+    wizard.move(Action.NEXT, done)
+    assert Action.CHECK_LEFT not in [one.action for one in wizard.view(done).others]
+    assert wizard.eyes(done) == ("right",)
+
+
+def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
+    wizard = begun(snapshot)
+    done = planned_snapshot(snapshot, StepName.DONE)
+    assert done.procedure.results is not None
+    rendered = done.procedure.results.rendered_shift_m
+    as_solved = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=rendered)
+    assert wizard.view(as_solved).fact == ""
+    back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
+    gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
+    assert "another φ" in wizard.view(gone_back).fact
+
+
+def test_changed_alignments_can_be_solved_again(snapshot: Maker) -> None:
+    view = begun(snapshot).view(planned_snapshot(snapshot, StepName.RAISE, results=None))
+    assert Action.SOLVE in [one.action for one in view.others]
+
+
+def test_every_other_action_is_the_engine_s(snapshot: Maker) -> None:
+    with pytest.raises(ValueError, match="engine"):
+        begun(snapshot).move(Action.TAKE_STEP, planned_snapshot(snapshot, StepName.CURSOR))
