@@ -96,7 +96,7 @@ def write_northstar(path: Path, outcome: SessionOutcome) -> None:
     axes = []
     for eye in EYES:
         P_H = _from_head(outcome, eye)
-        eyes_H_m[eye] = -np.linalg.solve(P_H[:, :3], P_H[:, 3])
+        eyes_H_m[eye] = -np.linalg.inv(P_H[:, :3]) @ P_H[:, 3]
         axes.append(P_H[2, :3] / np.linalg.norm(P_H[2, :3]))
     between_m = eyes_H_m["right"] - eyes_H_m["left"]
     distance_m = float(np.linalg.norm(between_m))
