@@ -15,10 +15,11 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.camera.images import DISTORTION_COUNTS, MAX_SIDE_PX
+from handcal.camera.images import DISTORTION_COUNTS
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.errors import CameraEndError, CameraError
 from handcal.geometry import invert, rigid
+from handcal.io.images import MAX_SIDE_PX
 from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8, UInt16
 
 METADATA = "metadata.yaml"
@@ -248,8 +249,7 @@ def _stamp_ns(message: Any) -> int:
 
 def _pixels(message: Any, kind: str, channels: int, camera: Intrinsics) -> Any:
     """Return an image's (H, W, channels) values; CameraError if it is not of the camera's size."""
-    order = ">" if message.is_bigendian else "<"
-    dtype = np.dtype(kind).newbyteorder(order)
+    dtype = np.dtype(f"{'>' if message.is_bigendian else '<'}{kind}")
     size = camera.height, camera.width
     row_bytes = camera.width * channels * dtype.itemsize
     if (

@@ -92,10 +92,11 @@ def write_northstar(path: Path, outcome: SessionOutcome) -> None:
     Monado's head has both eyes on its x axis and parallel to it. That frame N is placed into the
     solved eyes, so the bearings of a plane projection are exact at the mesh's nodes.
     """
-    eyes_H_m, axes = {}, []
+    eyes_H_m: dict[Eye, Float64] = {}
+    axes = []
     for eye in EYES:
         P_H = _from_head(outcome, eye)
-        eyes_H_m[eye] = -np.linalg.solve(P_H[:, :3], P_H[:, 3])
+        eyes_H_m[eye] = -np.linalg.inv(P_H[:, :3]) @ P_H[:, 3]
         axes.append(P_H[2, :3] / np.linalg.norm(P_H[2, :3]))
     between_m = eyes_H_m["right"] - eyes_H_m["left"]
     distance_m = float(np.linalg.norm(between_m))
@@ -119,7 +120,8 @@ def write_northstar(path: Path, outcome: SessionOutcome) -> None:
             "num_grid_points_y": _GRID,
             "ipd": 1e3 * distance_m,
             "fov": [left, right, up, down],
-            **{eye: {"grid": bearings[eye].tolist()} for eye in EYES},
+            "left": {"grid": bearings["left"].tolist()},
+            "right": {"grid": bearings["right"].tolist()},
             "handcal": {
                 "session": outcome.name,
                 "rig_from_head": opengl_transform(T_H_N).tolist(),

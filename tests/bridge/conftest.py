@@ -18,11 +18,15 @@ from handcal.session.session import Session
 from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.states import Observation, State
-from handcal.types import HandCloud
+from handcal.types import Eye, Float64, HandCloud
 
-POINTS_D_M = np.random.default_rng(0).uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.6], (5000, 3))
+POINTS_D_M = (
+    np.random.default_rng(0)
+    .uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.6], (5000, 3))
+    .astype(np.float32)
+)
 T_W_D = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])
-SHIFT_M = {"left": np.array([0.003, 0.001, 0.005]), "right": np.zeros(3)}
+SHIFT_M: dict[Eye, Float64] = {"left": np.array([0.003, 0.001, 0.005]), "right": np.zeros(3)}
 
 
 def placed_hand() -> PlacedHand:
@@ -56,7 +60,9 @@ def snapshot(tmp_path: Path) -> Iterator[Snapshot]:
             frame=None,
             observation=Observation(State.SHOW_HAND, placed_hand(), "", True),
             camera=CameraStatus("Camera of the tests"),
-            link=LinkStatistics(True, 0, 0, 0, 0, 0, 0, 0, 0, {}, 60.0, *[None] * 4, 0, 0),
+            link=LinkStatistics(
+                True, 0, 0, 0, 0, 0, 0, 0, 0, {}, 60.0, None, None, None, None, 0, 0
+            ),
             link_problem="",
             problem="",
             procedure=procedure,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -66,7 +67,12 @@ def test_one_that_hangs_is_dropped_with_one_line(snapshot: Snapshot) -> None:
     with Bridge(spy, said.append, patience_s=0.05) as bridge:
         begin_s = time.thread_time()
         bridge(snapshot)
-        eventually(lambda: bridge(snapshot) or bridge.is_over)
+
+        def is_dropped() -> bool:
+            bridge(snapshot)
+            return bridge.is_over
+
+        eventually(is_dropped)
         assert said == ["Spy is off: nothing could be sent for 0.05 s"]
         for _ in range(1000):
             bridge(snapshot)
@@ -83,8 +89,6 @@ def test_only_the_newest_wait(snapshot: Snapshot) -> None:
     with Bridge(spy, pytest.fail) as bridge:
         bridge(numbered[0])
         eventually(lambda: bridge._sending_since_s is not None)
-        from dataclasses import replace
-
         for number in range(2, 6):
             bridge(replace(snapshot, number=number))
         spy.go.set()

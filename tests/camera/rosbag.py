@@ -11,6 +11,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from handcal.geometry import invert
 from handcal.types import Float64, Frame, Intrinsics
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -79,7 +80,7 @@ def frame_messages(frames: Iterable[Frame]) -> Iterable[tuple[str, int, Any]]:
             if frame.color_intrinsics is not None:
                 yield "/camera/color/camera_info", t_ns, info(frame.color_intrinsics, "color")
                 # The pose of colour in the link, of which depth is the child by another way.
-                T_D_C = np.linalg.inv(frame.T_C_D)
+                T_D_C = invert(frame.T_C_D)
                 yield (
                     "/tf_static",
                     t_ns,

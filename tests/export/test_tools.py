@@ -19,7 +19,7 @@ from handcal.errors import FileError
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity
-from handcal.geometry import project, transform
+from handcal.geometry import invert, project, transform
 from handcal.session.session import SessionRecord
 from handcal.types import EYES, Eye, Float64, Rig
 
@@ -97,7 +97,7 @@ def test_north_star_sees_each_point_in_its_bearing(tmp_path: Path, outcome: Sess
     assert (data["type"], data["version"]) == ("Moses Turner's distortion correction", 2)
     assert 45.0 < data["ipd"] < 85.0
     T_H_N = opengl_transform(np.array(data["handcal"]["rig_from_head"]))
-    points_N_m = (transform(np.linalg.inv(T_H_N), POINTS_H_M)) @ UP
+    points_N_m = transform(invert(T_H_N), POINTS_H_M) @ UP
     left, right, up, down = np.tan(data["fov"])
     for eye, side in zip(EYES, (-0.5, 0.5), strict=True):
         display = outcome.record.rig.eyes[eye]
@@ -122,8 +122,7 @@ def read_itk(path: Path) -> Float64:
     from_parent[:3, :3] = np.reshape(numbers[:9], (3, 3))
     from_parent[:3, 3] = numbers[9:]
     lps = np.diag([-1.0, -1.0, 1.0, 1.0])
-    found: Float64 = np.linalg.inv(lps @ from_parent @ lps)
-    return found
+    return invert(lps @ from_parent @ lps)
 
 
 def read_vtk(path: Path) -> tuple[Float64, NDArray[np.int32]]:
