@@ -27,17 +27,21 @@ class Card(QFrame):
         self._icon = QLabel()
         heading = QLabel(title)
         scale_font(heading, 1.3, is_bold=True)
-        head = QGridLayout()
+        self._head = head = QGridLayout()
         head.setHorizontalSpacing(SPACING_PX)
         head.setVerticalSpacing(SPACING_PX // 2)
         head.setColumnStretch(1, 1)
         head.addWidget(self._icon, 0, 0)
         head.addWidget(heading, 0, 1)
-        head.addWidget(paragraph(text=hint), 1, 0, 1, 2)
+        head.addWidget(paragraph(text=hint), 1, 0, 1, 3)
         self.body = QVBoxLayout()
         self.body.setSpacing(SPACING_PX)
         vbox(head, (self.body, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
         follow_theme(self, self._refresh)
+
+    def add_to_head(self, widget: QWidget) -> None:
+        """Add a widget to the right of the title, where it takes no height."""
+        self._head.addWidget(widget, 0, 2)
 
     def _refresh(self) -> None:
         self._icon.setPixmap(icon(self._icon_name).pixmap(3 * SPACING_PX))

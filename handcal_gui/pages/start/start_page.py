@@ -87,11 +87,12 @@ class StartPage(QWidget):
         )
         example = button("example", "Example", "Open the example session")
         example.setToolTip("A simulated wearer's session, copied to the session folder")
-        browse = button("browse", "Folder…", "Choose a session's folder")
-        library = button("library", "All…", "Search, compare, export and repair sessions")
-        for added in (browse, example, library):
+        browse = button("browse", "Choose folder…")
+        library = button("library", "All sessions…", "Search, compare, export and repair sessions")
+        for added in (browse, example):
             self._opened.add_button(added)
         self._open.body.addWidget(self._opened, 1)
+        self._open.add_to_head(library)
         self._evaluate = Card(
             "Evaluate", "Simulated studies, the cube test, and the user test.", "check"
         )
