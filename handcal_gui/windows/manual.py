@@ -43,12 +43,18 @@ class Manual(QTextBrowser):
         self.raise_()
         self.activateWindow()
 
-    def doSetSource(self, url: QUrl, kind: QTextDocument.ResourceType) -> None:
+    def doSetSource(
+        self,
+        name: QUrl | str,
+        /,
+        type: QTextDocument.ResourceType = QTextDocument.ResourceType.UnknownResource,  # noqa: A002
+    ) -> None:
         """Show a page, from the heading that the link names, as GitHub writes it."""
+        url = QUrl(name)
         target = self.source().resolved(url)
         if target.isLocalFile() and not target.path().endswith(_PAGES):
             return  # a picture or a folder would replace the page
-        super().doSetSource(url, kind)
+        super().doSetSource(url, type)
         heading = url.fragment(QUrl.ComponentFormattingOption.FullyDecoded)
         block = self.document().begin()
         while heading and block.isValid():
