@@ -110,6 +110,8 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
         raise HandcalError(
             "reading clouds needs Open3D, which is not installed: pip install 'handcal[3d]'"
         ) from error
+    if path.suffix.lower() == ".xyz":
+        return _parse_xyz(path, data), None
     try:
         with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
             cloud = open3d.t.io.read_point_cloud(path)
@@ -117,12 +119,32 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
         raise FileError(f"{path} is damaged, or not a cloud of its format") from error
     if "positions" not in cloud.point or not len(cloud.point.positions):
         raise FileError(f"{path} is damaged, or holds no points")
-    points_m = cloud.point.positions.numpy().astype(np.float64)
-    if len(points_m) > MAX_POINTS or not np.isfinite(points_m).all():
-        raise FileError(f"{path} has more than {MAX_POINTS:,} points, or one without a position")
+    points_m = _require_plausible(path, cloud.point.positions.numpy().astype(np.float64))
     if "is_cut" not in cloud.point:
         return points_m, None
     return points_m, cloud.point["is_cut"].numpy().ravel() > 0
+
+
+def _parse_xyz(path: Path, data: bytes) -> Float64:
+    """Return the points of an XYZ file.
+
+    Open3D 0.19 drops the last point of a file that ends without a line break, and writes it beyond
+    its memory.
+    """
+    try:
+        rows = [line.split()[:3] for line in data.splitlines() if line.strip()]
+        points_m = np.array(rows, np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise FileError(f"{path} is damaged, or not a cloud of its format") from error
+    if not len(points_m):
+        raise FileError(f"{path} is damaged, or holds no points")
+    return _require_plausible(path, points_m)
+
+
+def _require_plausible(path: Path, points_m: Float64) -> Float64:
+    if len(points_m) > MAX_POINTS or not np.isfinite(points_m).all():
+        raise FileError(f"{path} has more than {MAX_POINTS:,} points, or one without a position")
+    return points_m
 
 
 def _require_all_points(path: Path, data: bytes) -> None:

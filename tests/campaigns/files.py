@@ -238,14 +238,12 @@ def _batch(cases: dict[str, Case], work: Path, number: int, size: int, tally: Ta
     child = os.fork()
     if child == 0:
         os.close(told)
-        os.chdir(work)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what native code prints
-        chance = random.Random(number)
-        for _ in range(size):
-            name = chance.choice(sorted(cases))
-            os.write(tell, (json.dumps([name, None, 0.0, 0]) + "\n").encode())
-            result = _try(cases[name](work, chance))
-            os.write(tell, (json.dumps([name, *result]) + "\n").encode())
+        try:
+            _work(cases, work, random.Random(number), size, tell)
+        except BaseException as error:
+            os.write(
+                tell, (json.dumps(["the campaign itself", repr(error), 0.0, 0]) + "\n").encode()
+            )
         os._exit(0)
     os.close(tell)
     most_mb, begun = 0, ""
@@ -267,6 +265,17 @@ def _batch(cases: dict[str, Case], work: Path, number: int, size: int, tally: Ta
     if code or begun:
         tally.fail(f"{begun} (batch {number}): the process ended with {code}")
     return most_mb
+
+
+def _work(cases: dict[str, Case], work: Path, chance: random.Random, size: int, tell: int) -> None:
+    """Run mutations; tell each before and after."""
+    os.chdir(work)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what native code prints
+    for _ in range(size):
+        name = chance.choice(sorted(cases))
+        os.write(tell, (json.dumps([name, None, 0.0, 0]) + "\n").encode())
+        result = _try(cases[name](work, chance))
+        os.write(tell, (json.dumps([name, *result]) + "\n").encode())
 
 
 def _try(words: Words) -> tuple[str, float, int]:
@@ -305,7 +314,7 @@ def _run(words: Words) -> str:
         except SystemExit as error:
             code = error.code or 0
     lines = told.getvalue().splitlines()
-    if code == 1 and not lines and words[:2] == ["session", "check"]:
+    if code in (1, 2) and not lines and words[:2] == ["session", "check"]:
         return "read"  # the damage is its output
     if code == 0:
         return "read" if not lines else f"several lines: {told.getvalue()[:200]}"

@@ -127,3 +127,10 @@ def test_without_open3d_reading_says_so(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "cloud.xyz").write_text("0 0 0\n")
     with pytest.raises(HandcalError, match=r"pip install 'handcal\[3d\]'"):
         read_cloud(tmp_path / "cloud.xyz")
+
+
+def test_an_xyz_file_without_a_last_line_break_keeps_its_last_point(tmp_path: Path) -> None:
+    pytest.importorskip("open3d")
+    (tmp_path / "cloud.xyz").write_text("1 2 3\n4 5 6")
+    points_m, _ = read_cloud(tmp_path / "cloud.xyz")
+    assert points_m.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
