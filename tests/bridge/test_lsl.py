@@ -57,7 +57,7 @@ def test_pylsl_receives_events_with_their_times(
         assert stamp_s - ahead_s == pytest.approx(one.t_host_ns * 1e-9, abs=1e-3)
 
 
-def test_what_is_applied_is_told_once(snapshot: Snapshot, later: Callable[..., Snapshot]) -> None:
+def test_an_applied_shift_is_one_event(snapshot: Snapshot, later: Callable[..., Snapshot]) -> None:
     waiting, applied = later(is_applied=False), later()
     assert events(snapshot, waiting) == []
     told = events(waiting, applied)

@@ -7,12 +7,14 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from handcal.bridge.bridge import Bridge
 from handcal.bridge.slicer import MAX_POINTS, SlicerOutput
+from handcal.cli.main import main
 from handcal.conventions import slicer_points_mm, slicer_transform
 from handcal.display import projection_matrix
 from handcal.errors import LinkError
@@ -137,7 +139,7 @@ def test_a_client_that_takes_no_data_is_disconnected_with_one_line(
         assert "POLYDATA HandInWorld" in receive(reading, output, replace(snapshot, number=-1))
 
 
-def test_a_client_that_dies_is_told_in_one_line(
+def test_a_client_that_dies_gives_one_line(
     output: SlicerOutput, snapshot: Snapshot, said: list[str]
 ) -> None:
     with socket.create_connection(output.address) as connection:
@@ -162,3 +164,19 @@ def test_it_costs_the_engine_less_than_a_millisecond(
         for number in range(200):
             bridge(replace(snapshot, number=number))
         assert (time.thread_time() - begin_s) / 200 < 1e-3
+
+
+@pytest.mark.parametrize("address", ["18944", "host:", "host:x", "host:65536"])
+def test_a_wrong_address_is_one_line(
+    address: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = f"run --headset virtual --camera simulator --rig none.yaml --slicer {address}"
+    monkeypatch.chdir(tmp_path)  # the command creates its folder of sessions
+    monkeypatch.setattr("sys.argv", ["handcal", *words.split()])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 2
+    assert "an address is HOST:PORT" in capsys.readouterr().err
