@@ -1,4 +1,4 @@
-"""Contents of the Windows setup by the lock, and the licences of everything that is shipped."""
+"""The payload of the Windows setup, by the lock, and the licences of everything shipped."""
 
 from __future__ import annotations
 
