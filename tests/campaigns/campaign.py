@@ -24,7 +24,7 @@ class Tally:
     note: str = ""
     """More for the line."""
     end_s: float = math.inf
-    """Time at which the campaign ends although less was tried than wanted."""
+    """Time of the end, even if less was tried than wanted."""
 
     def is_done(self, wanted: int) -> bool:
         """True once as much was tried as wanted, or the time is over."""

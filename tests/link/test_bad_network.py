@@ -54,7 +54,7 @@ def test_a_projection_that_cannot_arrive_is_clearly_refused() -> None:
         assert server.statistics().failed == 1
 
 
-def test_missing_projections_of_a_connected_headset_are_reported(
+def test_what_a_connected_headset_lacks_is_reported_until_it_has_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with (
