@@ -93,14 +93,13 @@ def doctor(arguments: argparse.Namespace) -> None:
         type=Path,
         metavar="FILE",
         default=Path("handcal-support.zip"),
-        help="ZIP file to write (default: handcal-support.zip)",
+        help="ZIP file to write",
     ),
     arg(
         "--sessions",
         type=Path,
         metavar="FOLDER",
         action="append",
-        default=[],
         help="further folder of sessions whose wearers' names are taken out; may be repeated",
     ),
     arg("--frames", type=Path, metavar="RECORDING", help="recording to add: a file or a folder"),
@@ -110,7 +109,7 @@ def support(arguments: argparse.Namespace) -> None:
     from handcal.station.support import default_settings, run_support
 
     settings = default_settings()
-    sessions = (*settings.sessions, *arguments.sessions)
+    sessions = (*settings.sessions, *(arguments.sessions or ()))
     settings = replace(settings, sessions=sessions, frames=arguments.frames)
     with show_progress() as progress:
         written = run_support(arguments.output, settings, progress)

@@ -43,15 +43,15 @@ def test_the_cube_of_a_recording_is_tracked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = tmp_path / "result.json"
-    played = recording(tmp_path / "take", 18)
+    played = recording(tmp_path / "take", 40)
     run("cube", "track", "--camera", played, "--no-headset", "--seconds", 20, "--json", result)
     found = json.loads(result.read_text())
-    assert found["frames"] == found["tracked"] == 18
+    assert found["frames"] == found["tracked"] == 40
     assert found["is_at_rest"]
     assert found["error_mm"] is None
     expected = example_rig().T_H_D @ T_D_T
     np.testing.assert_allclose(np.array(found["T_W_T"])[:3, 3], expected[:3, 3], atol=0.001)
-    assert "18 poses in 18 frames" in capsys.readouterr().out
+    assert "40 poses in 40 frames" in capsys.readouterr().out
 
 
 def test_a_recording_without_the_cube_says_why(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
     assert result["plan"] == "paper"
     assert result["seconds"] > 0.0
     assert set(result["guard"]) == {"rejected", "accepted_deg"}
-    assert set(result["link"]) == {"sent", "lost", "acked", "projection_acked"}
+    assert set(result["link"]) == {"sent", "lost", "acked", "given_up", "projection_acked"}
     assert result["link"]["projection_acked"] == {"left": True, "right": True}
     assert result["alignments"] == 2
     assert set(result["timing_ms"]) == {"segment", "guard", "solve_both_eyes"}

@@ -76,21 +76,28 @@ COMMANDS = {
     "rig compare": "RIG RIG",
     "rig obey": "--headset virtual --rig RIG --output OUTPUT/rig.yaml",
     "rig migrate": "RIG --output OUTPUT/rig.yaml",
+    "rig simulate": "OUTPUT/images --views 3",
     "evaluate cube net": "--pdf OUTPUT/net.pdf --cube OUTPUT/cube.json",
     "evaluate cube simulate": "OUTPUT/captures --poses 1",
     "evaluate users": "SESSION --output OUTPUT",
     "study noise": "--quick --workers 2 --output OUTPUT",
     "study methods": "--quick --workers 1 --output OUTPUT",
+    "study procedures": "--wearers 2 --workers 1 --plan paper --output OUTPUT",
     "bench": "--quick --json OUTPUT/bench.json",
     "doctor": "",
     "devices": "",
+    "support": "--output OUTPUT/support.zip",
     "run": "--headset virtual --camera simulator --rig SMALL --output OUTPUT",
 }
-SLOW = {"study noise", "study methods", "bench", "evaluate cube simulate"}
+SLOW = {
+    "study noise", "study methods", "study procedures", "bench", "evaluate cube simulate",
+    "rig simulate",
+}  # fmt: skip
 NEED_MORE = {
     "replay", "evaluate cube capture", "evaluate cube report", "evaluate detector",
     "study recorded", "rig take", "rig camera", "rig stereo", "rig convert", "rig display",
-    "rig make", "rig depth", "evaluate segmentation", "pair",
+    "rig make", "rig depth", "rig accept", "evaluate segmentation", "evaluate cube track",
+    "evaluate trials", "pair",
 }  # fmt: skip
 """Commands whose input would have to be made first; they write as those above."""
 
