@@ -95,6 +95,7 @@ class PreferencesFile:
         try:
             data = read_json(self.path)
             version = data.pop("version", 1)
+            data.pop("wearers", None)  # names of wearers are only in the sessions
             if type(version) is not int or version < 1:
                 raise FileError(f"preferences.version is a whole number, not {version!r:.40}")
             said = ""
@@ -164,7 +165,6 @@ def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
     program never offered to change, take their present defaults.
     """
     upgraded = deepcopy(data)
-    upgraded.pop("wearers", None)  # names of wearers are only in the sessions
     solve: Any = upgraded
     for name in ("station", "calibration", "solve"):
         solve = solve.get(name) if isinstance(solve, dict) else None

@@ -198,9 +198,9 @@ def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT
 
 
 def is_turned(technician: Technician) -> bool:
-    """Return whether the visible hand is not the cursor's."""
+    """Return whether the visible hand is not the cursor's, and is held still."""
     seen = technician.snapshot.observation
-    if seen is None or seen.rotation_rad is None:
+    if seen is None or seen.rotation_rad is None or not seen.is_steady:
         return False
     return bool(np.linalg.norm(seen.rotation_rad) > 0.02)
 
@@ -544,12 +544,7 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     away = path.with_name("away")
     path.rename(away)  # as good as a full disk
     studio.camera.shows = "live"
-    live.wait(
-        lambda: (
-            live.snapshot.observation is not None
-            and live.snapshot.observation.rotation_rad is not None
-        )
-    )
+    live.wait(lambda: is_turned(live))
     studio.headset.confirm()
     live.wait_for_state(State.ALIGNED)
     live.wait(lambda: "cannot write" in live.banner)
@@ -592,8 +587,9 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     panel = window.panels.fine_tune
     panel.setFocus()
     live.wait(lambda: panel.isVisible() and "In the headset" in live.child(QLabel, "status").text())
+    # The picture moves to the left, the eye to the right.
     for _ in range(3):
-        QTest.keyClick(panel, Qt.Key.Key_Right)
+        QTest.keyClick(panel, Qt.Key.Key_Left)
     step_m = 3.0 * panel.step_m
     live.wait(
         lambda: np.allclose(
@@ -649,7 +645,7 @@ def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio:
     live.wait(lambda: panel.isVisible() and panel.isEnabled())
     live.wait(lambda: "In the headset" in live.child(QLabel, "status").text())
     panel.setFocus()
-    QTest.keyClick(panel, Qt.Key.Key_Right)
+    QTest.keyClick(panel, Qt.Key.Key_Left)
     window.close()
     record = Session.open(path)
     assert record.notes == "wears glasses"

@@ -716,7 +716,7 @@ def test_a_shift_set_by_hand_reaches_the_display_and_the_next_cursor(
     for message in calibration.set_shift({"left": by_hand_m["left"]}):
         stage.server.wait_acked(message, 5.0)
     assert shows(stage, "left", by_hand_m["left"])
-    assert shows(stage, "right", np.zeros(3))
+    eventually(lambda: shows(stage, "right", np.zeros(3)))
     assert stage.state() is State.SHOW_HAND
 
     stage.calibrate()
