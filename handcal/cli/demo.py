@@ -27,7 +27,7 @@ from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
 from handcal.station.former import SLIP_M
-from handcal.station.plan import NextStep, PlanSettings, StepName
+from handcal.station.plan import NextStep, PlanSettings, StepName, paper_alignments, usable_eyes
 from handcal.station.procedure import Calibration, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -119,7 +119,7 @@ def run_demo(
         slip_m=_slip_m(settings),
         plan=PlanSettings(
             settings.plan,
-            _usable_eyes(settings),
+            usable_eyes(settings.eyes),
             is_automatic=_is_automatic(settings),
             verify=settings.verify,
         ),
@@ -248,10 +248,6 @@ def _delivered(station: Station) -> LinkStatistics:
     return statistics
 
 
-def _usable_eyes(settings: DemoSettings) -> tuple[Eye, ...]:
-    return (settings.eyes,) if settings.eyes in ("left", "right") else EYES
-
-
 def _is_automatic(settings: DemoSettings) -> bool:
     """Return whether the station follows the plan by itself; else the script does."""
     return settings.plan == "recommended" or bool(settings.former)
@@ -324,13 +320,7 @@ _PASSING = (StepName.SOLVE, StepName.APPLY, StepName.WAIT, StepName.CURSOR, Step
 def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -> _Watch:
     """Do every planned alignment of the paper's plan; solve and apply after each."""
     calibration = station.calibration
-    each: tuple[tuple[Eye, ...], ...] = {
-        "both": (EYES,),
-        "each": (("left",), ("right",)),
-        "left": (("left",),),
-        "right": (("right",),),
-    }[settings.eyes]
-    plan = each * settings.alignments
+    plan = paper_alignments(settings.eyes, settings.alignments)
     watch = _Watch(station)
 
     for number, eyes in enumerate(plan):

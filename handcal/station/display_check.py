@@ -24,7 +24,7 @@ from handcal.rig.obey import (
     judge_display,
     shares_seen,
 )
-from handcal.station.drawing import _rig_name
+from handcal.station.drawing import rig_name
 from handcal.types import EYES, DisplayCheck, Eye, HeadsetIdentity, Rig, UInt8
 
 Show: TypeAlias = Callable[[Shown], None]
@@ -70,7 +70,7 @@ def run_display_check(
     CancelledError
         If it was cancelled.
     """
-    name = _rig_name(rig)
+    name = rig_name(rig)
     problems: dict[Eye, str] = {}
     try:
         for number, eye in enumerate(eyes):

@@ -35,7 +35,7 @@ class Drawing:
         self._rig = rig
         self._link = link
         self._wearer = wearer
-        self._rig_name = _rig_name(rig)
+        self._rig_name = rig_name(rig)
         self._sent: dict[Eye, Outgoing] = {}
 
     @property
@@ -82,7 +82,7 @@ class Drawing:
             self._link.wait_acked(message, max(0.0, deadline_s - time.monotonic()))
 
 
-def _rig_name(rig: Rig) -> str:
+def rig_name(rig: Rig) -> str:
     """Return the rig's name in one line, with eight digits that change with its displays."""
     offline = {
         eye: Projection(eye, projection_matrix(one), one.width_px, one.height_px, one.T_V_H)

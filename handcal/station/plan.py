@@ -8,6 +8,7 @@ its verdict, or when nothing more is to be gained.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -16,7 +17,7 @@ from handcal.register.placement import PlacementSettings, Planned, next_alignmen
 from handcal.register.verdict import planned_eyes
 from handcal.station.procedure import Calibration
 from handcal.station.states import Observation, ProcedureError, State
-from handcal.types import EYES, Eye, PlanName
+from handcal.types import EYES, Eye, EyePlan, PlanName
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,21 @@ _BY_STATE = {
     State.VERIFY: StepName.NUDGE,
 }
 _JUDGED = ("accept", "keep")
+_IN_TURN: Mapping[EyePlan, tuple[tuple[Eye, ...], ...]] = {
+    "both": (EYES,), "each": (("left",), ("right",)), "left": (("left",),), "right": (("right",),),
+}  # fmt: skip
+
+
+def paper_alignments(eyes: EyePlan, count: int) -> tuple[tuple[Eye, ...], ...]:
+    """Return the eyes open in each alignment of the paper's plan, `count` times over."""
+    return _IN_TURN[eyes] * count
+
+
+def usable_eyes(eyes: EyePlan) -> tuple[Eye, ...]:
+    """Return the eyes that are calibrated in any order."""
+    return tuple(eye for eye in EYES if any(eye in open_eyes for open_eyes in _IN_TURN[eyes]))
+
+
 _FAULTY = ("contradicted", "implausible")
 
 

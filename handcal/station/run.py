@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,13 +13,13 @@ from handcal.errors import HandcalError
 from handcal.link.pairing import Pairings
 from handcal.progress import Progress
 from handcal.station.doctor import Health
-from handcal.station.plan import NextStep, PlanSettings, StepName
+from handcal.station.plan import NextStep, PlanSettings, StepName, paper_alignments, usable_eyes
 from handcal.station.preflight import check_station
 from handcal.station.procedure import Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EYES, Eye, EyePlan, PlanName
+from handcal.types import EyePlan, PlanName
 
 _DELIVERY_S = 5.0
 
@@ -77,7 +77,7 @@ def run_calibration(
     pairings = pairings or Pairings(())
     _require_ready(settings.station, pairings)
     is_recommended = settings.plan == "recommended"
-    usable: tuple[Eye, ...] = (settings.eyes,) if settings.eyes in ("left", "right") else EYES
+    usable = usable_eyes(settings.eyes)
     plan = PlanSettings(settings.plan, usable, is_automatic=is_recommended)
     wanted = replace(settings.station, plan=plan)
     with Station(wanted, settings.wearer, pairings=pairings) as station:
@@ -134,11 +134,7 @@ class _Run:
     def follow_paper(self) -> None:
         """Make every alignment; solve and apply after each."""
         settings, calibration = self.settings, self.station.calibration
-        each: Mapping[EyePlan, tuple[tuple[Eye, ...], ...]] = {
-            "both": (EYES,), "each": (("left",), ("right",)), "left": (("left",),),
-            "right": (("right",),),
-        }  # fmt: skip
-        plan = each[settings.eyes] * settings.alignments
+        plan = paper_alignments(settings.eyes, settings.alignments)
         for number, eyes in enumerate(plan):
             which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
             label = f"Alignment {number + 1} of {len(plan)}, {which}"
