@@ -31,6 +31,21 @@ KEYS = arg(
     help="file of the paired headsets (default: the key in the environment variable "
     "HANDCAL_PAIRING_KEY, else the file of the desktop program)",
 )
+ALIGNMENT_OPTIONS = (
+    arg(
+        "--alignments",
+        type=number(int, 1, 20),
+        default=1,
+        metavar="K",
+        help="number of alignments; with --eyes each, of each eye",
+    ),
+    arg(
+        "--eyes",
+        choices=("both", "each", "left", "right"),
+        default="both",
+        help="align both eyes at once, each eye alone, or the only usable eye",
+    ),
+)
 _CONTRADICTED = 3
 _SHARE = number(float, 0.0, 1.0)
 
@@ -57,19 +72,7 @@ _SHARE = number(float, 0.0, 1.0)
         help="alignments to make: as many as --alignments says, where the hand is; or those that "
         "tell most, and a verification of each eye",
     ),
-    arg(
-        "--alignments",
-        type=number(int, 1, 20),
-        default=1,
-        metavar="K",
-        help="number of alignments; with --eyes each, of each eye",
-    ),
-    arg(
-        "--eyes",
-        choices=("both", "each", "left", "right"),
-        default="both",
-        help="align both eyes at once, or each eye alone; or the one eye that sees",
-    ),
+    *ALIGNMENT_OPTIONS,
     arg("--wearer", default="", metavar="NAME", help="name or code of the wearer"),
     arg(
         "--output",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple
+from handcal.cli.run import ALIGNMENT_OPTIONS
 from handcal.cli.terminal import arg, command, number
 from handcal.io.files import make_folder
 from handcal.station.faults import Fault
@@ -42,19 +43,7 @@ _LINK = (
         default=1,
         help="random seed of the wearer, hand, room and noise",
     ),
-    arg(
-        "--alignments",
-        type=number(int, 1, 20),
-        default=1,
-        metavar="K",
-        help="number of alignments; with --eyes each, of each eye",
-    ),
-    arg(
-        "--eyes",
-        choices=("both", "each", "left", "right"),
-        default="both",
-        help="align both eyes at once, each eye alone, or the only usable eye",
-    ),
+    *ALIGNMENT_OPTIONS,
     arg(
         "--plan",
         choices=("paper", "recommended"),
