@@ -35,7 +35,8 @@ class CubeTrackSettings:
 class TrackedCube:
     """The filtered pose of the cube at the time of one frame."""
 
-    t_host_ns: int
+    t_ns: int
+    """On the camera's clock, whose intervals do not change while its latency is estimated."""
     T_W_T: Float64
     """(4, 4); from the cube's frame to the world."""
     is_at_rest: bool
@@ -62,24 +63,28 @@ class CubeFilter:
         self._newest: TrackedCube | None = None
         self._recent: deque[tuple[int, Float64]] = deque()
 
-    def take(self, T_W_T: Float64, t_host_ns: int) -> TrackedCube:
-        """Return the filtered pose after a measured one, (4, 4), at a time of the host's clock."""
+    def take(self, T_W_T: Float64, t_ns: int) -> TrackedCube:
+        """Return the filtered pose after a measured one, (4, 4); the time is the camera's."""
         settings, before = self._settings, self._newest
-        if before is None or not _near(T_W_T, before.T_W_T, settings.jump_m, settings.jump_rad):
+        if (
+            before is None
+            or t_ns < before.t_ns  # the camera has started again
+            or not _near(T_W_T, before.T_W_T, settings.jump_m, settings.jump_rad)
+        ):
             self._recent.clear()
-            filtered = TrackedCube(t_host_ns, T_W_T, False, 1)
+            filtered = TrackedCube(t_ns, T_W_T, False, 1)
         else:
-            passed_s = 1e-9 * (t_host_ns - before.t_host_ns)
+            passed_s = 1e-9 * (t_ns - before.t_ns)
             weight = max(
                 1.0 / (before.frames + 1), 1.0 - float(np.exp(-passed_s / settings.smoothing_s))
             )
             pose = interpolate_pose(before.T_W_T, T_W_T, min(weight, 1.0))
-            filtered = TrackedCube(t_host_ns, pose, False, before.frames + 1)
-        self._recent.append((t_host_ns, T_W_T))
+            filtered = TrackedCube(t_ns, pose, False, before.frames + 1)
+        self._recent.append((t_ns, T_W_T))
         rest_ns = round(1e9 * settings.rest_s)
-        while len(self._recent) > 1 and self._recent[1][0] <= t_host_ns - rest_ns:
+        while len(self._recent) > 1 and self._recent[1][0] <= t_ns - rest_ns:
             self._recent.popleft()
-        is_at_rest = t_host_ns - self._recent[0][0] >= rest_ns and all(
+        is_at_rest = t_ns - self._recent[0][0] >= rest_ns and all(
             _near(T, filtered.T_W_T, settings.rest_m, settings.rest_rad) for _, T in self._recent
         )
         self._newest = replace(filtered, is_at_rest=is_at_rest)

@@ -66,7 +66,7 @@ class CubeTracker:
         self._pose_at_host_ns = pose_at_host_ns
         self._filter = CubeFilter(settings)
         self._clock = FrameClock(CalibrationSettings().camera_latency_s)
-        self._waiting: deque[tuple[int, Float64]] = deque(maxlen=_WAITING)
+        self._waiting: deque[tuple[int, int, Float64]] = deque(maxlen=_WAITING)
 
     def step(self) -> TrackedCube | None:
         """Read a frame; return the newest filtered pose, or None if there is no new one.
@@ -85,7 +85,8 @@ class CubeTracker:
             return None
         t_host_ns = self._clock.exposure_ns(frame)
         try:
-            self._waiting.append((t_host_ns, self._T_H_D @ see_cube(frame, self.cube)))
+            T_H_T = self._T_H_D @ see_cube(frame, self.cube)
+            self._waiting.append((frame.t_camera_ns, t_host_ns, T_H_T))
             self.problem = ""
         except CubeError as error:
             self.problem = str(error)
@@ -95,7 +96,7 @@ class CubeTracker:
         """Place the cube in the world at each time for which the head's pose is known."""
         newest = None
         while self._waiting:
-            t_host_ns, T_H_T = self._waiting[0]
+            t_camera_ns, t_host_ns, T_H_T = self._waiting[0]
             try:
                 T_W_H = self._pose_at_host_ns(t_host_ns)
             except PosePendingError:
@@ -103,7 +104,7 @@ class CubeTracker:
             except PoseError as error:
                 self.problem = str(error)
             else:
-                newest = self._filter.take(T_W_H @ T_H_T, t_host_ns)
+                newest = self._filter.take(T_W_H @ T_H_T, t_camera_ns)
             self._waiting.popleft()
         return newest
 
@@ -141,7 +142,7 @@ class CubeTracking:
         """Filtered poses per second; None for less than two."""
         if len(self.tracked) < 2:
             return None
-        passed_ns = self.tracked[-1].t_host_ns - self.tracked[0].t_host_ns
+        passed_ns = self.tracked[-1].t_ns - self.tracked[0].t_ns
         return 1e9 * (len(self.tracked) - 1) / passed_ns
 
     @property

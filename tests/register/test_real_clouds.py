@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 
 from handcal import solve_eye_shift
 from handcal.hand.segment import segment_hand
@@ -47,28 +48,34 @@ def _clouds(folder: Path, every: int) -> list[tuple[Float64, Bool]]:
 
 
 @pytest.mark.parametrize(
-    ("name", "every", "largest_m"), [("color_aligned_640", 3, 0.0003), ("sr300_320", 2, 0.001)]
+    ("name", "every", "median_m"), [("color_aligned_640", 3, 0.0002), ("sr300_320", 2, 0.0005)]
 )
 def test_disjoint_samples_of_one_real_frame(
-    shared_data: Path, name: str, every: int, largest_m: float
+    shared_data: Path, name: str, every: int, median_m: float
 ) -> None:
-    """Squared errors over the covariance are below 3: both samples share the sensor's errors."""
+    """Squared errors over the covariance are below 3: both samples share the sensor's errors.
+
+    A hand that says little about one direction may err by more than 1 mm, and says so in its
+    covariance, so only the median is judged in metres.
+    """
     squares, errors_m = [], []
     for number, (points_m, is_cut) in enumerate(_clouds(shared_data / "rgbd" / name, every)):
-        rng = np.random.default_rng(number)
-        phi_m = rng.uniform(-0.008, 0.008, 3)
-        order = rng.permutation(len(points_m))
-        half = min(5000, len(order) // 2)
-        first, second = order[:half], order[half : 2 * half]
-        solved = solve_eye_shift(
-            points_m[first],
-            points_m[second] + _overlay(points_m[::7], phi_m),
-            display_distance_m=DISTANCE_M,
-            cursor_cut=is_cut[first],
-            hand_cut=is_cut[second],
-        )
-        error_m = solved.shift_m - phi_m
-        squares.append(error_m @ np.linalg.solve(solved.covariance_m2, error_m))
-        errors_m.append(float(np.linalg.norm(error_m)))
+        for seed in range(3):
+            rng = np.random.default_rng([number, seed])
+            phi_m = rng.uniform(-0.008, 0.008, 3)
+            order = rng.permutation(len(points_m))
+            half = min(5000, len(order) // 2)
+            first, second = order[:half], order[half : 2 * half]
+            solved = solve_eye_shift(
+                points_m[first],
+                points_m[second] + _overlay(points_m[::7], phi_m),
+                display_distance_m=DISTANCE_M,
+                cursor_cut=is_cut[first],
+                hand_cut=is_cut[second],
+            )
+            error_m = solved.shift_m - phi_m
+            squares.append(error_m @ np.linalg.solve(solved.covariance_m2, error_m))
+            errors_m.append(float(np.linalg.norm(error_m)))
     assert np.mean(squares) < 4.5
-    assert max(errors_m) < largest_m
+    assert max(squares) < chi2.isf(1e-4, 3)
+    assert np.median(errors_m) < median_m

@@ -34,6 +34,15 @@ def test_a_cube_in_slow_motion_is_not_at_rest() -> None:
     assert not any(filter_.take(T, n * _FRAME_NS).is_at_rest for n, T in enumerate(poses))
 
 
+def test_a_cube_comes_to_rest_after_the_camera_has_started_again() -> None:
+    filter_, T = CubeFilter(), rigid(None, [0.0, 0.0, 0.5])
+    before = [filter_.take(T, n * _FRAME_NS + 10**12) for n in range(40)]
+    after = [filter_.take(T, n * _FRAME_NS) for n in range(40)]
+    assert before[-1].is_at_rest
+    assert not after[0].is_at_rest
+    assert after[-1].is_at_rest
+
+
 def test_the_cubes_faces_are_in_order() -> None:
     cube = Cube()
     corners_m = cube_corners_m(cube)
