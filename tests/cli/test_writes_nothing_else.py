@@ -114,24 +114,58 @@ def test_every_command_is_tried_or_named() -> None:
     assert {*leaves(main.COMMANDS)} == COMMANDS.keys() | NEED_MORE
 
 
-@pytest.mark.parametrize(
-    "command",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in COMMANDS],
-)
-def test_a_command_writes_nothing_but_its_output(
-    command: str, picture: list[str], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    if command == "inspect" and find_spec("open3d") is None:
-        pytest.skip("Open3D is not installed")
+_DRIVER = """
+import contextlib, io, json, sys
+from handcal.cli.main import main
+
+for command, words in json.loads(sys.stdin.read()).items():
+    sys.argv, code = ["handcal", *words], 0
+    with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(said):
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+    print(json.dumps([command, code, said.getvalue()]), flush=True)
+"""
+
+
+@pytest.fixture
+def small_rig(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(write_small_rig(tmp_path_factory.mktemp("rig") / "rig.yaml"))
+
+
+def check(commands: set[str], picture: list[str], small_rig: str, tmp_path: Path) -> None:
+    """Run commands one after the other in a process apart; each has a folder for its output."""
     rig = str(resource_path("example_rig.yaml"))
-    small_rig = str(write_small_rig(tmp_path_factory.mktemp("rig") / "rig.yaml"))
     inputs = {"SESSION": [str(EXAMPLE)], "RIG": [rig], "PICTURE": picture, "SMALL": [small_rig]}
-    words = command.split()
-    for word in COMMANDS[command].split():
-        words += inputs.get(word, [word.replace("OUTPUT", str(tmp_path / "output"))])
-    run = run_apart(["handcal", *words], tmp_path)
+    outputs = {name: tmp_path / "output" / name for name in sorted(commands)}
+    words = {name: name.split() for name in outputs}
+    for name, output in outputs.items():
+        output.mkdir(parents=True)
+        for word in COMMANDS[name].split():
+            words[name] += inputs.get(word, [word.replace("OUTPUT", str(output))])
+    run = run_apart([_DRIVER], tmp_path, "-c", json.dumps(words))
     assert run.returncode == 0, run.stderr
-    assert bool(list((tmp_path / "output").iterdir())) == ("OUTPUT" in COMMANDS[command])
+    ended = {name: (code, said) for name, code, said in map(json.loads, run.stdout.splitlines())}
+    assert ended.keys() == commands
+    assert {name: said for name, (code, said) in ended.items() if code} == {}
+    for name, output in outputs.items():
+        assert bool(list(output.iterdir())) == ("OUTPUT" in COMMANDS[name]), name
+
+
+def test_commands_write_nothing_but_their_output(
+    picture: list[str], small_rig: str, tmp_path: Path
+) -> None:
+    absent = {"inspect"} if find_spec("open3d") is None else set()
+    check(COMMANDS.keys() - SLOW - absent, picture, small_rig, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", sorted(SLOW))
+def test_a_slow_command_writes_nothing_but_its_output(
+    command: str, picture: list[str], small_rig: str, tmp_path: Path
+) -> None:
+    check({command}, picture, small_rig, tmp_path)
 
 
 @pytest.mark.slow
@@ -156,7 +190,7 @@ def test_telemetry_is_off_before_onnxruntime_is_imported(module: str, tmp_path: 
 
 
 def run_apart(
-    words: list[str], tmp_path: Path, option: str = "-m"
+    words: list[str], tmp_path: Path, option: str = "-m", stdin: str | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run Python with folders of the user of its own; nothing may appear but output and config."""
     environment = {name: value for name, value in os.environ.items() if name not in SILENCERS}
@@ -164,14 +198,15 @@ def run_apart(
     environment |= {name: str(tmp_path / folder) for name, folder in FOLDERS.items()}
     environment |= {"QT_QPA_PLATFORM": "offscreen", KEY_VARIABLE: new_pairing_key()}
     for folder in (*FOLDERS.values(), "here", "output"):
-        (tmp_path / folder).mkdir()
+        (tmp_path / folder).mkdir(exist_ok=True)
     if path := environment.get("PYTHONPATH"):
         environment["PYTHONPATH"] = os.pathsep.join(
             str(Path(entry).absolute()) for entry in path.split(os.pathsep)
         )
     run = subprocess.run(
         [sys.executable, option, *words],
-        cwd=tmp_path / "here", env=environment, capture_output=True, text=True, check=False,
+        input=stdin, cwd=tmp_path / "here", env=environment,
+        capture_output=True, text=True, check=False,
     )  # fmt: skip
     written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
     elsewhere = {name for name in written if not name.startswith(("output/", "config/handcal/"))}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,7 @@ ELSEWHERE = {"08_headset_client.py": "tests/link/test_headset_example.py"}
 """Run by a test of their own."""
 
 
-def run(name: str, *words: object, code: int = 0) -> str:
+def run(name: str, *words: object) -> str:
     """Run an example; return what it prints."""
     done = subprocess.run(
         [sys.executable, EXAMPLES / name, *map(str, words)],
@@ -31,8 +32,8 @@ def run(name: str, *words: object, code: int = 0) -> str:
         encoding="utf-8",
         check=False,
     )
-    assert done.returncode == code, done.stderr
-    return done.stdout if code == 0 else done.stderr
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def numbers(pattern: str, text: str) -> list[float]:
@@ -117,11 +118,20 @@ def test_a_figure_is_plotted(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_path_is_one_line(
-    name: str, words: tuple[str, ...], message: str, tmp_path: Path
+    name: str,
+    words: tuple[str, ...],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "FILE").write_text("no folder")
     places = [str(tmp_path / word) if word[:2] != "--" else word for word in words]
-    error = run(name, *places, code=1)
+    monkeypatch.setattr(sys, "argv", [name, *places])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
+    error = capsys.readouterr().err
+    assert ended.value.code == 1
     assert message in error
     assert error.count("\n") == 1
 
