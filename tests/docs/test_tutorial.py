@@ -25,12 +25,14 @@ def commands(kind: str) -> list[str]:
 
 
 @pytest.mark.process
+@pytest.mark.parametrize("views", [8, pytest.param(20, marks=pytest.mark.slow)])
 def test_every_command_runs_on_rendered_images_and_the_simulator(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    views: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Takes a minute: a whole offline calibration and a wearer, as a reader would do it."""
+    """A whole offline calibration and a wearer, as a reader would do it; 20 views as written."""
     monkeypatch.chdir(tmp_path)
     for command in commands("bash"):
+        command = command.replace("--views 20", f"--views {views}")
         if "SESSION" in command:
             newest = max((tmp_path / "sessions").iterdir())
             command = command.replace("SESSION", newest.name)

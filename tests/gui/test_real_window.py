@@ -253,6 +253,7 @@ def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
         time.sleep(0.2)
 
 
+@pytest.mark.slow  # the two others cover its parts
 def test_begin_and_finish_are_all_that_is_pressed(
     display: Display, tmp_path: Path, preferences: Path
 ) -> None:
