@@ -9,12 +9,13 @@ from typing import Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.run import ALIGNMENT_OPTIONS
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, fail, number
 from handcal.io.files import make_folder
 from handcal.station.faults import Fault
 
 FAULTS = [fault for fault in get_args(Fault) if fault]
 _CONTRADICTED = 3
+_MAX_CODE = 1000
 _SEED = number(int, 0, 2**32 - 1)
 _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
@@ -154,7 +155,12 @@ def _say_contradictions(result: dict[str, Any]) -> None:
 
 
 @command(
-    arg("--port", type=_PORT, metavar="N", required=True, help="port on which the PC listens"),
+    arg("--port", type=_PORT, metavar="N", help="port on which the PC listens"),
+    arg(
+        "--pair",
+        action="store_true",
+        help="pair first: type the text below the QR code, or with --port the 8 digits",
+    ),
     arg(
         "--scene-port",
         type=_PORT,
@@ -232,16 +238,36 @@ def _say_contradictions(result: dict[str, Any]) -> None:
 def headset(arguments: argparse.Namespace) -> None:
     """Run a virtual headset with a simulated wearer, connected by the real protocol."""
     from handcal.link.impair import Impairment
-    from handcal.link.pairing import read_pairing_key
+    from handcal.link.invitation import read_invitation
+    from handcal.link.pair_by_digits import pair_by_digits
+    from handcal.link.pairing import new_device_id, read_pairing_key
     from handcal.sim.headset import HeadsetSettings, run_headset, until_terminated
     from handcal.sim.wearer import WearerSettings
 
+    host, port, device_id = arguments.host, arguments.port, ""
+    if arguments.pair:
+        console.print("Code: ", end="")
+        code = sys.stdin.readline(_MAX_CODE).strip()
+        if port is None:
+            invited = read_invitation(code)
+            host, port, key = invited.host, invited.port, invited.code.encode()
+        else:
+            device_id = new_device_id()
+            try:
+                key = pair_by_digits((host, port), device_id, code).encode()
+            except ValueError as error:
+                fail(str(error), 2)
+    elif port is not None:
+        key = read_pairing_key(arguments.key_file)
+    else:
+        fail("give --port and a pairing key, or --pair", 2)
     x_mm, y_mm, z_mm = arguments.slip_mm
     settings = HeadsetSettings(
         rig_path=str(_rig_path(arguments.rig)),
         worn_rig_path=str(arguments.worn_rig or ""),
-        host=arguments.host,
-        port=arguments.port,
+        host=host,
+        port=port,
+        device_id=device_id,
         scene_port=arguments.scene_port,
         seed=arguments.seed,
         impairment=Impairment(
@@ -260,7 +286,7 @@ def headset(arguments: argparse.Namespace) -> None:
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),
         has_wearer=not arguments.as_device,
     )
-    run_headset(settings, read_pairing_key(arguments.key_file), until_terminated())
+    run_headset(settings, key, until_terminated())
 
 
 def _rig_path(rig: Path | None) -> Path:

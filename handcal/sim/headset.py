@@ -67,6 +67,8 @@ class HeadsetSettings:
     duration_s: float | None = None
     """Time after which to end; None to run until stopped."""
     name: str = "Virtual headset"
+    device_id: str = ""
+    """Identity; empty for one made of the pairing key, the same after a restart."""
     is_stale: bool = False
     """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
     loses_start: bool = False
@@ -209,8 +211,7 @@ def _told(state: HeadsetState) -> str:
 
 def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> HeadsetIdentity:
     return HeadsetIdentity(
-        # The same after a restart: the key belongs to this identity.
-        hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
+        settings.device_id or hkdf(pairing_key, b"", b"virtual headset", 8).hex(),
         name=settings.name,
         runtime="simulator",
         app=f"handcal {version('handcal')}",

@@ -1,5 +1,6 @@
 """The commands for paired headsets."""
 
+import io
 import re
 import sys
 import threading
@@ -13,6 +14,7 @@ from handcal.link import inviting
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairing, Pairings
+from handcal.link.server import HeadsetServer
 from handcal.types import HeadsetIdentity
 from tests.helpers import eventually
 
@@ -127,3 +129,41 @@ def test_a_headset_is_paired_by_what_is_shown(
     assert f"Paired: a headset ({'c' * 16})" in text
     assert re.search(r"type \d{4} \d{4}", text)
     assert Pairings.read(keys).all[-1].device_id == "c" * 16
+
+
+@pytest.mark.parametrize("options", [[], ["--port", PORT]], ids=["by the text", "by the digits"])
+def test_the_virtual_headset_is_paired(
+    options: list[object],
+    handcal: Callable[..., None],
+    keys: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with HeadsetServer(Pairings.read(keys), ("127.0.0.1", PORT)) as server:
+        invitation = server.invite()
+        code = invitation.digits if options else invitation.text
+        monkeypatch.setattr(sys, "stdin", io.StringIO(code + "\n"))
+        handcal("headset", "--pair", "--as-device", "--duration-s", 0.5, *options)
+    assert len(Pairings.read(keys).all) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "typed", "problem"),
+    [
+        (["--pair"], "HANDCAL://nothing", "no invitation"),
+        (["--pair"], "", "no invitation"),
+        (["--pair", "--port", "47941"], "1234", "8 digits, not 4"),
+        ([], "", "--port and a pairing key, or --pair"),
+    ],
+)
+def test_a_virtual_headset_without_an_address_is_refused(
+    words: list[str],
+    typed: str,
+    problem: str,
+    handcal: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    with pytest.raises(SystemExit):
+        handcal("headset", *words)
+    assert problem in capsys.readouterr().err
