@@ -92,11 +92,19 @@ class RecordingCamera(PlayedCamera):
             ) from error
 
     def _stop(self) -> None:
-        if self._color is not None:
-            self._color.playback.close()
-        if self._depth is not None:
-            self._depth.close()
+        color = None if self._color is None else self._color.playback
+        playing = [playback for playback in (color, self._depth) if playback is not None]
         self._depth = self._color = None
+        if not playing:
+            return
+        # A reading thread that has met the end stops by itself, and librealsense aborts the program
+        # if it is stopped at that moment. After that, it runs on and must not outlive its objects.
+        for playback in playing:
+            playback.pause()
+        time.sleep(_SETTLE_S)
+        for playback in playing:
+            playback.close()
+        time.sleep(_SETTLE_S)
 
     def _next(self, timeout_s: float) -> Frame:
         assert self._depth is not None
@@ -125,7 +133,8 @@ class _Playback:
         self._device = config.resolve(rs.pipeline_wrapper(self._pipeline)).get_device()
         self._playback = self._device.as_playback()
         self._playback.set_real_time(False)  # before it starts, or the first frames are lost
-        self.profile = self._pipeline.start(config).get_stream(stream)
+        self._active = self._pipeline.start(config)  # owns the profile, also after the end
+        self.profile = self._active.get_stream(stream)
 
     def identity(self) -> CameraIdentity:
         """Return the recorded device's identity, as far as the recording tells it."""
@@ -162,12 +171,14 @@ class _Playback:
                 frames = self.read(_SKIP_TIMEOUT_S)
                 self._waiting = frames if frames.get_timestamp() >= t_ms else None
 
+    def pause(self) -> None:
+        """Let its thread read no more, if it has not met the end."""
+        if self._playback.current_status() != self._stopped:
+            self._playback.pause()
+
     def close(self) -> None:
-        """Stop the pipeline."""
-        ended = self._playback.current_status() == self._stopped
+        """Stop the pipeline; only some time after `pause`."""
         self._pipeline.stop()
-        if not ended:  # its reading thread runs on for a moment, and must not outlive its objects
-            time.sleep(_SETTLE_S)
 
 
 class _ColorTrack:

@@ -115,7 +115,8 @@ def test_it_ends_before_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_silent_camera_ends_a_recording_and_a_short_silence_does_not(tmp_path: Path) -> None:
-    recorded, frames, _ = run([1, CameraTimeoutError("none yet"), 2], tmp_path / "a")
+    patient = replace(SETTINGS, silent_s=2.0)  # a busy machine takes a while for 0.05 s
+    recorded, frames, _ = run([1, CameraTimeoutError("none yet"), 2], tmp_path / "a", patient)
     assert recorded.stop_reason == "no frame came"
     assert [frame.index for frame in frames] == [1, 2]
 
