@@ -46,6 +46,13 @@ def test_a_calibration(calibrate: Calibrate, loss: float) -> None:
         assert result["link"]["lost"] > 0.15 * result["link"]["sent"]
 
 
+def test_the_recommended_plan_is_verified_by_nudges(calibrate: Calibrate) -> None:
+    result = calibrate(DemoSettings(seed=SEED, plan="recommended"))
+    error_arcmin = result["reprojection_arcmin"]
+    assert error_arcmin["after"] < 0.5 * error_arcmin["before"]
+    assert all(one["verified"] for one in result["eyes"].values())
+
+
 def test_either_side_is_restarted_during_a_calibration(
     program: Path,
     tmp_path: Path,
@@ -64,7 +71,7 @@ def test_either_side_is_restarted_during_a_calibration(
         station.restart_headset()
         _step_until(station, lambda seen: seen.procedure.state is State.ALIGNED)
         path = station.session.path
-    with Station(settings, resume=path) as station:  # the PC's program anew
+    with Station(settings, resume=path) as station:  # the PC's program is restarted
         _step_until(station, lambda seen: seen.link.pose_rate_hz > 0)
         station.calibration.solve()
         station.calibration.apply()
