@@ -27,7 +27,7 @@ from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
-from tests.helpers import Patience
+from tests.helpers import Patience, eventually
 
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
@@ -63,6 +63,12 @@ def step_until(
 
 def is_connected(snapshot: Snapshot) -> bool:
     return not snapshot.link_problem and snapshot.link.pose_rate_hz > 0
+
+
+def is_stopped(process: int) -> bool:
+    """Return whether every thread of a process has been stopped by a signal."""
+    states = (path.read_text() for path in Path(f"/proc/{process}/task").glob("*/stat"))
+    return all(state.rpartition(")")[2].split()[0] == "T" for state in states)
 
 
 def is_in(state: State) -> Callable[[Snapshot], bool]:
@@ -151,6 +157,7 @@ def test_a_silent_headset_is_reported_and_applying_can_be_repeated(
         station.calibration.solve()
         silent = headset_of(os.getpid())
         os.kill(silent, signal.SIGSTOP)
+        eventually(lambda: is_stopped(silent), PATIENCE_S)
         station.calibration.apply()
         lost = step_until(station, "a problem", lambda s: bool(s.problem), PATIENCE_S)
         assert lost.procedure.state is State.SOLVED
