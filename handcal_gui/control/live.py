@@ -328,6 +328,7 @@ class CalibrationController(QObject):
 
     def _on_opened(self, station: Station) -> None:
         self._link = station.link
+        self._conditions = Conditions(is_usb=station.settings.source == "realsense")
         plan = station.plan.settings
         if plan.name == "recommended":
             is_held = self._wizard_panel.wizard.is_held
