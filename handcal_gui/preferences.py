@@ -11,6 +11,7 @@ from typing import Any, Literal, Self, TypeAlias, get_type_hints
 
 from PySide6.QtCore import QStandardPaths
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
@@ -50,6 +51,8 @@ class Preferences:
     """Folder of the last export; empty before the first."""
     fine_tune_step_m: float = 5e-4
     evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
+    bridges: BridgeSettings = field(default_factory=BridgeSettings)
+    """Bridges to other programs that every calibration runs."""
     theme: Theme = "system"
     arrangement: Literal["panels", "station"] = "panels"
     """Panels around the guide, or the guide alone."""

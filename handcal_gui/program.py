@@ -393,7 +393,8 @@ class Program(QObject):
         verdict = self._preferences.station.calibration.solve.verdict
         self.wizard_panel.picture.result.set_target(verdict.target_arcmin)
         is_held = not self._preferences.runs_itself
-        self.live.start(open_station, self._preferences.plan, is_held=is_held)
+        chosen = self._preferences
+        self.live.start(open_station, chosen.plan, bridges=chosen.bridges, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
 

@@ -10,6 +10,7 @@ from typing import Literal
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
@@ -40,6 +41,7 @@ _PANELS_OF_STEPS = {
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
 _RECORD = "record the trial"
+_NO_BRIDGES = BridgeSettings()
 
 
 class CalibrationController(QObject):
@@ -108,7 +110,12 @@ class CalibrationController(QObject):
         return self._link
 
     def start(
-        self, open_station: Callable[[], Station], plan: EyePlan, *, is_held: bool = True
+        self,
+        open_station: Callable[[], Station],
+        plan: EyePlan,
+        *,
+        bridges: BridgeSettings = _NO_BRIDGES,
+        is_held: bool = True,
     ) -> None:
         """End the present calibration and open a station; if held, no step runs by itself."""
         self.stop()
@@ -117,7 +124,8 @@ class CalibrationController(QObject):
         self._doing = self._shown = 0
         self._conditions = Conditions()
         self._wizard_panel.start(Wizard(plan), is_held=is_held)
-        self._engine = EngineThread(lambda: _held(open_station()), self)
+        self._engine = EngineThread(lambda: _held(open_station()), self, bridges)
+        self._engine.told.connect(self._window.banner.show_message)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
         self._engine.failed.connect(self._on_command_failed)

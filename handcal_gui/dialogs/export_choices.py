@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from handcal.export.export import ExportSettings
-from handcal.export.formats import FORMATS, Format
+from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import number, with_name
 from handcal_gui.widgets.layouts import vbox
@@ -23,7 +23,13 @@ _PURPOSES: dict[Format, str] = {
     "json": "The projections in the convention of each system",
     "ply": "Cursor and hand of each alignment, with residuals",
     "zip": "All recorded data, to archive or to open elsewhere",
+    "unity": "The final calibration for Unity's JsonUtility",
+    "openxr": "The final calibration as views of OpenXR: poses and angles",
+    "northstar": "The final calibration for Monado's North Star driver",
+    "slicer": "The eyes as transforms and the clouds as models",
 }
+_WITH_PLANES = "json", "unity"
+"""Formats with clipping distances."""
 
 
 class ExportChoices(QWidget):
@@ -50,7 +56,8 @@ class ExportChoices(QWidget):
         super().__init__(parent)
         self._settings, self._name = settings, name
         self._boxes = {
-            kind: with_name(QCheckBox(info.title), kind) for kind, info in FORMATS.items()
+            kind: with_name(QCheckBox(info.title), kind)
+            for kind, info in {**FORMATS, **TOOL_FORMATS}.items()
         }
         self._near = number("near", 0.01, 1.0, 0.05, " m", "Anything nearer is not drawn.")
         self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Anything farther is not drawn.")
@@ -95,7 +102,7 @@ class ExportChoices(QWidget):
 
     def _refresh(self) -> None:
         for field in (self._near, self._far):
-            field.setEnabled(self._boxes["json"].isChecked())
+            field.setEnabled(any(self._boxes[kind].isChecked() for kind in _WITH_PLANES))
         self.changed.emit()
 
     def _lay_out(self) -> None:
@@ -103,7 +110,10 @@ class ExportChoices(QWidget):
         formats.setHorizontalSpacing(2 * SPACING_PX)
         formats.setVerticalSpacing(SPACING_PX)
         formats.setColumnStretch(1, 1)
-        for row, (kind, box) in enumerate(self._boxes.items()):
+        for kind, box in self._boxes.items():
+            if kind == next(iter(TOOL_FORMATS)):
+                formats.addWidget(QLabel("For one program each:"), formats.rowCount(), 0)
+            row = formats.rowCount()
             formats.addWidget(box, row, 0)
             formats.addWidget(QLabel(_PURPOSES[kind]), row, 1)
         form = QFormLayout()

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QLabel, QWidget
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import choice, number, with_name
+from handcal_gui.widgets.fields import choice, fill_row, number, whole_number, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
@@ -26,10 +27,25 @@ _LEARN_HELP = (
     "Learn where wearers' eyes are from the finished sessions in this folder with the same rig,\n"
     "once there are enough."
 )
+_SLICER = {
+    "": "Off",
+    "127.0.0.1": "For this computer",
+    "0.0.0.0": "For other computers, too",  # noqa: S104 (chosen by the user, who is warned)
+}
+"""Addresses on which OpenIGTLink is served."""
+_SLICER_HELP = (
+    "Serve OpenIGTLink during calibrations, for 3D Slicer and others. It has no password:\n"
+    "any computer that reaches the address can read."
+)
+_PORT_HELP = "TCP port of OpenIGTLink."
+_LSL_HELP = (
+    "Send the events of calibrations to the Lab Streaming Layer, on which any computer of the\n"
+    "local network can read them."
+)
 
 
 class PreferencesDialog(QDialog):
-    """Theme, session folder, and the settings of future calibrations.
+    """Theme, session folder, bridges, and the settings of future calibrations.
 
     Parameters
     ----------
@@ -55,8 +71,27 @@ class PreferencesDialog(QDialog):
             QCheckBox("Learn from earlier sessions"), "learnPrior", help_text=_LEARN_HELP
         )
         self._learn.setChecked(preferences.station.learn_prior)
+        bridges = preferences.bridges
+        hosts = {**_SLICER}
+        hosts.setdefault(bridges.slicer_host, bridges.slicer_host)  # typed into the file
+        self._slicer = choice("slicer", "OpenIGTLink", hosts, _SLICER_HELP)
+        self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
+        self._port = whole_number("slicerPort", 1, 65535, _PORT_HELP)
+        self._port.setValue(bridges.slicer_port)
+        self._port.setEnabled(bool(bridges.slicer_host))
+        self._slicer.currentIndexChanged.connect(
+            lambda: self._port.setEnabled(bool(self._slicer.currentData()))
+        )
+        self._lsl = with_name(
+            QCheckBox("Send events to the Lab Streaming Layer"), "lsl", help_text=_LSL_HELP
+        )
+        self._lsl.setChecked(bridges.lsl)
         self._calibration.add_row("Target", self._target)
         self._calibration.add_row("Prior", self._learn)
+        slicer = QWidget()
+        fill_row(slicer, self._slicer, QLabel("port"), self._port, grows=self._port)
+        self._calibration.add_row("OpenIGTLink", slicer)
+        self._calibration.add_row("LSL", self._lsl)
         self._calibration.add_row("Theme", self._theme)
         self._calibration.add_row("Session folder", self._sessions)
         buttons = QDialogButtonBox(
@@ -77,6 +112,9 @@ class PreferencesDialog(QDialog):
         return replace(
             self._preferences,
             theme=self._theme.currentData(),
+            bridges=BridgeSettings(
+                self._slicer.currentData(), self._port.value(), self._lsl.isChecked()
+            ),
             station=replace(
                 station,
                 sessions=self._sessions.path or station.sessions,
