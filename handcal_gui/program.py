@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings, export_session
@@ -51,12 +52,12 @@ from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
-from handcal_gui.windows.evaluation.specs import make_specs
-from handcal_gui.windows.evaluation.window import EvaluationWindow
-from handcal_gui.windows.library.window import LibraryWindow
 from handcal_gui.windows.manual import Manual
-from handcal_gui.windows.rig.project_folder import ProjectFolder
-from handcal_gui.windows.rig.wizard import RigWizard
+
+if TYPE_CHECKING:  # imported when they open: they take longer than all the rest
+    from handcal_gui.windows.evaluation.window import EvaluationWindow
+    from handcal_gui.windows.library.window import LibraryWindow
+    from handcal_gui.windows.rig.wizard import RigWizard
 
 
 class Program(QObject):
@@ -77,7 +78,11 @@ class Program(QObject):
     inspection : Inspection
     start : StartPage
     manual : Manual
+    ending : Signal()
+        The program is about to end; dialogs end their work.
     """
+
+    ending = Signal()
 
     def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
         super().__init__()
@@ -183,14 +188,14 @@ class Program(QObject):
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
         """Show the sessions of a folder, by default of the session folder."""
         folder = folder or Path(self.start.new.settings.sessions)
+        from handcal_gui.windows.library.window import LibraryWindow
+
         window = LibraryWindow(folder, self.window)
-        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.open_requested.connect(self.open_session)
         window.resume_requested.connect(self.resume_session)
         window.export_requested.connect(lambda paths: self.export_many(paths, window))
         window.finished.connect(self.start.look_for_sessions)
-        window.open()
-        keep_on_screen(window)
+        self._open(window, window.stop)
         return window
 
     def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog | None:
@@ -213,11 +218,16 @@ class Program(QObject):
         self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
     ) -> ExportDialog:
         dialog = ExportDialog(record, self._preferences.export, folder, parent, export, name)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.remembered.connect(self._remember_export)
+        self._open(dialog, dialog.stop)
+        return dialog
+
+    def _open(self, dialog: QDialog, stop: Callable[[], object]) -> None:
+        """Show a dialog, which `stop` ends before the program does."""
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.ending.connect(stop)
         dialog.open()
         keep_on_screen(dialog)
-        return dialog
 
     def inspect(self) -> None:
         """Show the alignments of the session shown in a 3D window."""
@@ -239,28 +249,30 @@ class Program(QObject):
             self.window.banner.show_message(str(error))
             return None
         dialog = ConnectDialog(server, rig, is_calibrating=link is not None, parent=self.window)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(self.start.new.check)
-        dialog.open()
-        keep_on_screen(dialog)
+        self._open(dialog, dialog.stop)
         return dialog
 
     def calibrate_rig(self) -> RigWizard | None:
         """Open the wizard of the offline calibration; return None if its folder cannot be used."""
+        from handcal_gui.windows.rig.project_folder import ProjectFolder
+        from handcal_gui.windows.rig.wizard import RigWizard
+
         try:
             folder = ProjectFolder(self._file.path.parent / "rig")
         except FileError as error:
             self.window.banner.show_message(str(error))
             return None
         wizard = RigWizard(folder, self.window, self.start.new.settings.realsense)
-        wizard.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         wizard.rig_saved.connect(self._use_rig)
-        wizard.open()
-        keep_on_screen(wizard)
+        self._open(wizard, wizard.accept)
         return wizard
 
     def evaluate(self) -> EvaluationWindow:
         """Show the evaluation window; there is at most one."""
+        from handcal_gui.windows.evaluation.specs import make_specs
+        from handcal_gui.windows.evaluation.window import EvaluationWindow
+
         opened = [one for one in self.window.findChildren(EvaluationWindow) if one.isVisible()]
         if opened:
             opened[0].raise_()
@@ -273,6 +285,7 @@ class Program(QObject):
         window = EvaluationWindow(make_specs(), entries, self.window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(self._remember_evaluation)
+        self.ending.connect(window.stop)
         window.show()
         keep_on_screen(window)
         return window
@@ -289,18 +302,7 @@ class Program(QObject):
                 fine_tune_step_m=self.window.panels.fine_tune.step_m,
             )
         )
-        for dialog in self.window.findChildren(ExportDialog):
-            dialog.stop()
-        for support in self.window.findChildren(SupportDialog):
-            support.stop()
-        for library in self.window.findChildren(LibraryWindow):
-            library.stop()
-        for connecting in self.window.findChildren(ConnectDialog):
-            connecting.stop()
-        for wizard in self.window.findChildren(RigWizard):
-            wizard.accept()
-        for evaluation in self.window.findChildren(EvaluationWindow):
-            evaluation.stop()
+        self.ending.emit()
         self.inspection.close()
         self.live.stop()
         self.review.close()
@@ -441,9 +443,7 @@ class Program(QObject):
         folder = self._file.path.parent
         settings = SupportSettings(folder, (sessions,))
         dialog = SupportDialog(settings, Path.home(), self.window)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.open()
-        keep_on_screen(dialog)
+        self._open(dialog, dialog.stop)
         return dialog
 
     def _edit_preferences(self) -> None:
