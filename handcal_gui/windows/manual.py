@@ -82,7 +82,8 @@ class Manual(QWidget):
             "manualSearch",
             "Search all pages",
         )
-        self.found = with_name(QTreeWidget(rootIsDecorated=False), "manualFound", "Lines found")
+        self.found = with_name(QTreeWidget(), "manualFound", "Lines found")
+        self.found.setRootIsDecorated(False)
         self.found.setHeaderLabels(["Page", "Section", "Line"])
         self.found.setMaximumHeight(_FOUND_PX)
         self.found.hide()
@@ -146,12 +147,12 @@ class Manual(QWidget):
     def _show_next(self) -> None:
         """Show the next line found, after the last the first."""
         if self._shown:
-            row = self.found.indexOfTopLevelItem(self.found.currentItem()) + 1
-            self.found.setCurrentItem(self.found.topLevelItem(row % len(self._shown)))
+            following = (self.found.currentIndex().row() + 1) % len(self._shown)
+            self.found.setCurrentIndex(self.found.model().index(following, 0))
             self._show_current()
 
     def _show_current(self) -> None:
-        line = self._shown[self.found.indexOfTopLevelItem(self.found.currentItem())]
+        line = self._shown[self.found.currentIndex().row()]
         self.page.setSource(QUrl.fromLocalFile(str(line.page)))
         self.page.go_to(self.page.document().findBlockByNumber(line.block))
 

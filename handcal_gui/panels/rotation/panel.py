@@ -122,7 +122,7 @@ class RotationPanel(QWidget):
         self._limit_rad = limit_rad
         limit_deg = float(np.degrees(limit_rad))
         self._plot.item.setYRange(0.0, _HISTORY_LIMITS * limit_deg, padding=0.0)
-        self._plot.item.getAxis("left").setTicks([[(0.0, "0°"), (limit_deg, f"{limit_deg:g}°")]])
+        self._plot.item.getAxis("left").setTicks([[(limit_deg, f"{limit_deg:g}°")]])
         self._limit_line.setData([-_HISTORY_S, 0.0], [limit_deg, limit_deg])
 
     def _show_refusals(self, count: int, last: str) -> None:

@@ -23,6 +23,7 @@ from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
@@ -90,10 +91,8 @@ class TrialsPanel(QWidget):
         self._target: tuple[Eye, float] | None = None  # requested
         self._fill_choices()
         self._make_record_action()
-        self._message = QLabel()
-        self._message.setObjectName("message")
-        self._summary = QLabel()
-        self._summary.setObjectName("summary")
+        self._message = paragraph("message")
+        self._summary = paragraph("summary")
         self._table = RecordTable(
             "Trials", TRIAL_COLUMNS, "Trials appear here as they are recorded"
         )
@@ -269,8 +268,7 @@ class TrialsPanel(QWidget):
         vbox(
             hint,
             choices,
-            self._shows_target,
-            self._message,
+            hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
             (tabs, 1),
             self._summary,
             self._strip,
