@@ -250,6 +250,17 @@ class CalibrationController(QObject):
         trials.hide_target_requested.connect(
             lambda: self._submit("hide the target", Station.hide_target)
         )
+        compare = "compare"
+        trials.compare_requested.connect(lambda: self._submit(compare, Station.compare))
+        trials.end_comparison_requested.connect(
+            lambda: self._submit(compare, lambda s: s.comparing.end())
+        )
+        trials.show_compared_requested.connect(
+            lambda place: self._submit(compare, lambda s: s.comparing.show(place))
+        )
+        trials.comparison_answered.connect(
+            lambda answer: self._submit(compare, lambda s: s.comparing.answer(answer))
+        )
         trials.doubted.connect(partial(self._on_command_failed, _RECORD))
 
     def _connect_session(self) -> None:

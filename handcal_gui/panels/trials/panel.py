@@ -15,12 +15,14 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.display import TARGET_DEPTHS_M
+from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
 from handcal.session.trial import summarise_trials
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
+from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import paragraph
@@ -66,6 +68,9 @@ class TrialsPanel(QWidget):
     show_target_requested : Signal(str, float)
         Eye and distance of the target to show in the headset instead of the present one.
     hide_target_requested : Signal()
+    compare_requested, end_comparison_requested : Signal()
+    show_compared_requested, comparison_answered : Signal(str)
+        As in `ComparisonRow`.
     doubted : Signal(str)
         Reason why the user must confirm the trial by requesting it again.
     delete_requested, restore_requested : Signal(str, int)
@@ -75,6 +80,10 @@ class TrialsPanel(QWidget):
     trial_requested = Signal(str, float)
     show_target_requested = Signal(str, float)
     hide_target_requested = Signal()
+    compare_requested = Signal()
+    end_comparison_requested = Signal()
+    show_compared_requested = Signal(str)
+    comparison_answered = Signal(str)
     doubted = Signal(str)
     delete_requested = Signal(str, int)
     restore_requested = Signal(str, int)
@@ -89,6 +98,11 @@ class TrialsPanel(QWidget):
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox("Show the target in the headset")
         self._target: tuple[Eye, float] | None = None  # requested
+        self._comparison = ComparisonRow()
+        self._comparison.begun.connect(self.compare_requested)
+        self._comparison.ended.connect(self.end_comparison_requested)
+        self._comparison.show_requested.connect(self.show_compared_requested)
+        self._comparison.answered.connect(self.comparison_answered)
         self._fill_choices()
         self._make_record_action()
         self._message = paragraph("message")
@@ -192,6 +206,16 @@ class TrialsPanel(QWidget):
         if not can_show:
             self._shows_target.setChecked(False)
         self._request_target()
+        self._show_comparison(can_compare=can_show)
+
+    def _show_comparison(self, *, can_compare: bool) -> None:
+        snapshot, record = self._snapshot, self._record
+        self._comparison.show_comparison(
+            None if snapshot is None else snapshot.comparing,
+            has_seen_both=snapshot is not None and snapshot.has_compared_both,
+            can_begin=can_compare,
+            count=0 if record is None else len(read_comparisons(record.events)),
+        )
 
     def _request_target(self) -> None:
         """Request another target in the headset if the choice has changed."""
@@ -269,6 +293,7 @@ class TrialsPanel(QWidget):
             hint,
             choices,
             hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
+            self._comparison,
             (tabs, 1),
             self._summary,
             self._strip,
