@@ -422,9 +422,8 @@ def _comparisons(comparisons: Sequence[Comparison]) -> Section:
         "neither wearer nor technician knew it.",
     )
     sentence = (
-        f"The wearer found the applied calibration better {counts.applied} times, the offline one "
-        f"{counts.offline} times, and neither {counts.neither} times; two-sided sign test of "
-        f"this wearer's answers: p = {counts.p_value:.3f}."
+        f"Better with the calibration: {counts.applied}; without it: {counts.offline}; neither: "
+        f"{counts.neither}. Two-sided sign test of this wearer's answers: p = {counts.p_value:.3f}."
     )
     return Section("Blinded comparison", [sentence, table])
 
