@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -67,15 +68,14 @@ def read_comparisons(events: Iterable[Event]) -> list[Comparison]:
     """Return the comparisons of a session's events; those that lack something are left out."""
     found = []
     for event in events:
-        first, answer = event.data.get("first"), event.data.get("answer")
+        first: Any = event.data.get("first")
+        answer: Any = event.data.get("answer")
         is_sound = first in get_args(Drawing) and answer in get_args(Answer)
         if event.name != COMPARED or not is_sound:
             continue
-        try:
+        with suppress(KeyError, TypeError, ValueError, AttributeError):
             shifts_m = as_shifts(event.data["applied_shift_m"])
-        except (KeyError, TypeError, ValueError, AttributeError):
-            continue
-        found.append(Comparison(first, answer, shifts_m, event.time))
+            found.append(Comparison(first, answer, shifts_m, event.time))
     return found
 
 
@@ -90,4 +90,4 @@ def sign_test(first: int, second: int) -> float:
     """Return the two-sided p-value of two counts that are equally likely by chance, exactly."""
     total = first + second
     tail = sum(math.comb(total, k) for k in range(min(first, second) + 1))
-    return min(1.0, 2.0 * tail / 2**total)
+    return float(min(1.0, 2.0 * tail / 2**total))

@@ -28,7 +28,7 @@ _PURPOSES: dict[Format, str] = {
     "northstar": "The final calibration for Monado's North Star driver",
     "slicer": "The eyes as transforms and the clouds as models",
 }
-_WITH_PLANES = "json", "unity"
+_WITH_PLANES: tuple[Format, ...] = ("json", "unity")
 """Formats with clipping distances."""
 
 

@@ -25,8 +25,9 @@ from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, co
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
 from handcal.session.trial import Trial
+from handcal.types import Eye, Float64
 
-COMPARED_M = {"left": np.array([1e-3, 0.0, 0.0])}
+COMPARED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0])}
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
 
 

@@ -20,8 +20,9 @@ from handcal.session.comparison import (
     sign_test,
 )
 from handcal.session.session import Session
+from handcal.types import Eye, Float64
 
-SHIFT_M = {"left": np.array([1e-3, 2e-3, 3e-3])}
+SHIFT_M: dict[Eye, Float64] = {"left": np.array([1e-3, 2e-3, 3e-3])}
 
 
 def made(first: Drawing, answer: Answer) -> Comparison:
