@@ -351,7 +351,8 @@ class MainWindow(QMainWindow):
         )
         if self._page == "review":  # the page itself needs little space
             page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
-            left = right = (width - page) // 2
+            left = (width - page) * 45 // 100
+            right = width - page - left
         self.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
         column = [docks[name] for name in _LEFT_COLUMN]
         self.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)

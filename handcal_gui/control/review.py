@@ -106,7 +106,8 @@ class ReviewController(QObject):
         self.record = record = stored.record
         panels = self._window.panels
         note = "" if stored.results else "It contains no alignments yet."
-        self._page.show_session(record, stored.results, note)
+        target_arcmin = stored.settings.verdict.target_arcmin
+        self._page.show_session(record, stored.results, target_arcmin, note)
         panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)

@@ -13,7 +13,7 @@ from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_WORDS
+from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.widgets.times import local_time
 
 
@@ -39,6 +39,7 @@ class ReviewPage(QWidget):
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
+        self._card = ResultCard()
         self._export = main_button("reviewExport", "&Export…")
         self._resume = button("reviewResume", "&Resume this session")
         self._resume.setToolTip("Open camera and headset to add alignments, fine-tuning or trials")
@@ -56,6 +57,7 @@ class ReviewPage(QWidget):
         vbox(
             self._title,
             self._facts,
+            self._card,
             buttons,
             0,
             on=self,
@@ -63,7 +65,13 @@ class ReviewPage(QWidget):
             spacing=2 * SPACING_PX,
         )
 
-    def show_session(self, record: SessionRecord, results: Results | None, note: str = "") -> None:
+    def show_session(
+        self,
+        record: SessionRecord,
+        results: Results | None,
+        target_arcmin: float,
+        note: str = "",
+    ) -> None:
         """Show a session and, if it has been solved, its results.
 
         Parameters
@@ -71,21 +79,25 @@ class ReviewPage(QWidget):
         record : SessionRecord
         results : Results or None
             None while it is being solved, or if it cannot be solved.
+        target_arcmin : float
+            The lab's target when the session was made.
         note : str
             The current activity, or the reason why there are no results.
         """
         self._title.setText(record.wearer or "Session without a name")
         self._export.setEnabled(bool(record.alignments))
         self._again.setEnabled(results is not None)
+        self._card.show_results(results, target_arcmin)
+        self._card.setVisible(results is not None)
         while self._facts.rowCount():
             self._facts.removeRow(0)
-        for name, fact in _facts(record, results, note):
+        for name, fact in _facts(record, note):
             text = paragraph(f"review{name.replace(' ', '')}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(QLabel(name, alignment=Qt.AlignmentFlag.AlignTop), text)
 
 
-def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
+def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str]]:
     """Yield the name and the text of each fact about a session."""
     yield "Started", local_time(record.events[0].time)
     yield "Rig", record.rig.name
@@ -93,8 +105,6 @@ def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterato
     counts = pluralize(len(record.alignments), "alignment"), pluralize(len(record.trials), "trial")
     yield "Contents", f"{', '.join(counts)}; {state}"
     yield "Folder", str(record.path)
-    for eye, verdict in results.verdicts.items() if results else ():
-        yield EYE_NAMES[eye], f"{VERDICT_WORDS[verdict.name]}: {verdict.reason}"
     if note:
         yield "Note", note
     if record.left_out:
