@@ -52,7 +52,7 @@ Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
 _CHILDREN_ONLY = Qt.FindChildOption.FindDirectChildrenOnly
-_NARROWEST_PX, _WIDEST_PX = 360, 560
+_NARROWEST_PX, _WIDEST_PX = 360, 720
 """Limits of the initial width of a column of docks."""
 _SMALL_PX = 1200, 690
 """Width and height below which all docks of a window are tabs."""

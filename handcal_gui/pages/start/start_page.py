@@ -22,6 +22,9 @@ from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
+_LARGEST_PX = 1600, 1000
+"""Size beyond which a larger window leaves room around the page."""
+
 
 class StartPage(QWidget):
     """The first page: new calibration, unfinished and recent sessions, evaluation.
@@ -176,7 +179,10 @@ class StartPage(QWidget):
         room_px = cards.minimumSizeHint().width() + right.verticalScrollBar().sizeHint().width()
         right.setMinimumWidth(room_px)
         right.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        grid = QGridLayout(self)
+        content = QWidget()
+        content.setMaximumSize(*_LARGEST_PX)
+        hbox(1, (content, 1000), 1, on=self, margins=0)
+        grid = QGridLayout(content)
         grid.setContentsMargins(*4 * (3 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)
         grid.setColumnStretch(1, 3)
