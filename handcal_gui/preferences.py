@@ -21,6 +21,7 @@ from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.translation import tr
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 PREFERENCES_VERSION = 2
@@ -112,8 +113,10 @@ class PreferencesFile:
             with suppress(OSError):
                 self.path.replace(bad)
             return Preferences(), (
-                "The preferences could not be read and were reset; "
-                f"the old file was kept as {bad}: {error}"
+                tr(
+                    "The preferences could not be read and were reset; the old file was kept as "
+                    "{}: {}"
+                ).format(bad, error)
             )
 
     def save(self, preferences: Preferences) -> None:
@@ -126,10 +129,10 @@ class PreferencesFile:
         kept = self.path.with_name(f"{self.path.name}.newer")
         with suppress(OSError):
             shutil.copyfile(self.path, kept)
-        return (
-            "The preferences are of a newer version of handcal. Settings that this one does not "
-            f"know are left out; they are kept in {kept}."
-        )
+        return tr(
+            "The preferences are of a newer version of handcal. Settings that this one "
+            "does not know are left out; they are kept in {}."
+        ).format(kept)
 
     def pairings(self) -> Pairings:
         """Return the paired headsets, with a key for the next one.

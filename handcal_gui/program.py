@@ -50,6 +50,7 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
+from handcal_gui.translation import tr
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
 from handcal_gui.windows.manual import Manual
@@ -180,7 +181,7 @@ class Program(QObject):
         """
         record = self._record()
         if record is None or not record.alignments:
-            self.window.banner.show_message("There is no alignment to export yet.")
+            self.window.banner.show_message(tr("There is no alignment to export yet."))
             return None
         folder = folder or Path(self._preferences.export_folder or record.path.parent)
         return self._open_export(record, folder, self.window, export_session, "")
@@ -212,7 +213,9 @@ class Program(QObject):
             return export_sessions(paths, target, settings, progress)
 
         folder = Path(self._preferences.export_folder or paths[0].parent)
-        return self._open_export(first, folder, parent, export, f"{len(paths)} sessions")
+        return self._open_export(
+            first, folder, parent, export, tr("{} sessions").format(len(paths))
+        )
 
     def _open_export(
         self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
@@ -233,9 +236,9 @@ class Program(QObject):
         """Show the alignments of the session shown in a 3D window."""
         record = self._record()
         if record is None or not record.alignments:
-            self.window.banner.show_message("There is no alignment to inspect yet.")
+            self.window.banner.show_message(tr("There is no alignment to inspect yet."))
             return
-        self.window.banner.show_message("The 3D window opens in a few seconds.")
+        self.window.banner.show_message(tr("The 3D window opens in a few seconds."))
         self.inspection.start(record)
 
     def connect_headset(self) -> ConnectDialog | None:
@@ -350,26 +353,26 @@ class Program(QObject):
 
     def _make_menus(self) -> None:
         add = self.window.add_action
-        add("File", "&Next wearer", "Ctrl+N", self.show_start)
-        add("File", "&Open session…", "Ctrl+O", self._browse)
-        add("File", "&Sessions…", "Ctrl+L", self.show_library)
-        add("File", "&Export…", "Ctrl+E", self.export)
-        add("File", "&Inspect in 3D", "", self.inspect)
-        add("File", "Connect a &headset…", "", self.connect_headset)
-        add("File", "&Calibrate a rig…", "", self.calibrate_rig)
-        add("File", "E&valuate…", "", self.evaluate)
-        add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
-        add("File", "&Quit", "Ctrl+Q", self.window.close)
-        add("View", "&Reset layout", "", self.window.reset_layout)
-        add("Help", "&Guide", "Shift+F1", lambda: self._read("docs/guide.md"))
-        add("Help", "&Manual", "", lambda: self._read("docs/index.md"))
-        add("Help", "Headset &protocol", "", lambda: self._read("docs/protocol.md"))
-        add("Help", "&Examples in Python", "", lambda: self._show_folder("examples"))
-        add("Help", "&Unity package", "", lambda: self._show_folder("unity"))
-        add("Help", "&Support bundle…", "", self.make_support_bundle)
-        add("Help", "&Keys", "F1", self._show_keys)
-        add("Help", "&Licences", "", lambda: self._read("THIRD-PARTY.md"))
-        add("Help", "&About handcal", "", self._show_about)
+        add("File", tr("&Next wearer"), "Ctrl+N", self.show_start)
+        add("File", tr("&Open session…"), "Ctrl+O", self._browse)
+        add("File", tr("&Sessions…"), "Ctrl+L", self.show_library)
+        add("File", tr("&Export…"), "Ctrl+E", self.export)
+        add("File", tr("&Inspect in 3D"), "", self.inspect)
+        add("File", tr("Connect a &headset…"), "", self.connect_headset)
+        add("File", tr("&Calibrate a rig…"), "", self.calibrate_rig)
+        add("File", tr("E&valuate…"), "", self.evaluate)
+        add("File", tr("&Preferences…"), "Ctrl+,", self._edit_preferences)
+        add("File", tr("&Quit"), "Ctrl+Q", self.window.close)
+        add("View", tr("&Reset layout"), "", self.window.reset_layout)
+        add("Help", tr("&Guide"), "Shift+F1", lambda: self._read("docs/guide.md"))
+        add("Help", tr("&Manual"), "", lambda: self._read("docs/index.md"))
+        add("Help", tr("Headset &protocol"), "", lambda: self._read("docs/protocol.md"))
+        add("Help", tr("&Examples in Python"), "", lambda: self._show_folder("examples"))
+        add("Help", tr("&Unity package"), "", lambda: self._show_folder("unity"))
+        add("Help", tr("&Support bundle…"), "", self.make_support_bundle)
+        add("Help", tr("&Keys"), "F1", self._show_keys)
+        add("Help", tr("&Licences"), "", lambda: self._read("THIRD-PARTY.md"))
+        add("Help", tr("&About handcal"), "", self._show_about)
 
     def _restore(self) -> None:
         preferences = self._preferences
@@ -402,7 +405,7 @@ class Program(QObject):
 
     def _browse(self) -> None:
         folder = QFileDialog.getExistingDirectory(
-            self.window, "Open a session's folder", self._preferences.station.sessions
+            self.window, tr("Open a session's folder"), self._preferences.station.sessions
         )
         if folder:
             self.open_session(Path(folder))
@@ -433,8 +436,11 @@ class Program(QObject):
         self._pairings = self._file.renew_pairing_key()
         self.start.set_pairing_key(self._pairings.open_key())
         self.window.banner.show_message(
-            "New pairing key created. Enter it in the headset; all others are disconnected, and "
-            "the key is used from the next calibration on."
+            tr(
+                "New pairing key created. Enter it in the headset; all others are "
+                "disconnected, and "
+                "the key is used from the next calibration on."
+            )
         )
 
     def make_support_bundle(self) -> SupportDialog:
@@ -471,10 +477,12 @@ class Program(QObject):
             if self._remembers:
                 self._file.save(preferences)
         except FileError as error:
-            self.window.banner.show_message(f"The preferences could not be saved: {error}")
+            self.window.banner.show_message(
+                tr("The preferences could not be saved: {}").format(error)
+            )
 
     def _show_keys(self) -> None:
-        QMessageBox.information(self.window, "Keys", keys_html(self.window))
+        QMessageBox.information(self.window, tr("Keys"), keys_html(self.window))
 
     def _read(self, page: str) -> None:
         try:
@@ -489,13 +497,17 @@ class Program(QObject):
             self.window.banner.show_message(str(error))
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.window.banner.show_message(f"No file manager was found; the folder is {folder}")
+            self.window.banner.show_message(
+                tr("No file manager was found; the folder is {}").format(folder)
+            )
 
     def _show_about(self) -> None:
         QMessageBox.about(
             self.window,
-            "About handcal",
-            f"<b>handcal {version('handcal')}</b><p>Calibrates an optical see-through headset with "
-            "the wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR 2021."
-            "<p>Apache-2.0",
+            tr("About handcal"),
+            tr(
+                "<b>handcal {}</b><p>Calibrates an optical see-through headset with the "
+                "wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR "
+                "2021.<p>Apache-2.0"
+            ).format(version("handcal")),
         )

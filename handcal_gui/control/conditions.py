@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from handcal.camera.feed import CameraStatus
 from handcal.station.snapshot import Snapshot
+from handcal_gui.translation import tr
 
 _LASTS_S = 0.8
 """Time for which a problem lasts before it is shown."""
@@ -90,10 +91,13 @@ class Conditions:
             self.is_slow, self._rate_since_s = not self.is_slow, None
             # Frames that the camera counted, but nobody took, are lost in this computer.
             is_camera = self._is_usb and camera.dropped == self._dropped
-            advice = "plug the camera into a USB 3 port" if is_camera else "close other programs"
+            advice = (
+                tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
+            )
             self._slow_text = (
-                f"frames per second: only {rate_hz:.0f} of the {_SLOW_HZ:.0f} that are needed; "
-                f"{advice}"
+                tr("frames per second: only {:.0f} of the {:.0f} that are needed; {}").format(
+                    rate_hz, _SLOW_HZ, advice
+                )
                 if self.is_slow
                 else ""
             )

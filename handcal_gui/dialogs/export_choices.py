@@ -11,22 +11,23 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidg
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import number, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
-    "report": "Verdict, eye shifts, figures and settings, to read and archive",
-    "html": "The report for a browser, and each figure with its data",
-    "csv": "One row for each eye, alignment and trial, for statistics",
-    "yaml": "Projection, K, H0 and φ of each eye, read by cv2.FileStorage",
-    "json": "The projections in the convention of each system",
-    "ply": "Cursor and hand of each alignment, with residuals",
-    "zip": "All recorded data, to archive or to open elsewhere",
-    "unity": "The final calibration for Unity's JsonUtility",
-    "openxr": "The final calibration as views of OpenXR: poses and angles",
-    "northstar": "The final calibration for Monado's North Star driver",
-    "slicer": "The eyes as transforms and the clouds as models",
+    "report": tr("Verdict, eye shifts, figures and settings, to read and archive"),
+    "html": tr("The report for a browser, and each figure with its data"),
+    "csv": tr("One row for each eye, alignment and trial, for statistics"),
+    "yaml": tr("Projection, K, H0 and φ of each eye, read by cv2.FileStorage"),
+    "json": tr("The projections in the convention of each system"),
+    "ply": tr("Cursor and hand of each alignment, with residuals"),
+    "zip": tr("All recorded data, to archive or to open elsewhere"),
+    "unity": tr("The final calibration for Unity's JsonUtility"),
+    "openxr": tr("The final calibration as views of OpenXR: poses and angles"),
+    "northstar": tr("The final calibration for Monado's North Star driver"),
+    "slicer": tr("The eyes as transforms and the clouds as models"),
 }
 _WITH_PLANES: tuple[Format, ...] = ("json", "unity")
 """Formats with clipping distances."""
@@ -59,11 +60,11 @@ class ExportChoices(QWidget):
             kind: with_name(QCheckBox(info.title), kind)
             for kind, info in {**FORMATS, **TOOL_FORMATS}.items()
         }
-        self._near = number("near", 0.01, 1.0, 0.05, " m", "Anything nearer is not drawn.")
-        self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Anything farther is not drawn.")
+        self._near = number("near", 0.01, 1.0, 0.05, " m", tr("Anything nearer is not drawn."))
+        self._far = number("far", 1.5, 10000.0, 10.0, " m", tr("Anything farther is not drawn."))
         self._near.setValue(settings.near_m)
         self._far.setValue(settings.far_m)
-        self._folder = PathField("Export folder", "folder")
+        self._folder = PathField(tr("Export folder"), "folder")
         self._folder.set_path(str(folder))
         self._lay_out()
         for kind, box in self._boxes.items():
@@ -112,15 +113,15 @@ class ExportChoices(QWidget):
         formats.setColumnStretch(1, 1)
         for kind, box in self._boxes.items():
             if kind == next(iter(TOOL_FORMATS)):
-                formats.addWidget(QLabel("For one program each:"), formats.rowCount(), 0)
+                formats.addWidget(QLabel(tr("For one program each:")), formats.rowCount(), 0)
             row = formats.rowCount()
             formats.addWidget(box, row, 0)
             formats.addWidget(QLabel(_PURPOSES[kind]), row, 1)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
-        form.addRow("Near plane (OpenGL, Unity)", self._near)
-        form.addRow("Far plane (OpenGL, Unity)", self._far)
-        form.addRow("Export to", self._folder)
-        form.addRow("", QLabel(f"The folder {self._name} is created there."))
+        form.addRow(tr("Near plane (OpenGL, Unity)"), self._near)
+        form.addRow(tr("Far plane (OpenGL, Unity)"), self._far)
+        form.addRow(tr("Export to"), self._folder)
+        form.addRow("", QLabel(tr("The folder {} is created there.").format(self._name)))
         vbox(formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)

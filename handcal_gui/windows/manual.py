@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from handcal.io.resources import resource_path
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
@@ -73,18 +74,18 @@ class Manual(QWidget):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Window)
-        self.setWindowTitle("Manual")
+        self.setWindowTitle(tr("Manual"))
         self.setObjectName("manual")
         self.resize(*_SIZE_PX)
         self.page = ManualPage(self)
         self.search = with_name(
-            QLineEdit(placeholderText="Search all pages (Ctrl+F)", clearButtonEnabled=True),
+            QLineEdit(placeholderText=tr("Search all pages (Ctrl+F)"), clearButtonEnabled=True),
             "manualSearch",
-            "Search all pages",
+            tr("Search all pages"),
         )
-        self.found = with_name(QTreeWidget(), "manualFound", "Lines found")
+        self.found = with_name(QTreeWidget(), "manualFound", tr("Lines found"))
         self.found.setRootIsDecorated(False)
-        self.found.setHeaderLabels(["Page", "Section", "Line"])
+        self.found.setHeaderLabels([tr("Page"), tr("Section"), tr("Line")])
         self.found.setMaximumHeight(_FOUND_PX)
         self.found.hide()
         self._count = QLabel()
@@ -102,7 +103,7 @@ class Manual(QWidget):
         self.search.returnPressed.connect(self._show_next)
         self.found.itemClicked.connect(self._show_current)
         self.found.itemActivated.connect(self._show_current)
-        add_action(self, "Search all pages", "Ctrl+F", self._begin_search)
+        add_action(self, tr("Search all pages"), "Ctrl+F", self._begin_search)
 
     def open(self, page: str) -> None:
         """Show a shipped page, such as ``docs/guide.md``.
@@ -141,8 +142,9 @@ class Manual(QWidget):
         for column, width_px in enumerate(_COLUMNS_PX):
             self.found.setColumnWidth(column, width_px)
         self.found.setVisible(bool(words.split()))
-        most = f", the first {_MOST_FOUND} listed" if len(found) > _MOST_FOUND else ""
-        self._count.setText(f"{pluralize(len(found), 'line')}{most}" if words.split() else "")
+        most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
+        count = pluralize(len(found), tr("line"), tr("lines"))
+        self._count.setText(f"{count}{most}" if words.split() else "")
 
     def _show_next(self) -> None:
         """Show the next line found, after the last the first."""

@@ -7,17 +7,18 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.session.comparison import Answer, Place
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 
-_SHOW: dict[Place, str] = {"first": "Show first", "second": "Show second"}
+_SHOW: dict[Place, str] = {"first": tr("Show first"), "second": tr("Show second")}
 _ANSWERS: dict[Answer, str] = {
-    "first": "First is better",
-    "second": "Second is better",
-    "neither": "Neither",
+    "first": tr("First is better"),
+    "second": tr("Second is better"),
+    "neither": tr("Neither"),
 }
-_COMPARE_HELP = (
+_COMPARE_HELP = tr(
     "Show the wearer the drawing without and with the calibration, in an order that nobody knows,\n"
     "and record which fits the hand better. The report tells which was which."
 )
@@ -44,11 +45,11 @@ class ComparisonRow(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._begin = button("compare", "Blinded comparison", help_text=_COMPARE_HELP)
+        self._begin = button("compare", tr("Blinded comparison"), help_text=_COMPARE_HELP)
         self._count = paragraph("compared")
         self._show = {place: button(f"show-{place}", text) for place, text in _SHOW.items()}
         self._answers = {one: button(f"answer-{one}", text) for one, text in _ANSWERS.items()}
-        self._end = button("compareEnd", "Cancel")
+        self._end = button("compareEnd", tr("Cancel"))
         self._shown: Place | None = None
         self._begin.clicked.connect(self.begun)
         self._end.clicked.connect(self.ended)
@@ -78,7 +79,11 @@ class ComparisonRow(QWidget):
         self._idle.setVisible(shown is None)
         self._running.setVisible(shown is not None)
         self._begin.setEnabled(can_begin)
-        self._count.setText(f"{pluralize(count, 'comparison')} recorded" if count else "")
+        self._count.setText(
+            tr("{} recorded").format(pluralize(count, tr("comparison"), tr("comparisons")))
+            if count
+            else ""
+        )
         for place, one in self._show.items():
             one.setChecked(place == shown)
         for one in self._answers.values():
