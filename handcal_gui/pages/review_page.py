@@ -54,7 +54,7 @@ class ReviewPage(QWidget):
                 "checks first"
             )
         )
-        close = button("reviewClose", tr("&Close session"))
+        close = button("reviewClose", tr("Close &session"))
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)
         self._again.clicked.connect(self.again_requested)

@@ -631,7 +631,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Close session</source>
+        <source>Close &amp;session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1301,7 +1301,7 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Hand rotated by less than {:.0f}°</source>
+        <source>Hand rotated by less than {:g}°</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

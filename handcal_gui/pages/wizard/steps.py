@@ -203,7 +203,7 @@ class Wizard:
         procedure, seen = snapshot.procedure, snapshot.observation
         hand = hand_check(snapshot)
         is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
-        limit_deg = np.degrees(procedure.guard_limit_rad)
+        limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
         cursor = procedure.cursor
         # A second press of the key that made the cursor must not confirm a hand that has not moved.
         is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_ALIGN_NS
@@ -219,9 +219,7 @@ class Wizard:
             ).format(close),
             (
                 hand,
-                Precondition(
-                    tr("Hand rotated by less than {:.0f}°").format(limit_deg), is_straight
-                ),
+                Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
             ),
             ButtonSpec(
                 Action.CONFIRM, tr("Confirm for the wearer"), is_placed(snapshot) and is_due

@@ -200,10 +200,7 @@ class FineTunePanel(QWidget):
 
     def _show(self) -> None:
         self._stream.flush()
-        shown = self._shown()
-        self._stream.preview(
-            self._history.present if shown is None else {**self._history.present, **shown}
-        )
+        self._stream.preview(self._drawn())
         self._refresh()
 
     def _shown(self) -> Shifts | None:
@@ -211,6 +208,10 @@ class FineTunePanel(QWidget):
         if self._show_solved.isChecked():
             return self._solved
         return _OFFLINE if self._show_offline.isChecked() else None
+
+    def _drawn(self) -> Shifts:
+        """Return the φ that the headset is to draw with: the one set, or shown for comparison."""
+        return {**self._history.present, **(self._shown() or {})}
 
     def _stop_showing(self) -> None:
         for action in (self._show_solved, self._show_offline):
@@ -223,7 +224,7 @@ class FineTunePanel(QWidget):
         is_editable, is_ready = self._is_editable(), not self._obstacle
         for eye, editor in self._editors.items():
             editor.setEnabled(is_editable)
-            editor.show_shift(self._history.present[eye])
+            editor.show_shift(self._drawn()[eye])
             editor.show_effect(self._effect(eye))
         self._undo.setEnabled(is_editable and self._history.can_undo)
         self._redo.setEnabled(is_editable and self._history.can_redo)
@@ -240,7 +241,7 @@ class FineTunePanel(QWidget):
         if self._rig is None:
             return None
         before_m = self._solved.get(eye, _OFFLINE[eye])
-        after_m, depth_m = self._history.present[eye], self._depth.currentData()
+        after_m, depth_m = self._drawn()[eye], self._depth.currentData()
         return effect_at(self._rig.eyes[eye], before_m, after_m, depth_m)
 
     def _show_status(self, icon_name: str, text: str) -> None:
