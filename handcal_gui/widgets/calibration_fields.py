@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QWidget
+from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.hand.settings import Roi
 from handcal.station.procedure import CalibrationSettings
 from handcal.types import Method
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, number
 
@@ -112,6 +112,13 @@ class CalibrationFields(QWidget):
     def add_row(self, label: str, field: QWidget) -> None:
         """Add a field below."""
         self._form.addRow(label, field)
+
+    def add_heading(self, text: str) -> None:
+        """Add a heading below, for the fields added next."""
+        heading = QLabel(text)
+        scale_font(heading, 1.0, is_bold=True)
+        heading.setContentsMargins(0, SPACING_PX, 0, 0)
+        self._form.addRow(heading)
 
     def _push_far(self, near_m: float) -> None:
         """Keep the far limit beyond the near one."""

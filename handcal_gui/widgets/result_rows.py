@@ -71,9 +71,10 @@ def _phi(index: int, direction: str) -> Quantity:
     return Quantity(
         tr("φ{} (mm)").format(index + 1),
         "",
-        tr("Distance of the eye {} the rig's viewpoint,\n± one standard deviation (σ)").format(
-            direction
-        ),
+        tr(
+            "Distance of the eye {} the rig's viewpoint,\n± one standard deviation (σ). Both eyes "
+            "are solved together:\nan alignment of one may change the other, too."
+        ).format(direction),
         lambda shift, _: 1e3 * float(shift.shift_m[index]),
         2,
         lambda shift: 1e3 * float(shift.covariance_m2[index, index]) ** 0.5,

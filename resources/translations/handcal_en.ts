@@ -547,6 +547,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Told to other programs, from the next calibration on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Program</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>One file to send with a bug report: the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced. It holds nothing of any session, and frames of the camera only if you add a recording here.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3079,7 +3087,8 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Distance of the eye {} the rig&apos;s viewpoint,
-± one standard deviation (σ)</source>
+± one standard deviation (σ). Both eyes are solved together:
+an alignment of one may change the other, too.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
