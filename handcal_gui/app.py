@@ -10,15 +10,19 @@ import os
 import re
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QCoreApplication, QLocale, QSize, Qt, QTranslator
 from PySide6.QtWidgets import QApplication, QLabel, QMessageBox
 
+from handcal.errors import FileError
 from handcal.io.configuration import keep_font_list_in_configuration
+from handcal.io.resources import resource_path
 from handcal.io.x_display import x_server_answers
 from handcal_gui import FIRST_SIZE_PX
+from handcal_gui.translation import tr, use_translator
 
 _EXPOSED_S = 0.3
 """Longest wait for the first window to be on the screen."""
@@ -34,6 +38,7 @@ def main() -> NoReturn:
     app.setApplicationName("handcal")
     app.setDesktopFileName("handcal")
     app.setStyle("Fusion")
+    translate_texts(app)
     first = first_window(arguments.size)
     from handcal_gui.launch import LaunchError, launch
 
@@ -49,10 +54,26 @@ def keep_window_quick() -> None:
     sys.setswitchinterval(0.0005)
 
 
+def translate_texts(app: QApplication) -> None:
+    """Translate texts to the user's language, if there is a translation (docs/translating.md)."""
+    with suppress(FileError):
+        translator = translation_for(QLocale(), resource_path("translations"))
+        if translator is not None:
+            translator.setParent(app)
+            app.installTranslator(translator)
+            use_translator(lambda text: QCoreApplication.translate("", text))
+
+
+def translation_for(locale: QLocale, folder: Path) -> QTranslator | None:
+    """Return the compiled translation of a folder for a locale; None if there is none."""
+    translator = QTranslator()
+    return translator if translator.load(locale, "handcal", "_", str(folder)) else None
+
+
 def first_window(size: QSize | None) -> QLabel:
     """Show a message that the program is starting, where the main window will appear."""
-    window = QLabel("Starting handcal…", alignment=Qt.AlignmentFlag.AlignCenter)
-    window.setWindowTitle("Starting…")
+    window = QLabel(tr("Starting handcal…"), alignment=Qt.AlignmentFlag.AlignCenter)
+    window.setWindowTitle(tr("Starting…"))
     screen = QApplication.primaryScreen().availableSize()
     window.resize(size or screen.boundedTo(QSize(*FIRST_SIZE_PX)))
     window.show()

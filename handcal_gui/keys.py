@@ -8,15 +8,19 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
-_WINDOW = "Window"
+from handcal_gui.translation import tr
+
+_WINDOW = tr("Window")
 _NOT_ACTIONS = {
     _WINDOW: (
-        ("Return", "Press the button, or open the list, that has the focus"),
-        ("Alt+underlined letter", "Press a button at the lower left"),
-        ("Esc", "Close the message at the top"),
-        ("Tab", "Move to the next button or field"),
+        ("Return", tr("Press the button, or open the list, that has the focus")),
+        ("Alt+underlined letter", tr("Press a button at the lower left")),
+        ("Esc", tr("Close the message at the top")),
+        ("Tab", tr("Move to the next button or field")),
     ),
-    "Fine-tune": (("Arrows, PgUp, PgDown", "Move what the chosen eye sees, as the key points"),),
+    tr("Fine-tune"): (
+        (tr("Arrows, PgUp, PgDown"), tr("Move what the chosen eye sees, as the key points")),
+    ),
 }
 """Keys that widgets handle themselves, as their meaning depends on the focus."""
 

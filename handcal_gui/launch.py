@@ -23,6 +23,7 @@ from handcal.station.settings import StationSettings
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.translation import tr
 from handcal_gui.widgets.placement import show_on_screen
 
 _LOG_BYTES = 2**20
@@ -136,6 +137,8 @@ def _report_error(
     """Log and show an unexpected error; captured data is already on the disk."""
     logging.getLogger(__name__).error("unexpected error", exc_info=(kind, error, trace))
     program.window.banner.show_message(
-        f"handcal hit an unexpected error ({kind.__name__}: {error}). Everything captured is "
-        "saved; restart the program if it no longer works."
+        tr(
+            "handcal hit an unexpected error ({}: {}). Everything captured is saved; restart the "
+            "program if it no longer works."
+        ).format(kind.__name__, error)
     )

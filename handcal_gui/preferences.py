@@ -11,6 +11,7 @@ from typing import Any, Literal, Self, TypeAlias, get_type_hints
 
 from PySide6.QtCore import QStandardPaths
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
@@ -20,6 +21,7 @@ from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.translation import tr
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 PREFERENCES_VERSION = 2
@@ -50,6 +52,8 @@ class Preferences:
     """Folder of the last export; empty before the first."""
     fine_tune_step_m: float = 5e-4
     evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
+    bridges: BridgeSettings = field(default_factory=BridgeSettings)
+    """Bridges to other programs that every calibration runs."""
     theme: Theme = "system"
     arrangement: Literal["panels", "station"] = "panels"
     """Panels around the guide, or the guide alone."""
@@ -109,8 +113,10 @@ class PreferencesFile:
             with suppress(OSError):
                 self.path.replace(bad)
             return Preferences(), (
-                "The preferences could not be read and were reset; "
-                f"the old file was kept as {bad}: {error}"
+                tr(
+                    "The preferences could not be read and were reset; the old file was kept as "
+                    "{}: {}"
+                ).format(bad, error)
             )
 
     def save(self, preferences: Preferences) -> None:
@@ -123,10 +129,10 @@ class PreferencesFile:
         kept = self.path.with_name(f"{self.path.name}.newer")
         with suppress(OSError):
             shutil.copyfile(self.path, kept)
-        return (
-            "The preferences are of a newer version of handcal. Settings that this one does not "
-            f"know are left out; they are kept in {kept}."
-        )
+        return tr(
+            "The preferences are of a newer version of handcal. Settings that this one "
+            "does not know are left out; they are kept in {}."
+        ).format(kept)
 
     def pairings(self) -> Pairings:
         """Return the paired headsets, with a key for the next one.

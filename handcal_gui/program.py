@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings, export_session
@@ -49,14 +50,15 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
+from handcal_gui.translation import tr
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow, Page, Panels
-from handcal_gui.windows.evaluation.specs import make_specs
-from handcal_gui.windows.evaluation.window import EvaluationWindow
-from handcal_gui.windows.library.window import LibraryWindow
 from handcal_gui.windows.manual import Manual
-from handcal_gui.windows.rig.project_folder import ProjectFolder
-from handcal_gui.windows.rig.wizard import RigWizard
+
+if TYPE_CHECKING:  # imported when they open: they take longer than all the rest
+    from handcal_gui.windows.evaluation.window import EvaluationWindow
+    from handcal_gui.windows.library.window import LibraryWindow
+    from handcal_gui.windows.rig.wizard import RigWizard
 
 
 class Program(QObject):
@@ -77,7 +79,11 @@ class Program(QObject):
     inspection : Inspection
     start : StartPage
     manual : Manual
+    ending : Signal()
+        The program is about to end; dialogs end their work.
     """
+
+    ending = Signal()
 
     def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
         super().__init__()
@@ -175,7 +181,7 @@ class Program(QObject):
         """
         record = self._record()
         if record is None or not record.alignments:
-            self.window.banner.show_message("There is no alignment to export yet.")
+            self.window.banner.show_message(tr("There is no alignment to export yet."))
             return None
         folder = folder or Path(self._preferences.export_folder or record.path.parent)
         return self._open_export(record, folder, self.window, export_session, "")
@@ -183,14 +189,14 @@ class Program(QObject):
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
         """Show the sessions of a folder, by default of the session folder."""
         folder = folder or Path(self.start.new.settings.sessions)
+        from handcal_gui.windows.library.window import LibraryWindow
+
         window = LibraryWindow(folder, self.window)
-        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.open_requested.connect(self.open_session)
         window.resume_requested.connect(self.resume_session)
         window.export_requested.connect(lambda paths: self.export_many(paths, window))
         window.finished.connect(self.start.look_for_sessions)
-        window.open()
-        keep_on_screen(window)
+        self._open(window, window.stop)
         return window
 
     def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog | None:
@@ -207,25 +213,32 @@ class Program(QObject):
             return export_sessions(paths, target, settings, progress)
 
         folder = Path(self._preferences.export_folder or paths[0].parent)
-        return self._open_export(first, folder, parent, export, f"{len(paths)} sessions")
+        return self._open_export(
+            first, folder, parent, export, tr("{} sessions").format(len(paths))
+        )
 
     def _open_export(
         self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
     ) -> ExportDialog:
         dialog = ExportDialog(record, self._preferences.export, folder, parent, export, name)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.remembered.connect(self._remember_export)
+        self._open(dialog, dialog.stop)
+        return dialog
+
+    def _open(self, dialog: QDialog, stop: Callable[[], object]) -> None:
+        """Show a dialog, which `stop` ends before the program does."""
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.ending.connect(stop)
         dialog.open()
         keep_on_screen(dialog)
-        return dialog
 
     def inspect(self) -> None:
         """Show the alignments of the session shown in a 3D window."""
         record = self._record()
         if record is None or not record.alignments:
-            self.window.banner.show_message("There is no alignment to inspect yet.")
+            self.window.banner.show_message(tr("There is no alignment to inspect yet."))
             return
-        self.window.banner.show_message("The 3D window opens in a few seconds.")
+        self.window.banner.show_message(tr("The 3D window opens in a few seconds."))
         self.inspection.start(record)
 
     def connect_headset(self) -> ConnectDialog | None:
@@ -239,28 +252,30 @@ class Program(QObject):
             self.window.banner.show_message(str(error))
             return None
         dialog = ConnectDialog(server, rig, is_calibrating=link is not None, parent=self.window)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(self.start.new.check)
-        dialog.open()
-        keep_on_screen(dialog)
+        self._open(dialog, dialog.stop)
         return dialog
 
     def calibrate_rig(self) -> RigWizard | None:
         """Open the wizard of the offline calibration; return None if its folder cannot be used."""
+        from handcal_gui.windows.rig.project_folder import ProjectFolder
+        from handcal_gui.windows.rig.wizard import RigWizard
+
         try:
             folder = ProjectFolder(self._file.path.parent / "rig")
         except FileError as error:
             self.window.banner.show_message(str(error))
             return None
         wizard = RigWizard(folder, self.window, self.start.new.settings.realsense)
-        wizard.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         wizard.rig_saved.connect(self._use_rig)
-        wizard.open()
-        keep_on_screen(wizard)
+        self._open(wizard, wizard.accept)
         return wizard
 
     def evaluate(self) -> EvaluationWindow:
         """Show the evaluation window; there is at most one."""
+        from handcal_gui.windows.evaluation.specs import make_specs
+        from handcal_gui.windows.evaluation.window import EvaluationWindow
+
         opened = [one for one in self.window.findChildren(EvaluationWindow) if one.isVisible()]
         if opened:
             opened[0].raise_()
@@ -273,6 +288,7 @@ class Program(QObject):
         window = EvaluationWindow(make_specs(), entries, self.window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(self._remember_evaluation)
+        self.ending.connect(window.stop)
         window.show()
         keep_on_screen(window)
         return window
@@ -289,18 +305,7 @@ class Program(QObject):
                 fine_tune_step_m=self.window.panels.fine_tune.step_m,
             )
         )
-        for dialog in self.window.findChildren(ExportDialog):
-            dialog.stop()
-        for support in self.window.findChildren(SupportDialog):
-            support.stop()
-        for library in self.window.findChildren(LibraryWindow):
-            library.stop()
-        for connecting in self.window.findChildren(ConnectDialog):
-            connecting.stop()
-        for wizard in self.window.findChildren(RigWizard):
-            wizard.accept()
-        for evaluation in self.window.findChildren(EvaluationWindow):
-            evaluation.stop()
+        self.ending.emit()
         self.inspection.close()
         self.live.stop()
         self.review.close()
@@ -348,26 +353,26 @@ class Program(QObject):
 
     def _make_menus(self) -> None:
         add = self.window.add_action
-        add("File", "&Next wearer", "Ctrl+N", self.show_start)
-        add("File", "&Open session…", "Ctrl+O", self._browse)
-        add("File", "&Sessions…", "Ctrl+L", self.show_library)
-        add("File", "&Export…", "Ctrl+E", self.export)
-        add("File", "&Inspect in 3D", "", self.inspect)
-        add("File", "Connect a &headset…", "", self.connect_headset)
-        add("File", "&Calibrate a rig…", "", self.calibrate_rig)
-        add("File", "E&valuate…", "", self.evaluate)
-        add("File", "&Preferences…", "Ctrl+,", self._edit_preferences)
-        add("File", "&Quit", "Ctrl+Q", self.window.close)
-        add("View", "&Reset layout", "", self.window.reset_layout)
-        add("Help", "&Guide", "Shift+F1", lambda: self._read("docs/guide.md"))
-        add("Help", "&Manual", "", lambda: self._read("docs/index.md"))
-        add("Help", "Headset &protocol", "", lambda: self._read("docs/protocol.md"))
-        add("Help", "&Examples in Python", "", lambda: self._show_folder("examples"))
-        add("Help", "&Unity package", "", lambda: self._show_folder("unity"))
-        add("Help", "&Support bundle…", "", self.make_support_bundle)
-        add("Help", "&Keys", "F1", self._show_keys)
-        add("Help", "&Licences", "", lambda: self._read("THIRD-PARTY.md"))
-        add("Help", "&About handcal", "", self._show_about)
+        add("File", tr("&Next wearer"), "Ctrl+N", self.show_start)
+        add("File", tr("&Open session…"), "Ctrl+O", self._browse)
+        add("File", tr("&Sessions…"), "Ctrl+L", self.show_library)
+        add("File", tr("&Export…"), "Ctrl+E", self.export)
+        add("File", tr("&Inspect in 3D"), "", self.inspect)
+        add("File", tr("Connect a &headset…"), "", self.connect_headset)
+        add("File", tr("&Calibrate a rig…"), "", self.calibrate_rig)
+        add("File", tr("E&valuate…"), "", self.evaluate)
+        add("File", tr("&Preferences…"), "Ctrl+,", self._edit_preferences)
+        add("File", tr("&Quit"), "Ctrl+Q", self.window.close)
+        add("View", tr("&Reset layout"), "", self.window.reset_layout)
+        add("Help", tr("&Guide"), "Shift+F1", lambda: self._read("docs/guide.md"))
+        add("Help", tr("&Manual"), "", lambda: self._read("docs/index.md"))
+        add("Help", tr("Headset &protocol"), "", lambda: self._read("docs/protocol.md"))
+        add("Help", tr("&Examples in Python"), "", lambda: self._show_folder("examples"))
+        add("Help", tr("&Unity package"), "", lambda: self._show_folder("unity"))
+        add("Help", tr("&Support bundle…"), "", self.make_support_bundle)
+        add("Help", tr("&Keys"), "F1", self._show_keys)
+        add("Help", tr("&Licences"), "", lambda: self._read("THIRD-PARTY.md"))
+        add("Help", tr("&About handcal"), "", self._show_about)
 
     def _restore(self) -> None:
         preferences = self._preferences
@@ -393,13 +398,14 @@ class Program(QObject):
         verdict = self._preferences.station.calibration.solve.verdict
         self.wizard_panel.picture.result.set_target(verdict.target_arcmin)
         is_held = not self._preferences.runs_itself
-        self.live.start(open_station, self._preferences.plan, is_held=is_held)
+        chosen = self._preferences
+        self.live.start(open_station, chosen.plan, bridges=chosen.bridges, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
 
     def _browse(self) -> None:
         folder = QFileDialog.getExistingDirectory(
-            self.window, "Open a session's folder", self._preferences.station.sessions
+            self.window, tr("Open a session's folder"), self._preferences.station.sessions
         )
         if folder:
             self.open_session(Path(folder))
@@ -430,8 +436,11 @@ class Program(QObject):
         self._pairings = self._file.renew_pairing_key()
         self.start.set_pairing_key(self._pairings.open_key())
         self.window.banner.show_message(
-            "New pairing key created. Enter it in the headset; all others are disconnected, and "
-            "the key is used from the next calibration on."
+            tr(
+                "New pairing key created. Enter it in the headset; all others are "
+                "disconnected, and "
+                "the key is used from the next calibration on."
+            )
         )
 
     def make_support_bundle(self) -> SupportDialog:
@@ -440,9 +449,7 @@ class Program(QObject):
         folder = self._file.path.parent
         settings = SupportSettings(folder, (sessions,))
         dialog = SupportDialog(settings, Path.home(), self.window)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.open()
-        keep_on_screen(dialog)
+        self._open(dialog, dialog.stop)
         return dialog
 
     def _edit_preferences(self) -> None:
@@ -470,10 +477,12 @@ class Program(QObject):
             if self._remembers:
                 self._file.save(preferences)
         except FileError as error:
-            self.window.banner.show_message(f"The preferences could not be saved: {error}")
+            self.window.banner.show_message(
+                tr("The preferences could not be saved: {}").format(error)
+            )
 
     def _show_keys(self) -> None:
-        QMessageBox.information(self.window, "Keys", keys_html(self.window))
+        QMessageBox.information(self.window, tr("Keys"), keys_html(self.window))
 
     def _read(self, page: str) -> None:
         try:
@@ -488,13 +497,17 @@ class Program(QObject):
             self.window.banner.show_message(str(error))
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.window.banner.show_message(f"No file manager was found; the folder is {folder}")
+            self.window.banner.show_message(
+                tr("No file manager was found; the folder is {}").format(folder)
+            )
 
     def _show_about(self) -> None:
         QMessageBox.about(
             self.window,
-            "About handcal",
-            f"<b>handcal {version('handcal')}</b><p>Calibrates an optical see-through headset with "
-            "the wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR 2021."
-            "<p>Apache-2.0",
+            tr("About handcal"),
+            tr(
+                "<b>handcal {}</b><p>Calibrates an optical see-through headset with the "
+                "wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR "
+                "2021.<p>Apache-2.0"
+            ).format(version("handcal")),
         )

@@ -45,6 +45,7 @@ from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.layouts import scrollable, vbox
 
@@ -52,7 +53,7 @@ Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
 _CHILDREN_ONLY = Qt.FindChildOption.FindDirectChildrenOnly
-_NARROWEST_PX, _WIDEST_PX = 360, 560
+_NARROWEST_PX, _WIDEST_PX = 360, 720
 """Limits of the initial width of a column of docks."""
 _SMALL_PX = 1200, 690
 """Width and height below which all docks of a window are tabs."""
@@ -61,16 +62,17 @@ _LEFT, _RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDoc
 
 
 _TITLES = {
-    "camera": "Camera",
-    "cloud": "Hand cloud",
-    "wearer_view": "Wearer's view",
-    "rotation": "Rotation",
-    "results": "Results",
-    "fine_tune": "Fine-tune",
-    "trials": "Trials",
-    "session": "Session",
-    "link": "Link",
+    "camera": tr("Camera"),
+    "cloud": tr("Hand cloud"),
+    "wearer_view": tr("Wearer's view"),
+    "rotation": tr("Rotation"),
+    "results": tr("Results"),
+    "fine_tune": tr("Fine-tune"),
+    "trials": tr("Trials"),
+    "session": tr("Session"),
+    "link": tr("Link"),
 }
+_MENUS = {"File": tr("&File"), "View": tr("&View"), "Help": tr("&Help")}
 _TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
 """Icons of a dock's buttons, by the names that Qt gives the buttons."""
 _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
@@ -351,7 +353,8 @@ class MainWindow(QMainWindow):
         )
         if self._page == "review":  # the page itself needs little space
             page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
-            left = right = (width - page) // 2
+            left = (width - page) * 45 // 100
+            right = width - page - left
         self.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
         column = [docks[name] for name in _LEFT_COLUMN]
         self.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
@@ -381,14 +384,14 @@ class MainWindow(QMainWindow):
         self._draw_title_buttons()  # Qt recreates them with the titles
 
     def _make_menus(self) -> None:
-        self._menus = {
-            name: self.menuBar().addMenu(f"&{name}") for name in ("File", "View", "Help")
-        }
+        self._menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}
         view = self._menus["View"]
-        go_to = view.addMenu("&Go to")
+        go_to = view.addMenu(tr("&Go to"))
         for number, (name, title) in enumerate(_TITLES.items(), 1):
             go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
-        self._station = view.addAction("&Station: the guide alone", QKeySequence("F11"), self._swap)
+        self._station = view.addAction(
+            tr("&Station: the guide alone"), QKeySequence("F11"), self._swap
+        )
         self._station.setCheckable(True)
         self._dock_actions_start = view.addSeparator()
         for dock in self._docks.values():

@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
@@ -17,7 +15,7 @@ from handcal.errors import LinkError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
-    from handcal.bridge.bridge import Bridge
+    from handcal.bridge.bridges import BridgeSettings
     from handcal.link.pairing import Pairings
 
 LISTEN = (
@@ -106,6 +104,7 @@ _SHARE = number(float, 0.0, 1.0)
 )
 def run(arguments: argparse.Namespace) -> None:
     """Calibrate one wearer without a window, for scripts and for testing headset apps."""
+    from handcal.bridge.bridges import open_bridges
     from handcal.station.run import RunSettings, run_calibration
     from handcal.station.settings import StationSettings
 
@@ -134,7 +133,7 @@ def run(arguments: argparse.Namespace) -> None:
     pairings = paired_headsets(arguments.keys) if arguments.headset == "network" else None
     with (
         until_interrupted() as is_stopped,
-        bridges(arguments) as watchers,
+        open_bridges(bridges_of(arguments), _tell) as watchers,
         show_progress(is_stopped) as progress,
     ):
         result = run_calibration(settings, progress, pairings, watchers)
@@ -155,26 +154,20 @@ def run(arguments: argparse.Namespace) -> None:
         sys.exit(_CONTRADICTED)
 
 
-@contextmanager
-def bridges(arguments: argparse.Namespace) -> Iterator[list[Bridge[Any]]]:
-    """Run the bridges that the arguments name."""
-    from handcal.bridge.bridge import Bridge
-    from handcal.bridge.lsl import LslOutput
-    from handcal.bridge.slicer import SlicerOutput
+def bridges_of(arguments: argparse.Namespace) -> BridgeSettings:
+    """Return the settings of the bridges that the arguments name."""
+    from handcal.bridge.bridges import BridgeSettings
 
-    def tell(line: str) -> None:
-        console.print(line, markup=False)
+    if arguments.slicer is None:
+        return BridgeSettings(lsl=arguments.lsl)
+    host, _, port = arguments.slicer.rpartition(":")
+    if not (host and port.isdecimal() and 0 < int(port) < 65536):
+        fail(f"--slicer: an address is HOST:PORT, not {arguments.slicer}", 2)
+    return BridgeSettings(host, int(port), arguments.lsl)
 
-    with ExitStack() as stack:
-        running: list[Bridge[Any]] = []
-        if arguments.slicer is not None:
-            host, _, port = arguments.slicer.rpartition(":")
-            if not (host and port.isdecimal() and 0 < int(port) < 65536):
-                fail(f"--slicer: an address is HOST:PORT, not {arguments.slicer}", 2)
-            running.append(stack.enter_context(Bridge(SlicerOutput(tell, host, int(port)), tell)))
-        if arguments.lsl:
-            running.append(stack.enter_context(Bridge(LslOutput(), tell)))
-        yield running
+
+def _tell(line: str) -> None:
+    console.print(line, markup=False)
 
 
 def paired_headsets(path: Path | None) -> Pairings:

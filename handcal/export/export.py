@@ -12,7 +12,7 @@ from handcal.export.clouds import write_clouds
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
-from handcal.export.tables import write_parameters, write_trials
+from handcal.export.tables import write_comparisons, write_parameters, write_trials
 from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity
 from handcal.progress import Progress
 from handcal.session.session import SessionRecord
@@ -108,6 +108,7 @@ def _write(
         case "csv":
             write_parameters(place / "parameters.csv", outcome)
             write_trials(place / "trials.csv", outcome)
+            write_comparisons(place / "comparisons.csv", outcome)
         case "yaml":
             write_calibration_yaml(place / "calibration.yaml", outcome)
         case "json":

@@ -24,7 +24,9 @@ FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
     {
         "report": FormatInfo("Report (PDF)", ("report.pdf",)),
         "html": FormatInfo("Report (HTML)", ("report.html", "figures/*.png", "figures/*.csv")),
-        "csv": FormatInfo("Parameters and trials (CSV)", ("parameters.csv", "trials.csv")),
+        "csv": FormatInfo(
+            "Parameters and trials (CSV)", ("parameters.csv", "trials.csv", "comparisons.csv")
+        ),
         "yaml": FormatInfo("Calibration (OpenCV YAML)", ("calibration.yaml",)),
         "json": FormatInfo(
             "Matrices for OpenCV, OpenGL, Unity, OpenXR (JSON)", ("calibration.json",)

@@ -24,6 +24,7 @@ from handcal.register.results import Results
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
+from handcal.session.comparison import Comparison, count_comparisons, read_comparisons
 from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise_trials
 from handcal.statistics import mean_interval
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
@@ -66,6 +67,9 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     if record.trials:
         yield _user_test(outcome)
         yield _trials(outcome)
+    comparisons = read_comparisons(record.events)
+    if comparisons:
+        yield _comparisons(comparisons)
     if record.notes.strip():
         yield Section("Notes", [record.notes])
     links = [event for event in record.events if event.name == "link"]
@@ -402,6 +406,26 @@ def _trials(outcome: SessionOutcome) -> Section:
         ],
     )
     return Section("Trials", [table])
+
+
+def _comparisons(comparisons: Sequence[Comparison]) -> Section:
+    counts = count_comparisons(comparisons)
+    table = Table(
+        [
+            Column("time, UTC"),
+            Column("shown first", "left"),
+            Column("answer", "left"),
+            Column("better", "left"),
+        ],
+        [[one.time[11:19], one.first, one.answer, one.better or "neither"] for one in comparisons],
+        "offline: without the calibration; applied: with it. The order was drawn by lot, and "
+        "neither wearer nor technician knew it.",
+    )
+    sentence = (
+        f"Better with the calibration: {counts.applied}; without it: {counts.offline}; neither: "
+        f"{counts.neither}. Two-sided sign test of this wearer's answers: p = {counts.p_value:.3f}."
+    )
+    return Section("Blinded comparison", [sentence, table])
 
 
 def _error_cells(errors: ErrorStatistics) -> list[str]:

@@ -1,8 +1,8 @@
-"""Parameters and trials as CSV, with units in the headers."""
+"""Parameters, trials and blinded comparisons as CSV, with units in the headers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.io.files import write_atomic
 from handcal.register.benefit import expected_error_arcmin
 from handcal.report.rows import rows_csv
+from handcal.session.comparison import Comparison, read_comparisons
 from handcal.session.trial import Trial
 from handcal.types import EYES, Eye, EyeShift, Float64
 
@@ -55,6 +56,15 @@ _TRIALS = (
     "truth_y_px",
     "error_px",
     "error_arcmin",
+)
+_COMPARISONS = (
+    *_WHOSE,
+    "comparison",
+    "time_utc",
+    "first",
+    "answer",
+    "better",
+    *(f"{eye}_phi{axis}_mm" for eye in EYES for axis in (1, 2, 3)),
 )
 
 
@@ -130,6 +140,29 @@ def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any
         "stop_reason": shift.stop_reason,
         "expected_error_arcmin": expected_error_arcmin(outcome.record.rig.eyes[eye], shift),
     }
+
+
+def write_comparisons(path: Path, outcome: SessionOutcome) -> None:
+    """Write the blinded comparisons, if there are any; FileError if they cannot be written."""
+    comparisons = read_comparisons(outcome.record.events)
+    if comparisons:
+        _write(path, _COMPARISONS, outcome, _comparison_rows(comparisons))
+
+
+def _comparison_rows(comparisons: Sequence[Comparison]) -> Iterator[dict[str, Any]]:
+    for number, one in enumerate(comparisons, 1):
+        yield {
+            "comparison": number,
+            "time_utc": one.time,
+            "first": one.first,
+            "answer": one.answer,
+            "better": one.better or "neither",
+            **{
+                name: value
+                for eye, shift_m in one.applied_shift_m.items()
+                for name, value in _triple(f"{eye}_phi{{}}_mm", 1e3 * shift_m).items()
+            },
+        }
 
 
 def corner_rows(trials: Mapping[int, Trial]) -> Iterator[dict[str, Any]]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
-from scipy.stats import qmc
 
 from handcal.display import (
     TARGET_DEPTHS_M,
@@ -113,6 +112,8 @@ def _samples(mean_m: Float64, covariance_m2: Float64) -> Float64:
 
 @cache
 def _standard_normal() -> Float64:
+    from scipy.stats import qmc  # takes half a second, and not every user of this module samples
+
     draw = qmc.MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0))
     half = draw.random(2**_SAMPLES_LOG2)
     samples = np.concatenate([half, -half])

@@ -31,6 +31,8 @@ class RigFinding:
     is_fine: bool = True
     expected: str = ""
     """Empty where anything is."""
+    is_known: bool = True
+    """False if the file does not tell it: neither fine nor doubtful."""
 
 
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
@@ -99,13 +101,11 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         "Depth camera",
         f"{camera.model or 'model not known'}, serial number {camera.serial_number or 'not known'}",
     )
-    headset = rig.headset
-    yield RigFinding(
-        "Headset",
-        f"{headset.name or headset.device_id}, {headset.runtime or 'runtime not known'}"
-        if headset
-        else "not told in this file",
-    )
+    if rig.headset is None:
+        yield _not_told("Headset")
+    else:
+        name, runtime = rig.headset.name or rig.headset.device_id, rig.headset.runtime
+        yield RigFinding("Headset", f"{name}, {runtime or 'runtime not known'}")
     yield depth_finding(rig.depth_check)
     yield display_finding(rig.display_check)
     for part in RIG_PARTS:
@@ -164,7 +164,7 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
     """Return the largest bias of depth where hands are held; it is fine if it is surely small."""
     what = "Depth check"
     if check is None:
-        return RigFinding(what, "not told in this file")
+        return _not_told(what)
     bias_m, sigma_m = np.transpose([check.bias_m(depth_m) for depth_m in _HAND_DEPTHS_M])
     worst = int(np.argmax(np.abs(bias_m) + 2.0 * sigma_m))
     return RigFinding(
@@ -180,7 +180,7 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
     """Return what the check of the displays has found."""
     what, expected = "Display check", "what is drawn moves as the projections say"
     if check is None:
-        return RigFinding(what, "not told in this file")
+        return _not_told(what)
     found = "; ".join(
         f"{' and '.join(eye for eye in check.problems if check.problems[eye] == text)}: {text}"
         for text in dict.fromkeys(check.problems.values())
@@ -191,10 +191,14 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
     return RigFinding(what, f"{found or f'{eyes} as sent'} ({by})", not found, expected)
 
 
+def _not_told(what: str) -> RigFinding:
+    return RigFinding(what, "not told in this file", is_known=False)
+
+
 def _origin_finding(rig: Rig, part: str) -> RigFinding:
     origin = next((origin for name, origin in rig.origins.items() if name == part), None)
     if origin is None:
-        return RigFinding(f"Calibration of {part}", "not told in this file")
+        return _not_told(f"Calibration of {part}")
     return RigFinding(
         f"Calibration of {part}",
         f"{origin.verdict}: {origin.reason} ({origin.method}, {origin.made})",

@@ -9,6 +9,7 @@ from pathlib import Path
 from handcal.camera.feed import CameraStatus
 from handcal.link.server import LinkStatistics
 from handcal.register.results import Results
+from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
 from handcal.station.hands import PlacedHand
 from handcal.station.plan import NextStep
@@ -75,7 +76,11 @@ class Snapshot:
     contradiction: str = ""
     """Evidence against the calibration or this frame, with advice; empty if there is none."""
     views: Mapping[Eye, EyeView] = field(default_factory=dict)
-    """The wearer's views, if requested by `Station.watch_views`."""
+    """The wearer's views, if requested by `Station.watch_views`; none during a comparison."""
+    comparing: Place | None = None
+    """The drawing shown in a blinded comparison; None while there is none."""
+    has_compared_both: bool = False
+    """True once both drawings of the comparison have been shown."""
 
     @property
     def session_path(self) -> Path:

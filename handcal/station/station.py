@@ -36,6 +36,7 @@ from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
 from handcal.sim.wearer import WearerSettings
+from handcal.station.comparing import Comparing
 from handcal.station.former import Former, read_former
 from handcal.station.hands import PlacedHand
 from handcal.station.lab_prior import run_learn_prior
@@ -72,6 +73,7 @@ class Station(Closable):
     calibration : Calibration
     session : Session
     plan : Plan
+    comparing : Comparing
     holds_plan : bool
         True to hold an automatic plan before its next step.
 
@@ -156,6 +158,7 @@ class Station(Closable):
             )
             self.plan = Plan(self.calibration, plan, checks_first=bool(facts.former or former))
             self._stack = stack.pop_all()
+        self.comparing = Comparing(self.session, self.show_offline)
         self._number = 0
         self._frame: Frame | None = None
         self._not_applied = self._not_stored = ""
@@ -232,7 +235,9 @@ class Station(Closable):
             self._not_applied = ""
         if self.calibration.state is not State.APPLIED:
             self.hide_target()
+            self.comparing.end()
             self.show_offline(False)
+        self.comparing.check(self.calibration.applied_shift_m)
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -249,7 +254,10 @@ class Station(Closable):
             contradiction=self._contradiction(observation),
             procedure=self._procedure(),
             record=self._record,
-            views=dict(self._views),
+            # A view of what the headset draws would tell which drawing is compared.
+            views={} if self.comparing.shown else dict(self._views),
+            comparing=self.comparing.shown,
+            has_compared_both=self.comparing.has_seen_both,
         )
         for watcher in self._watchers:
             watcher(snapshot)
@@ -354,6 +362,20 @@ class Station(Closable):
         self._link.send_target(Target(eye, corners_E_m - self.rig.eyes[eye].t_C0_V_m))
         self._target_E_m = {eye: corners_E_m}
 
+    def compare(self) -> None:
+        """Begin a blinded comparison of the offline calibration and the applied φ.
+
+        Raises
+        ------
+        ProcedureError
+            Unless the solved φ is applied, or if it is the offline one.
+        LinkError
+            If the link is closed.
+        """
+        if self.calibration.state is not State.APPLIED:
+            raise ProcedureError("solve and apply first")
+        self.comparing.begin(self.calibration.applied_shift_m)
+
     def hide_target(self) -> None:
         """Hide the target if it is shown."""
         if self._target_E_m:
@@ -432,7 +454,7 @@ class Station(Closable):
             outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
             self._link.send_live_hand(outline_W_m, False, is_outline=True)
         started_s = time.monotonic()
-        if self.watch_views and started_s >= self._next_view_s:
+        if self.watch_views and not self.comparing.shown and started_s >= self._next_view_s:
             eye: Eye = "left" if self._viewed == "right" else "right"
             self._views[eye] = self._see(eye, hand)
             self._viewed = eye

@@ -15,7 +15,7 @@ from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.panels.camera.panel import Mode
 from handcal_gui.program import Program
 
-_LOOK_MS = 600
+_LOOK_MS = 400
 """Time until a change is visible, on a busy computer, too."""
 _TURN_MS = 50
 _PATIENCE_MS = 20_000
@@ -82,6 +82,10 @@ class Tour(QObject):
         yield _LOOK_MS
         self._save("panel-camera-both", window.panels.camera)
         window.panels.camera.set_mode(Mode.COLOR)
+        window.use_arrangement("station")
+        yield _LOOK_MS
+        self._save("station")
+        window.use_arrangement("panels")
 
     def export(self, dialog: ExportDialog) -> Walk:
         """Start the export and save its progress; the dialog emits the result."""
@@ -106,9 +110,32 @@ class Tour(QObject):
         yield _LOOK_MS
         self._save("preferences", preferences)
         preferences.close()
+        yield from self._dialogs()
         program.show_start()
         yield 2 * _LOOK_MS
         self._save("start-next-wearer")
+
+    def _dialogs(self) -> Walk:
+        """Save the dialogs and windows that the menus open."""
+        program = self._program
+        opened: dict[str, Callable[[], QWidget | None]] = {
+            "sessions": program.show_library,
+            "connect": program.connect_headset,
+            "rig": program.calibrate_rig,
+            "evaluate": program.evaluate,
+            "support": program.make_support_bundle,
+        }
+        for name, open_dialog in opened.items():
+            dialog = open_dialog()
+            yield _LOOK_MS
+            if dialog is not None:  # without a network, no headset can be connected
+                self._save(name, dialog)
+                dialog.close()
+        program.manual.open("docs/guide.md")
+        program.manual.search.setText("target")
+        yield _LOOK_MS
+        self._save("manual", program.manual)
+        program.manual.close()
 
     def _fine_tune(self) -> Walk:
         """Change φ, record trials with it, and reset it."""

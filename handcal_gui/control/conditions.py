@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from handcal.camera.feed import CameraStatus
 from handcal.station.snapshot import Snapshot
+from handcal_gui.translation import tr
 
 _LASTS_S = 0.8
 """Time for which a problem lasts before it is shown."""
@@ -18,16 +20,23 @@ _SLOW_S = 3.0
 class Conditions:
     """Watches the snapshots of one calibration.
 
+    Parameters
+    ----------
+    is_usb : bool
+        True if the camera is connected by USB, which may be too slow.
+
     Attributes
     ----------
     is_slow : bool
         True if too few frames a second are processed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_usb: bool = False) -> None:
         self.is_slow = False
+        self._is_usb = is_usb
         self._slow_text = ""
         self._rate_since_s: float | None = None
+        self._dropped = 0
         self._problem, self._problem_since_s = "", 0.0
         self._hand_problem, self._hand_since_s = "", 0.0
         self._has_started = False
@@ -43,7 +52,7 @@ class Conditions:
         now_s = 1e-9 * snapshot.t_host_ns
         camera, link = snapshot.camera, snapshot.link
         self._has_started |= camera.rate_hz > 0 and link.pose_rate_hz > 0
-        self._watch_rate(camera.rate_hz, now_s)
+        self._watch_rate(camera, now_s)
         found = (
             snapshot.problem
             or camera.problem
@@ -70,18 +79,25 @@ class Conditions:
             return snapshot
         return replace(snapshot, observation=replace(seen, problem=""))
 
-    def _watch_rate(self, rate_hz: float, now_s: float) -> None:
+    def _watch_rate(self, camera: CameraStatus, now_s: float) -> None:
         """Note that frames are few, or many again, once this has lasted."""
+        rate_hz = camera.rate_hz
         changes = rate_hz >= _FAST_HZ if self.is_slow else 0.0 < rate_hz < _SLOW_HZ
         if not self._has_started or not changes:
             self._rate_since_s = None
         elif self._rate_since_s is None:
-            self._rate_since_s = now_s
+            self._rate_since_s, self._dropped = now_s, camera.dropped
         elif now_s - self._rate_since_s >= _SLOW_S:
             self.is_slow, self._rate_since_s = not self.is_slow, None
+            # Frames that the camera counted, but nobody took, are lost in this computer.
+            is_camera = self._is_usb and camera.dropped == self._dropped
+            advice = (
+                tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
+            )
             self._slow_text = (
-                f"frames per second: only {rate_hz:.0f} of the {_SLOW_HZ:.0f} that are needed; "
-                "close other programs, and plug the camera into a USB 3 port"
+                tr("frames per second: only {:.0f} of the {:.0f} that are needed; {}").format(
+                    rate_hz, _SLOW_HZ, advice
+                )
                 if self.is_slow
                 else ""
             )

@@ -10,6 +10,7 @@ from typing import Literal
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
@@ -25,6 +26,7 @@ from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
+from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow, Panel
 
 _POLL_MS = 4
@@ -39,7 +41,8 @@ _PANELS_OF_STEPS = {
 """The panel to show when a step begins."""
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
-_RECORD = "record the trial"
+_RECORD = tr("record the trial")
+_NO_BRIDGES = BridgeSettings()
 
 
 class CalibrationController(QObject):
@@ -108,7 +111,12 @@ class CalibrationController(QObject):
         return self._link
 
     def start(
-        self, open_station: Callable[[], Station], plan: EyePlan, *, is_held: bool = True
+        self,
+        open_station: Callable[[], Station],
+        plan: EyePlan,
+        *,
+        bridges: BridgeSettings = _NO_BRIDGES,
+        is_held: bool = True,
     ) -> None:
         """End the present calibration and open a station; if held, no step runs by itself."""
         self.stop()
@@ -117,7 +125,8 @@ class CalibrationController(QObject):
         self._doing = self._shown = 0
         self._conditions = Conditions()
         self._wizard_panel.start(Wizard(plan), is_held=is_held)
-        self._engine = EngineThread(lambda: _held(open_station()), self)
+        self._engine = EngineThread(lambda: _held(open_station()), self, bridges)
+        self._engine.told.connect(self._window.banner.show_message)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
         self._engine.failed.connect(self._on_command_failed)
@@ -198,12 +207,12 @@ class CalibrationController(QObject):
         if verifying is not None:
             eye = verifying.eye
             self._calibrate(
-                "move the outline", lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)
+                tr("move the outline"), lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)
             )
 
     def _go_back(self, to: Literal["offline", "former"]) -> None:
         """Have the headset draw with another φ."""
-        self._calibrate("go back", lambda calibration: calibration.go_back(to))
+        self._calibrate(tr("go back"), lambda calibration: calibration.go_back(to))
 
     def _connect(self) -> None:
         panels = self._window.panels
@@ -218,16 +227,16 @@ class CalibrationController(QObject):
         self._connect_fine_tuning()
         self._connect_session()
         panels.link.restart_headset_requested.connect(
-            lambda: self._submit("restart the headset", Station.restart_headset)
+            lambda: self._submit(tr("restart the headset"), Station.restart_headset)
         )
 
     def _connect_fine_tuning(self) -> None:
         fine_tune, trials = self._window.panels.fine_tune, self._window.panels.trials
         fine_tune.shift_changed.connect(
-            lambda shifts_m: self._calibrate("set φ", lambda c: c.set_shift(shifts_m))
+            lambda shifts_m: self._calibrate(tr("set φ"), lambda c: c.set_shift(shifts_m))
         )
         fine_tune.shift_settled.connect(
-            lambda: self._calibrate("record φ", Calibration.record_shift)
+            lambda: self._calibrate(tr("record φ"), Calibration.record_shift)
         )
         # A φ shown only for comparison is not the one that the trial is about.
         trials.trial_requested.connect(fine_tune.settle)
@@ -236,11 +245,22 @@ class CalibrationController(QObject):
         )
         trials.show_target_requested.connect(
             lambda eye, depth_m: self._submit(
-                "show the target", lambda s: s.show_target(eye, depth_m)
+                tr("show the target"), lambda s: s.show_target(eye, depth_m)
             )
         )
         trials.hide_target_requested.connect(
-            lambda: self._submit("hide the target", Station.hide_target)
+            lambda: self._submit(tr("hide the target"), Station.hide_target)
+        )
+        compare = "compare"
+        trials.compare_requested.connect(lambda: self._submit(compare, Station.compare))
+        trials.end_comparison_requested.connect(
+            lambda: self._submit(compare, lambda s: s.comparing.end())
+        )
+        trials.show_compared_requested.connect(
+            lambda place: self._submit(compare, lambda s: s.comparing.show(place))
+        )
+        trials.comparison_answered.connect(
+            lambda answer: self._submit(compare, lambda s: s.comparing.answer(answer))
         )
         trials.doubted.connect(partial(self._on_command_failed, _RECORD))
 
@@ -249,18 +269,18 @@ class CalibrationController(QObject):
         for panel in (session, trials):
             panel.delete_requested.connect(
                 lambda kind, number: self._submit(
-                    f"delete the {kind}", lambda s: s.delete(kind, number)
+                    tr("delete the {}").format(kind), lambda s: s.delete(kind, number)
                 )
             )
             panel.restore_requested.connect(
                 lambda kind, number: self._submit(
-                    f"restore the {kind}", lambda s: s.restore(kind, number)
+                    tr("restore the {}").format(kind), lambda s: s.restore(kind, number)
                 )
             )
         session.notes_changed.connect(self._save_notes)
         session.eye_distance_changed.connect(
             lambda typed: self._calibrate(
-                "set the eye distance", lambda c: c.set_eye_distance(typed)
+                tr("set the eye distance"), lambda c: c.set_eye_distance(typed)
             )
         )
 
@@ -328,6 +348,7 @@ class CalibrationController(QObject):
 
     def _on_opened(self, station: Station) -> None:
         self._link = station.link
+        self._conditions = Conditions(is_usb=station.settings.source == "realsense")
         plan = station.plan.settings
         if plan.name == "recommended":
             is_held = self._wizard_panel.wizard.is_held
@@ -355,7 +376,7 @@ class CalibrationController(QObject):
 
     def _on_command_failed(self, name: str, why: str) -> None:
         self._failed_command = name
-        self._window.banner.show_message(f"Could not {name}: {why}")
+        self._window.banner.show_message(tr("Could not {}: {}").format(name, why))
 
     def _save_notes(self, text: str) -> None:
         """Save notes in the engine's thread, or here if the engine has failed."""
@@ -363,7 +384,7 @@ class CalibrationController(QObject):
             with suppress(FileError), Session(self._snapshot.session_path) as session:
                 session.save_notes(text)
         else:
-            self._submit("save the notes", lambda station: station.session.save_notes(text))
+            self._submit(tr("save the notes"), lambda station: station.session.save_notes(text))
 
     def _on_ended(self, why: str) -> None:
         self._timer.stop()

@@ -15,6 +15,7 @@ from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal_gui.control.compare import Comparison
 from handcal_gui.engine.jobs import Job
 from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow
 
 _PATIENCE_MS = 500
@@ -70,7 +71,9 @@ class ReviewController(QObject):
         self._job = Job(work)
         self._job.succeeded.connect(self._show)
         self._job.failed.connect(self._fail)
-        self._job.cancelled.connect(lambda: self._fail(f"{path} was not opened: cancelled"))
+        self._job.cancelled.connect(
+            lambda: self._fail(tr("{} was not opened: cancelled").format(path))
+        )
         self._show_progress(self._job)
         self._job.start()
 
@@ -85,7 +88,7 @@ class ReviewController(QObject):
 
     def _show_progress(self, job: Job) -> None:
         """Show a dialog with the progress if opening takes long, with a Cancel button."""
-        progress = QProgressDialog("Reading the session…", "Cancel", 0, 0, self._window)
+        progress = QProgressDialog(tr("Reading the session…"), tr("Cancel"), 0, 0, self._window)
         progress.setObjectName("opening")
         progress.setMinimumDuration(_PATIENCE_MS)
         progress.canceled.connect(job.cancel)
@@ -105,8 +108,9 @@ class ReviewController(QObject):
         self._end_progress()
         self.record = record = stored.record
         panels = self._window.panels
-        note = "" if stored.results else "It contains no alignments yet."
-        self._page.show_session(record, stored.results, note)
+        note = "" if stored.results else tr("It contains no alignments yet.")
+        target_arcmin = stored.settings.verdict.target_arcmin
+        self._page.show_session(record, stored.results, target_arcmin, note)
         panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)

@@ -16,22 +16,23 @@ from PySide6.QtWidgets import (
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, fill_row, paragraph, whole_number, with_name
 from handcal_gui.widgets.layouts import vbox
 
-_AS_IT_IS = "Keep the camera's setting"
+_AS_IT_IS = tr("Keep the camera's setting")
 _PROFILES: dict[Profile, str] = {
-    "auto": "Largest available",
+    "auto": tr("Largest available"),
     "1280x720": "1280 × 720 px",
     "848x480": "848 × 480 px",
 }
 _PRESETS: dict[Preset | Literal[""], str] = {
     "": _AS_IT_IS,
-    "default": "Default",
-    "hand": "Hand",
-    "high_accuracy": "High accuracy",
-    "high_density": "High density",
-    "medium_density": "Medium density",
+    "default": tr("Default"),
+    "hand": tr("Hand"),
+    "high_accuracy": tr("High accuracy"),
+    "high_density": tr("High density"),
+    "medium_density": tr("Medium density"),
 }
 
 
@@ -47,39 +48,55 @@ class CameraSettingsDialog(QDialog):
     def __init__(self, settings: RealSenseSettings, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("cameraSettings")
-        self.setWindowTitle("Camera settings")
+        self.setWindowTitle(tr("Camera settings"))
         self._serial = settings.serial
         self._profile = choice(
-            "profile", "Image size", _PROFILES, "Size of both depth and colour images, at 30 Hz."
+            "profile",
+            tr("Image size"),
+            _PROFILES,
+            tr("Size of both depth and colour images, at 30 Hz."),
         )
         self._preset = choice(
             "preset",
-            "Depth preset",
+            tr("Depth preset"),
             _PRESETS,
-            "The RealSense SDK's visual preset; the settings below take precedence.",
+            tr("The RealSense SDK's visual preset; the settings below take precedence."),
         )
         self._exposure = _OwnNumber(
-            "Exposure",
+            tr("Exposure"),
             _number(
-                "exposure", 1, 200_000, 500, " µs", "Of the depth image; a frame lasts 33,333 µs."
+                "exposure",
+                1,
+                200_000,
+                500,
+                " µs",
+                tr("Of the depth image; a frame lasts 33,333 µs."),
             ),
-            "Automatic",
+            tr("Automatic"),
             8_500,
         )
         self._laser = _OwnNumber(
-            "Laser power",
-            _number("laser", 0, 360, 30, " mW", "Power of the projector; 0 mW switches it off."),
+            tr("Laser power"),
+            _number(
+                "laser", 0, 360, 30, " mW", tr("Power of the projector; 0 mW switches it off.")
+            ),
             _AS_IT_IS,
             150,
         )
         self._whole = _filter(
             "wholeImage",
-            "For the whole image",
-            "Measures the exposure of colour on the whole image, not on the hand once found.",
+            tr("For the whole image"),
+            tr("Measures the exposure of colour on the whole image, not on the hand once found."),
         )
-        self._spatial = _filter("spatial", "Spatial", "Smooths each depth image, keeping edges.")
-        self._temporal = _filter("temporal", "Temporal", "Averages over the last depth images.")
-        self._holes = _filter("holes", "Hole filling", "Fills in depth where none was measured.")
+        self._spatial = _filter(
+            "spatial", tr("Spatial"), tr("Smooths each depth image, keeping edges.")
+        )
+        self._temporal = _filter(
+            "temporal", tr("Temporal"), tr("Averages over the last depth images.")
+        )
+        self._holes = _filter(
+            "holes", tr("Hole filling"), tr("Fills in depth where none was measured.")
+        )
         self._lay_out()
         self._show(settings)
 
@@ -112,19 +129,23 @@ class CameraSettingsDialog(QDialog):
         fill_row(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
         form = QFormLayout()
         form.setSpacing(SPACING_PX)
-        form.addRow("Image size", self._profile)
-        form.addRow("Depth preset", self._preset)
-        form.addRow("Exposure", self._exposure)
-        form.addRow("Exposure of colour", self._whole)
-        form.addRow("Laser power", self._laser)
-        form.addRow("Depth filters", filters)
-        form.addRow("", paragraph(text="Filters smooth and invent depth: calibrate without them."))
+        form.addRow(tr("Image size"), self._profile)
+        form.addRow(tr("Depth preset"), self._preset)
+        form.addRow(tr("Exposure"), self._exposure)
+        form.addRow(tr("Exposure of colour"), self._whole)
+        form.addRow(tr("Laser power"), self._laser)
+        form.addRow(tr("Depth filters"), filters)
+        form.addRow(
+            "", paragraph(text=tr("Filters smooth and invent depth: calibrate without them."))
+        )
         standard = QDialogButtonBox.StandardButton
         buttons = QDialogButtonBox(standard.Ok | standard.Cancel | standard.RestoreDefaults)
         for one in buttons.buttons():
             one.setIcon(QIcon())  # like all other buttons
-        restore = with_name(buttons.button(standard.RestoreDefaults), "restore", "Restore defaults")
-        restore.setText("Restore defaults")
+        restore = with_name(
+            buttons.button(standard.RestoreDefaults), "restore", tr("Restore defaults")
+        )
+        restore.setText(tr("Restore defaults"))
         restore.clicked.connect(lambda: self._show(RealSenseSettings()))
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
@@ -174,4 +195,4 @@ def _number(name: str, low: int, high: int, step: int, unit: str, help_text: str
 
 
 def _filter(name: str, text: str, help_text: str) -> QCheckBox:
-    return with_name(QCheckBox(text), name, f"{text} filter", help_text)
+    return with_name(QCheckBox(text), name, tr("{} filter").format(text), help_text)

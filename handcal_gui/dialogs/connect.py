@@ -22,6 +22,7 @@ from handcal.types import EYES, Eye, Rig
 from handcal_gui.dialogs.paired_devices import PairedDevices
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX, number_font, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -30,9 +31,9 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _PERIOD_MS = 250
 _DELIVERIES = {
-    Delivery.PENDING: "sent, not acknowledged yet",
-    Delivery.ACKED: "acknowledged by the headset",
-    Delivery.FAILED: "not acknowledged; try again",
+    Delivery.PENDING: tr("sent, not acknowledged yet"),
+    Delivery.ACKED: tr("acknowledged by the headset"),
+    Delivery.FAILED: tr("not acknowledged; try again"),
 }
 
 
@@ -61,7 +62,7 @@ class ConnectDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("connectDialog")
-        self.setWindowTitle("Connect a headset")
+        self.setWindowTitle(tr("Connect a headset"))
         self._server = server
         self._rig = rig
         self._is_calibrating = is_calibrating
@@ -71,17 +72,17 @@ class ConnectDialog(QDialog):
         self._invited_s = 0.0
         self._known: frozenset[str] = frozenset()
         self._qr = QrCode()
-        self._code = with_name(QLabel(), "digits", "Code to type in the headset")
+        self._code = with_name(QLabel(), "digits", tr("Code to type in the headset"))
         self._code.setFont(number_font())
         scale_font(self._code, 1.6, is_bold=True)
         self._how = paragraph("howToPair")
-        self._invite = button("invite", "New code", "Invite another headset")
+        self._invite = button("invite", tr("New code"), tr("Invite another headset"))
         self._state = FindingLine("headset")
         self._problem = paragraph("connectProblem")
         self._devices = PairedDevices(server.pairings)
         self._devices.failed.connect(self._problem.setText)
         self._squares = {eye: _Square(eye) for eye in EYES}
-        self._close = button("close", "Close")
+        self._close = button("close", tr("Close"))
         self._lay_out()
         self._invite.clicked.connect(self.invite)
         self._close.clicked.connect(self.accept)
@@ -92,7 +93,7 @@ class ConnectDialog(QDialog):
         self._timer.timeout.connect(self.refresh)
         self._timer.start()
         if server.connected:
-            self._end_invitation("A headset is connected. New code pairs another one.")
+            self._end_invitation(tr("A headset is connected. New code pairs another one."))
         else:
             self.invite()
         self.refresh()
@@ -110,8 +111,10 @@ class ConnectDialog(QDialog):
         self._qr.show()
         self._code.setText(f"{invitation.digits[:4]} {invitation.digits[4:]}")
         self._how.setText(
-            "Scan the code with the headset's app. Without a camera: choose this computer "
-            f"({invitation.host}, port {invitation.port}) in the app and type the digits."
+            tr(
+                "Scan the code with the headset's app. Without a camera: choose this "
+                "computer ({}, port {}) in the app and type the digits."
+            ).format(invitation.host, invitation.port)
         )
         self._announce(invitation)
 
@@ -121,9 +124,11 @@ class ConnectDialog(QDialog):
         problem = headset_problem(device, link, self._rig)
         if link.connected:
             health = Health.LIMITED if problem else Health.GOOD
-            finding = Finding("Headset", health, headset_state(device, link), problem)
+            finding = Finding(tr("Headset"), health, headset_state(device, link), problem)
         else:
-            finding = Finding("Headset", Health.LIMITED, "no headset is connected yet", problem)
+            finding = Finding(
+                tr("Headset"), Health.LIMITED, tr("no headset is connected yet"), problem
+            )
         self._state.show_finding(finding)
         self._devices.show_devices(device.device_id if device and link.connected else "")
         for square in self._squares.values():
@@ -153,9 +158,9 @@ class ConnectDialog(QDialog):
         if self._invitation is None:
             return
         if self._paired() - self._known:
-            self._end_invitation("Paired. The headset connects by itself from now on.")
+            self._end_invitation(tr("Paired. The headset connects by itself from now on."))
         elif time.monotonic() - self._invited_s > OFFER_S:
-            self._end_invitation("The code has expired. New code makes another one.")
+            self._end_invitation(tr("The code has expired. New code makes another one."))
 
     def _end_invitation(self, why: str) -> None:
         self._invitation = None
@@ -200,9 +205,9 @@ class ConnectDialog(QDialog):
             spacing=SPACING_PX,
         )
         right = vbox(
-            _heading("Headset"),
+            _heading(tr("Headset")),
             self._state,
-            _heading("Test square, 8 cm at 0.5 m"),
+            _heading(tr("Test square, 8 cm at 0.5 m")),
             *self._squares.values(),
             (self._devices, 1),
             self._problem,
@@ -221,10 +226,12 @@ class _Square(QWidget):
         self.sent: tuple[Outgoing, ...] = ()
         self._eye = eye
         name = EYE_NAMES[eye]
-        self.send = button(f"square-{eye}", f"Show to {name.lower()}")
+        self.send = button(f"square-{eye}", tr("Show to {}").format(name.lower()))
         self._state = paragraph(f"squareState-{eye}")
         self._seen = with_name(
-            QCheckBox("The wearer sees it"), f"squareSeen-{eye}", f"{name}: the wearer sees it"
+            QCheckBox(tr("The wearer sees it")),
+            f"squareSeen-{eye}",
+            tr("{}: the wearer sees it").format(name),
         )
         hbox(self.send, (self._state, 1), self._seen, on=self, margins=0, spacing=SPACING_PX)
         self.forget()

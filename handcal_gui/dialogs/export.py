@@ -15,6 +15,7 @@ from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.layouts import hbox, vbox
 
@@ -60,7 +61,7 @@ class ExportDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("exportDialog")
-        self.setWindowTitle(f"Export {name or record.wearer or record.path.name}")
+        self.setWindowTitle(tr("Export {}").format(name or record.wearer or record.path.name))
         self._record = record
         self._export_session = export
         self._job: Job | None = None
@@ -70,9 +71,9 @@ class ExportDialog(QDialog):
         self._pages = QStackedWidget()
         self._pages.addWidget(self._choices)
         self._pages.addWidget(self._progress)
-        self._back = button("back", "Back")
-        self._close = button("close", "Close")
-        self._export = button("export", "Export")
+        self._back = button("back", tr("Back"))
+        self._close = button("close", tr("Close"))
+        self._export = button("export", tr("Export"))
         self._export.setDefault(True)
         self._lay_out()
         self._choices.changed.connect(self._refresh)
@@ -157,7 +158,7 @@ class ExportDialog(QDialog):
         self._export.setEnabled(self._choices.is_complete)
         self._back.setVisible(not is_choosing)
         self._back.setEnabled(self._job is None)
-        self._close.setText("Close" if self._job is None else "Cancel")
+        self._close.setText(tr("Close") if self._job is None else tr("Cancel"))
         self._close.setEnabled(True)
 
     def _lay_out(self) -> None:

@@ -9,21 +9,28 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from handcal.export.export import ExportSettings
-from handcal.export.formats import FORMATS, Format
+from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import number, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
-    "report": "Verdict, eye shifts, figures and settings, to read and archive",
-    "html": "The report for a browser, and each figure with its data",
-    "csv": "One row for each eye, alignment and trial, for statistics",
-    "yaml": "Projection, K, H0 and φ of each eye, read by cv2.FileStorage",
-    "json": "The projections in the convention of each system",
-    "ply": "Cursor and hand of each alignment, with residuals",
-    "zip": "All recorded data, to archive or to open elsewhere",
+    "report": tr("Verdict, eye shifts, figures and settings, to read and archive"),
+    "html": tr("The report for a browser, and each figure with its data"),
+    "csv": tr("One row for each eye, alignment and trial, for statistics"),
+    "yaml": tr("Projection, K, H0 and φ of each eye, read by cv2.FileStorage"),
+    "json": tr("The projections in the convention of each system"),
+    "ply": tr("Cursor and hand of each alignment, with residuals"),
+    "zip": tr("All recorded data, to archive or to open elsewhere"),
+    "unity": tr("The final calibration for Unity's JsonUtility"),
+    "openxr": tr("The final calibration as views of OpenXR: poses and angles"),
+    "northstar": tr("The final calibration for Monado's North Star driver"),
+    "slicer": tr("The eyes as transforms and the clouds as models"),
 }
+_WITH_PLANES: tuple[Format, ...] = ("json", "unity")
+"""Formats with clipping distances."""
 
 
 class ExportChoices(QWidget):
@@ -50,13 +57,14 @@ class ExportChoices(QWidget):
         super().__init__(parent)
         self._settings, self._name = settings, name
         self._boxes = {
-            kind: with_name(QCheckBox(info.title), kind) for kind, info in FORMATS.items()
+            kind: with_name(QCheckBox(info.title), kind)
+            for kind, info in {**FORMATS, **TOOL_FORMATS}.items()
         }
-        self._near = number("near", 0.01, 1.0, 0.05, " m", "Anything nearer is not drawn.")
-        self._far = number("far", 1.5, 10_000.0, 10.0, " m", "Anything farther is not drawn.")
+        self._near = number("near", 0.01, 1.0, 0.05, " m", tr("Anything nearer is not drawn."))
+        self._far = number("far", 1.5, 10000.0, 10.0, " m", tr("Anything farther is not drawn."))
         self._near.setValue(settings.near_m)
         self._far.setValue(settings.far_m)
-        self._folder = PathField("Export folder", "folder")
+        self._folder = PathField(tr("Export folder"), "folder")
         self._folder.set_path(str(folder))
         self._lay_out()
         for kind, box in self._boxes.items():
@@ -95,7 +103,7 @@ class ExportChoices(QWidget):
 
     def _refresh(self) -> None:
         for field in (self._near, self._far):
-            field.setEnabled(self._boxes["json"].isChecked())
+            field.setEnabled(any(self._boxes[kind].isChecked() for kind in _WITH_PLANES))
         self.changed.emit()
 
     def _lay_out(self) -> None:
@@ -103,14 +111,17 @@ class ExportChoices(QWidget):
         formats.setHorizontalSpacing(2 * SPACING_PX)
         formats.setVerticalSpacing(SPACING_PX)
         formats.setColumnStretch(1, 1)
-        for row, (kind, box) in enumerate(self._boxes.items()):
+        for kind, box in self._boxes.items():
+            if kind == next(iter(TOOL_FORMATS)):
+                formats.addWidget(QLabel(tr("For one program each:")), formats.rowCount(), 0)
+            row = formats.rowCount()
             formats.addWidget(box, row, 0)
             formats.addWidget(QLabel(_PURPOSES[kind]), row, 1)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
-        form.addRow("Near plane (OpenGL, Unity)", self._near)
-        form.addRow("Far plane (OpenGL, Unity)", self._far)
-        form.addRow("Export to", self._folder)
-        form.addRow("", QLabel(f"The folder {self._name} is created there."))
+        form.addRow(tr("Near plane (OpenGL, Unity)"), self._near)
+        form.addRow(tr("Far plane (OpenGL, Unity)"), self._far)
+        form.addRow(tr("Export to"), self._folder)
+        form.addRow("", QLabel(tr("The folder {} is created there.").format(self._name)))
         vbox(formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)

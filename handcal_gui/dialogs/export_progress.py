@@ -11,12 +11,13 @@ from PySide6.QtWidgets import QLabel, QListWidget, QProgressBar, QVBoxLayout, QW
 
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.numbers import pluralize
 
 _WHOLE = 1000
-_UNCHANGED = "the session and earlier exports are unchanged"
+_UNCHANGED = tr("the session and earlier exports are unchanged")
 
 
 class ExportProgress(QWidget):
@@ -25,9 +26,9 @@ class ExportProgress(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._doing = with_name(QLabel(), "doing")
-        self._bar = with_name(QProgressBar(maximum=_WHOLE), "progress", "Progress")
+        self._bar = with_name(QProgressBar(maximum=_WHOLE), "progress", tr("Progress"))
         self._end = FindingLine("exportEnd")
-        self._files = with_name(QListWidget(), "files", "Files")
+        self._files = with_name(QListWidget(), "files", tr("Files"))
         self._files.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -42,7 +43,7 @@ class ExportProgress(QWidget):
         self._end.hide()
         self._files.clear()
         self._files.hide()
-        self.show_progress("Starting", 0.0)
+        self.show_progress(tr("Starting"), 0.0)
 
     def show_progress(self, doing: str, share: float) -> None:
         """Show the present activity and the share done, 0..1."""
@@ -51,29 +52,31 @@ class ExportProgress(QWidget):
 
     def show_files(self, folder: Path, files: Sequence[Path]) -> None:
         """Show the files written."""
-        self._doing.setText("Done.")
+        self._doing.setText(tr("Done."))
         self._bar.setValue(_WHOLE)
         self._files.addItems([str(path.relative_to(folder)) for path in files])
         self._files.show()
-        count = f"{pluralize(len(files), 'file')} in {folder}"
+        count = tr("{} in {}").format(pluralize(len(files), tr("file"), tr("files")), folder)
         url = QUrl.fromLocalFile(str(folder))
         self._end.show_finding(
-            Finding("", Health.GOOD, count), "Open folder", lambda: QDesktopServices.openUrl(url)
+            Finding("", Health.GOOD, count),
+            tr("Open folder"),
+            lambda: QDesktopServices.openUrl(url),
         )
         self._end.show()
 
     def show_failure(self, why: str) -> None:
         """Show the reason why nothing was exported."""
-        self._doing.setText("Nothing was exported.")
+        self._doing.setText(tr("Nothing was exported."))
         self._end.show_finding(Finding("", Health.BROKEN, why, _UNCHANGED))
         self._end.show()
 
     def show_cancelling(self) -> None:
         """Show that the export is being cancelled."""
-        self._doing.setText("Cancelling…")
+        self._doing.setText(tr("Cancelling…"))
 
     def show_cancelled(self) -> None:
         """Show that the export was cancelled."""
-        self._doing.setText("Nothing was exported.")
+        self._doing.setText(tr("Nothing was exported."))
         self._end.show_finding(Finding("", Health.LIMITED, "cancelled", _UNCHANGED))
         self._end.show()

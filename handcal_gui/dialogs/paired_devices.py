@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 from handcal.errors import HandcalError
 from handcal.link.pairing import Pairing, Pairings
 from handcal_gui.theme import SPACING_PX, flat_header, number_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 
@@ -45,8 +46,8 @@ class PairedDevices(QWidget):
         self._is_filling = False
         self._table = QTableWidget(0, 2)
         self._table.setObjectName("pairedDevices")
-        self._table.setAccessibleName("Paired headsets")
-        self._table.setHorizontalHeaderLabels(["Paired headset", "Device"])
+        self._table.setAccessibleName(tr("Paired headsets"))
+        self._table.setHorizontalHeaderLabels([tr("Paired headset"), tr("Device")])
         self._table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setTabKeyNavigation(False)
@@ -57,10 +58,13 @@ class PairedDevices(QWidget):
         flat_header(across)
         across.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
         across.setSectionResizeMode(_DEVICE, QHeaderView.ResizeMode.ResizeToContents)
-        self._empty = paragraph("noDevices", "No headset is paired yet.")
-        self._rename = button("renameDevice", "Rename", "Rename the chosen headset")
+        self._empty = paragraph("noDevices", tr("No headset is paired yet."))
+        self._rename = button("renameDevice", tr("Rename"), tr("Rename the chosen headset"))
         self._revoke = button(
-            "revokeDevice", "Revoke…", "Revoke the chosen headset", "It can then no longer connect"
+            "revokeDevice",
+            tr("Revoke…"),
+            tr("Revoke the chosen headset"),
+            tr("It can then no longer connect"),
         )
         self._table.itemChanged.connect(self._take_name)
         self._table.itemSelectionChanged.connect(self._refresh)
@@ -90,7 +94,7 @@ class PairedDevices(QWidget):
         self._is_filling = True
         self._table.setRowCount(len(devices))
         for row, one in enumerate(devices):
-            name = QTableWidgetItem(one.name or "Without a name")
+            name = QTableWidgetItem(one.name or tr("Without a name"))
             is_connected = one.device_id == connected_id
             device = QTableWidgetItem(f"{one.device_id}{', connected' if is_connected else ''}")
             device.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
@@ -126,11 +130,11 @@ class PairedDevices(QWidget):
         if one is None:
             return
         buttons = QMessageBox.StandardButton
-        question = (
-            f"Revoke {one.name or one.device_id}? Its session ends, and it connects again only "
-            "after it has been paired again."
-        )
-        if QMessageBox.question(self, "Revoke", question) == buttons.Yes:
+        question = tr(
+            "Revoke {}? Its session ends, and it connects again only after it has been "
+            "paired again."
+        ).format(one.name or one.device_id)
+        if QMessageBox.question(self, tr("Revoke"), question) == buttons.Yes:
             self._change(lambda: self._pairings.revoke(one.device_id))
 
     def _change(self, change: Callable[[], None]) -> None:

@@ -5,31 +5,48 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QLabel, QWidget
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import choice, number, with_name
+from handcal_gui.widgets.fields import choice, fill_row, number, whole_number, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {
-    "system": "Same as the system",
-    "light": "Light",
-    "dark": "Dark",
-    "contrast": "High contrast",
+    "system": tr("Same as the system"),
+    "light": tr("Light"),
+    "dark": tr("Dark"),
+    "contrast": tr("High contrast"),
 }
 
-_TARGET_HELP = "Largest expected error of a calibration that is accepted, in arcminutes."
-_LEARN_HELP = (
+_TARGET_HELP = tr("Largest expected error of a calibration that is accepted, in arcminutes.")
+_LEARN_HELP = tr(
     "Learn where wearers' eyes are from the finished sessions in this folder with the same rig,\n"
     "once there are enough."
+)
+_SLICER = {
+    "": tr("Off"),
+    "127.0.0.1": tr("For this computer"),
+    "0.0.0.0": tr("For other computers, too"),  # noqa: S104 (chosen by the user, who is warned)
+}
+"""Addresses on which OpenIGTLink is served."""
+_SLICER_HELP = tr(
+    "Serve OpenIGTLink during calibrations, for 3D Slicer and others. It has no password:\n"
+    "any computer that reaches the address can read."
+)
+_PORT_HELP = tr("TCP port of OpenIGTLink.")
+_LSL_HELP = tr(
+    "Send the events of calibrations to the Lab Streaming Layer, on which any computer of the\n"
+    "local network can read them."
 )
 
 
 class PreferencesDialog(QDialog):
-    """Theme, session folder, and the settings of future calibrations.
+    """Theme, session folder, bridges, and the settings of future calibrations.
 
     Parameters
     ----------
@@ -40,11 +57,11 @@ class PreferencesDialog(QDialog):
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("preferencesDialog")
-        self.setWindowTitle("Preferences")
+        self.setWindowTitle(tr("Preferences"))
         self._preferences = preferences
-        self._theme = choice("theme", "Theme", _THEMES)
+        self._theme = choice("theme", tr("Theme"), _THEMES)
         self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
-        self._sessions = PathField("Session folder", "folder")
+        self._sessions = PathField(tr("Session folder"), "folder")
         self._sessions.set_path(preferences.station.sessions)
         self._sessions.setMinimumWidth(45 * SPACING_PX)
         self._calibration = CalibrationFields()
@@ -52,13 +69,34 @@ class PreferencesDialog(QDialog):
         self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
         self._target.setValue(preferences.station.calibration.solve.verdict.target_arcmin)
         self._learn = with_name(
-            QCheckBox("Learn from earlier sessions"), "learnPrior", help_text=_LEARN_HELP
+            QCheckBox(tr("Learn from earlier sessions")), "learnPrior", help_text=_LEARN_HELP
         )
         self._learn.setChecked(preferences.station.learn_prior)
-        self._calibration.add_row("Target", self._target)
-        self._calibration.add_row("Prior", self._learn)
-        self._calibration.add_row("Theme", self._theme)
-        self._calibration.add_row("Session folder", self._sessions)
+        bridges = preferences.bridges
+        hosts = {**_SLICER}
+        hosts.setdefault(bridges.slicer_host, bridges.slicer_host)  # typed into the file
+        self._slicer = choice("slicer", "OpenIGTLink", hosts, _SLICER_HELP)
+        self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
+        self._port = whole_number("slicerPort", 1, 65535, _PORT_HELP)
+        self._port.setValue(bridges.slicer_port)
+        self._port.setEnabled(bool(bridges.slicer_host))
+        self._slicer.currentIndexChanged.connect(
+            lambda: self._port.setEnabled(bool(self._slicer.currentData()))
+        )
+        self._lsl = with_name(
+            QCheckBox(tr("Send events to the Lab Streaming Layer")), "lsl", help_text=_LSL_HELP
+        )
+        self._lsl.setChecked(bridges.lsl)
+        self._calibration.add_row(tr("Target"), self._target)
+        self._calibration.add_row(tr("Prior"), self._learn)
+        slicer = QWidget()
+        fill_row(slicer, self._slicer, QLabel(tr("port")), self._port, grows=self._port)
+        self._calibration.add_heading(tr("Told to other programs, from the next calibration on"))
+        self._calibration.add_row("OpenIGTLink", slicer)
+        self._calibration.add_row("LSL", self._lsl)
+        self._calibration.add_heading(tr("Program"))
+        self._calibration.add_row(tr("Theme"), self._theme)
+        self._calibration.add_row(tr("Session folder"), self._sessions)
         buttons = QDialogButtonBox(
             QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
         )
@@ -77,6 +115,9 @@ class PreferencesDialog(QDialog):
         return replace(
             self._preferences,
             theme=self._theme.currentData(),
+            bridges=BridgeSettings(
+                self._slicer.currentData(), self._port.value(), self._lsl.isChecked()
+            ),
             station=replace(
                 station,
                 sessions=self._sessions.path or station.sessions,

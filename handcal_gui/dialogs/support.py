@@ -13,11 +13,12 @@ from handcal.progress import Progress
 from handcal.station.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.path_field import PathField
 
-_ABOUT = (
+_ABOUT = tr(
     "One file to send with a bug report: the checks of the installation, package versions, and the "
     "log, in which wearers' names, your user name and the home folder are replaced. It holds "
     "nothing of any session, and frames of the camera only if you add a recording here."
@@ -40,24 +41,24 @@ class SupportDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("supportDialog")
-        self.setWindowTitle("Support bundle")
+        self.setWindowTitle(tr("Support bundle"))
         self._settings = settings
         self._job: Job | None = None
-        self._folder = PathField("Folder", "folder")
+        self._folder = PathField(tr("Folder"), "folder")
         self._folder.set_path(str(folder))
         self._folder.setMinimumWidth(45 * SPACING_PX)
-        self._frames = PathField("Recording to add", "either", empty="None")
+        self._frames = PathField(tr("Recording to add"), "either", empty=tr("None"))
         self._said = paragraph("supportSaid")
         self._said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._write = button("writeBundle", "Write")
+        self._write = button("writeBundle", tr("Write"))
         self._write.setDefault(True)
-        close = button("close", "Close")
+        close = button("close", tr("Close"))
         self._write.clicked.connect(self.write)
         close.clicked.connect(self.reject)
         self.finished.connect(self.stop)
         form = QFormLayout()
-        form.addRow("Folder", self._folder)
-        form.addRow("Recording to add", self._frames)
+        form.addRow(tr("Folder"), self._folder)
+        form.addRow(tr("Recording to add"), self._frames)
         vbox(
             paragraph("supportAbout", _ABOUT),
             form,
@@ -80,7 +81,7 @@ class SupportDialog(QDialog):
 
         def work(progress: Progress) -> str:
             written = run_support(output, settings, progress)
-            return f"{output} is written; it holds {', '.join(written[:5])}."
+            return tr("{} is written; it holds {}.").format(output, ", ".join(written[:5]))
 
         self._write.setEnabled(False)
         self._job = Job(work)

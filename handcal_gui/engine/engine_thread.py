@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 
 from PySide6.QtCore import QObject, Signal
 
+from handcal.bridge.bridges import BridgeSettings, open_bridges
 from handcal.errors import HandcalError
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
@@ -17,6 +19,7 @@ from handcal_gui.engine.worker import Worker
 _LOG = logging.getLogger(__name__)
 
 Command = Callable[[Station], object]
+_NO_BRIDGES = BridgeSettings()
 
 
 class EngineThread(Worker):
@@ -29,6 +32,8 @@ class EngineThread(Worker):
     ----------
     open_station : callable
         Opens the station, in the engine's thread.
+    bridges : BridgeSettings
+        The calibration goes on without bridges that cannot be opened.
 
     Attributes
     ----------
@@ -38,6 +43,8 @@ class EngineThread(Worker):
         A command has finished: its name and its result.
     failed : Signal(str, str)
         A command failed: its name and the reason, as a message for the user.
+    told : Signal(str)
+        A line about a bridge that could not be opened or was dropped.
     ended : Signal(str)
         The reason why the station could not be opened or failed; empty if it was closed.
     """
@@ -45,11 +52,18 @@ class EngineThread(Worker):
     opened = Signal(object)
     command_done = Signal(str, object)
     failed = Signal(str, str)
+    told = Signal(str)
     ended = Signal(str)
 
-    def __init__(self, open_station: Callable[[], Station], parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        open_station: Callable[[], Station],
+        parent: QObject | None = None,
+        bridges: BridgeSettings = _NO_BRIDGES,
+    ) -> None:
         super().__init__("handcal engine", parent)
         self._open_station = open_station
+        self._bridges = bridges
         self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
         self._submitted = self._done = 0
         self._newest: tuple[Snapshot | None, int] = None, 0
@@ -84,7 +98,7 @@ class EngineThread(Worker):
     def _run(self) -> None:
         why = ""
         try:
-            with self._open_station() as station:
+            with self._open_station() as station, self._watching(station):
                 if not self._closing.is_set():
                     self._emit_later(self.opened.emit, station)
                 try:
@@ -99,6 +113,20 @@ class EngineThread(Worker):
             _LOG.exception("the engine failed unexpectedly")
             why = f"handcal hit an unexpected error ({_describe(error)}); the session is kept"
         self._emit_later(self.ended.emit, why)
+
+    @contextmanager
+    def _watching(self, station: Station) -> Iterator[None]:
+        """Have bridges watch the station."""
+        with ExitStack() as stack:
+            try:
+                for bridge in stack.enter_context(open_bridges(self._bridges, self._tell)):
+                    station.watch(bridge)
+            except HandcalError as error:
+                self._tell(str(error))
+            yield
+
+    def _tell(self, line: str) -> None:
+        self._emit_later(self.told.emit, line)
 
     def _run_commands(self, station: Station) -> None:
         while not self._commands.empty():

@@ -10,10 +10,11 @@ from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_WORDS
+from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.widgets.times import local_time
 
 
@@ -39,15 +40,21 @@ class ReviewPage(QWidget):
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
-        self._export = main_button("reviewExport", "&Export…")
-        self._resume = button("reviewResume", "&Resume this session")
-        self._resume.setToolTip("Open camera and headset to add alignments, fine-tuning or trials")
-        self._again = button("reviewAgain", "Calibrate a&gain")
-        self._again.setToolTip(
-            "The same wearer, or the headset has slipped: begins with this result, which each eye "
-            "checks first"
+        self._card = ResultCard()
+        self._export = main_button("reviewExport", tr("&Export…"))
+        self._resume = button("reviewResume", tr("&Resume this session"))
+        self._resume.setToolTip(
+            tr("Open camera and headset to add alignments, fine-tuning or trials")
         )
-        close = button("reviewClose", "&Close session")
+        self._again = button("reviewAgain", tr("Calibrate a&gain"))
+        self._again.setToolTip(
+            tr(
+                "The same wearer, or the headset has slipped: begins with this result, "
+                "which each eye "
+                "checks first"
+            )
+        )
+        close = button("reviewClose", tr("Close &session"))
         self._export.clicked.connect(self.export_requested)
         self._resume.clicked.connect(self.resume_requested)
         self._again.clicked.connect(self.again_requested)
@@ -56,6 +63,7 @@ class ReviewPage(QWidget):
         vbox(
             self._title,
             self._facts,
+            self._card,
             buttons,
             0,
             on=self,
@@ -63,7 +71,13 @@ class ReviewPage(QWidget):
             spacing=2 * SPACING_PX,
         )
 
-    def show_session(self, record: SessionRecord, results: Results | None, note: str = "") -> None:
+    def show_session(
+        self,
+        record: SessionRecord,
+        results: Results | None,
+        target_arcmin: float,
+        note: str = "",
+    ) -> None:
         """Show a session and, if it has been solved, its results.
 
         Parameters
@@ -71,33 +85,38 @@ class ReviewPage(QWidget):
         record : SessionRecord
         results : Results or None
             None while it is being solved, or if it cannot be solved.
+        target_arcmin : float
+            The lab's target when the session was made.
         note : str
             The current activity, or the reason why there are no results.
         """
-        self._title.setText(record.wearer or "Session without a name")
+        self._title.setText(record.wearer or tr("Session without a name"))
         self._export.setEnabled(bool(record.alignments))
         self._again.setEnabled(results is not None)
+        self._card.show_results(results, target_arcmin)
+        self._card.setVisible(results is not None)
         while self._facts.rowCount():
             self._facts.removeRow(0)
-        for name, fact in _facts(record, results, note):
+        for name, fact in _facts(record, note):
             text = paragraph(f"review{name.replace(' ', '')}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(QLabel(name, alignment=Qt.AlignmentFlag.AlignTop), text)
 
 
-def _facts(record: SessionRecord, results: Results | None, note: str) -> Iterator[tuple[str, str]]:
+def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str]]:
     """Yield the name and the text of each fact about a session."""
-    yield "Started", local_time(record.events[0].time)
-    yield "Rig", record.rig.name
-    state = "finished" if record.is_finished else "not finished"
-    counts = pluralize(len(record.alignments), "alignment"), pluralize(len(record.trials), "trial")
-    yield "Contents", f"{', '.join(counts)}; {state}"
-    yield "Folder", str(record.path)
-    for eye, verdict in results.verdicts.items() if results else ():
-        yield EYE_NAMES[eye], f"{VERDICT_WORDS[verdict.name]}: {verdict.reason}"
+    yield tr("Started"), local_time(record.events[0].time)
+    yield tr("Rig"), record.rig.name
+    state = tr("finished") if record.is_finished else tr("not finished")
+    counts = (
+        pluralize(len(record.alignments), tr("alignment"), tr("alignments")),
+        pluralize(len(record.trials), tr("trial"), tr("trials")),
+    )
+    yield tr("Contents"), f"{', '.join(counts)}; {state}"
+    yield tr("Folder"), str(record.path)
     if note:
-        yield "Note", note
+        yield tr("Note"), note
     if record.left_out:
-        yield "Damaged", f"{record.left_out[0].upper()}{record.left_out[1:]}."
+        yield tr("Damaged"), f"{record.left_out[0].upper()}{record.left_out[1:]}."
     if record.torn_bytes:
-        yield "Journal", "The last line is incomplete, as after a crash."
+        yield tr("Journal"), tr("The last line is incomplete, as after a crash.")

@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.sentence import sentence
@@ -27,9 +28,9 @@ class Banner(QWidget):
         self._text = paragraph()
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         close = QToolButton(autoRaise=True)
-        close.setText("Close")
+        close.setText(tr("Close"))
         close.setObjectName("bannerClose")
-        close.setToolTip("Close this message (Esc)")
+        close.setToolTip(tr("Close this message (Esc)"))
         close.clicked.connect(self.clear)
         self._close = close
         hbox(

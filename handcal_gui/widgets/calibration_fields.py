@@ -6,22 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QWidget
+from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.hand.settings import Roi
 from handcal.station.procedure import CalibrationSettings
 from handcal.types import Method
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, number
 
 _METHODS: dict[Method, str] = {
-    "consistent": "Consistent (recommended)",
-    "linear": "Linear",
-    "paper": "As in the paper",
-    "icp": "Rigid ICP",
-    "icp-open3d": "Rigid ICP by Open3D",
+    "consistent": tr("Consistent (recommended)"),
+    "linear": tr("Linear"),
+    "paper": tr("As in the paper"),
+    "icp": tr("Rigid ICP"),
+    "icp-open3d": tr("Rigid ICP by Open3D"),
 }
-_METHOD_HELP = (
+_METHOD_HELP = tr(
     "Solver of the eye shift φ from an alignment.\n"
     "Consistent: exact model; robust to cut edges and a rotated hand.\n"
     "Linear: assumes a scale of 1, which underestimates φ3.\n"
@@ -29,12 +30,12 @@ _METHOD_HELP = (
     "Rigid ICP: the paper's baseline; by Open3D the same, if it is installed."
 )
 _ROIS: dict[Roi, str] = {
-    "detector": "Colour and depth",
-    "left": "Colour and depth, leftmost",
-    "right": "Colour and depth, rightmost",
-    "depth": "Depth alone",
+    "detector": tr("Colour and depth"),
+    "left": tr("Colour and depth, leftmost"),
+    "right": tr("Colour and depth, rightmost"),
+    "depth": tr("Depth alone"),
 }
-_ROI_HELP = (
+_ROI_HELP = tr(
     "Method of finding the hand.\n"
     "Colour and depth: the hand detector selects where to search; of several hands\n"
     "the nearest, or the leftmost or rightmost in the camera's image.\n"
@@ -61,24 +62,24 @@ class CalibrationFields(QWidget):
             45.0,
             0.5,
             " °",
-            "Limit of the hand's rotation from the cursor; beyond it an alignment is refused.",
+            tr("Limit of the hand's rotation from the cursor; beyond it an alignment is refused."),
         )
         self._near = number(
-            "gateNear", 0.10, 1.95, 0.05, " m", "Anything nearer to the camera is ignored."
+            "gateNear", 0.10, 1.95, 0.05, " m", tr("Anything nearer to the camera is ignored.")
         )
         self._far = number(
-            "gateFar", 0.15, 2.00, 0.05, " m", "Anything farther from the camera is ignored."
+            "gateFar", 0.15, 2.00, 0.05, " m", tr("Anything farther from the camera is ignored.")
         )
-        self._roi = choice("roi", "Hand found by", _ROIS, _ROI_HELP)
-        self._method = choice("method", "Solver", _METHODS, _METHOD_HELP)
+        self._roi = choice("roi", tr("Hand found by"), _ROIS, _ROI_HELP)
+        self._method = choice("method", tr("Solver"), _METHODS, _METHOD_HELP)
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
         self._form.setSpacing(SPACING_PX)
-        self.add_row("Rotation guard", self._guard)
-        self.add_row("Depth gate from", self._near)
-        self.add_row("Depth gate to", self._far)
-        self.add_row("Hand found by", self._roi)
-        self.add_row("Solver", self._method)
+        self.add_row(tr("Rotation guard"), self._guard)
+        self.add_row(tr("Depth gate from"), self._near)
+        self.add_row(tr("Depth gate to"), self._far)
+        self.add_row(tr("Hand found by"), self._roi)
+        self.add_row(tr("Solver"), self._method)
         self._near.valueChanged.connect(self._push_far)
         self._far.valueChanged.connect(self._push_near)
         for field in (self._guard, self._near, self._far):
@@ -111,6 +112,13 @@ class CalibrationFields(QWidget):
     def add_row(self, label: str, field: QWidget) -> None:
         """Add a field below."""
         self._form.addRow(label, field)
+
+    def add_heading(self, text: str) -> None:
+        """Add a heading below, for the fields added next."""
+        heading = QLabel(text)
+        scale_font(heading, 1.0, is_bold=True)
+        heading.setContentsMargins(0, SPACING_PX, 0, 0)
+        self._form.addRow(heading)
 
     def _push_far(self, near_m: float) -> None:
         """Keep the far limit beyond the near one."""

@@ -9,11 +9,12 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.sentence import sentence
 
 _ICONS = {Health.GOOD: "check", Health.LIMITED: "warning", Health.BROKEN: "cross"}
-_WORDS = {Health.GOOD: "Good", Health.LIMITED: "Note", Health.BROKEN: "Problem"}
+_WORDS = {Health.GOOD: tr("Good"), Health.LIMITED: tr("Note"), Health.BROKEN: tr("Problem")}
 
 
 class FindingLine(QWidget):

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QLabel, QProgressBar, QWidget
 
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, fill_row, with_name
 
@@ -34,9 +35,9 @@ class JobBar(QWidget):
         self._job: Job | None = None
         self._then: Callable[[Any], object] = lambda _: None
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
-        self._bar = with_name(QProgressBar(), "progress", "Progress")
+        self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
         self._bar.setFixedWidth(20 * SPACING_PX)
-        self._cancel = button("cancel", "Cancel")
+        self._cancel = button("cancel", tr("Cancel"))
         self._cancel.clicked.connect(self.cancel)
         fill_row(self, self._bar, self._doing, self._cancel, grows=self._doing)
         self._refresh()
@@ -66,7 +67,7 @@ class JobBar(QWidget):
         """Cancel the running job at its next check."""
         if self._job is not None:
             self._job.cancel()
-            self._doing.setText("Cancelling…")
+            self._doing.setText(tr("Cancelling…"))
             self._cancel.setEnabled(False)
 
     def stop(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLineEdit, QWidget
 
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, fill_row, with_name
 
 
@@ -16,12 +17,12 @@ class KeyField(QWidget):
         self._key = with_name(
             QLineEdit(readOnly=True),
             "pairingKey",
-            "Pairing key",
-            "Enter this key in the headset and nowhere else: any device with it can connect.",
+            tr("Pairing key"),
+            tr("Enter this key in the headset and nowhere else: any device with it can connect."),
         )
-        self._reveal = button("showKey", "Show", "Show the pairing key")
+        self._reveal = button("showKey", tr("Show"), tr("Show the pairing key"))
         self._reveal.setCheckable(True)
-        copy = button("copyKey", "Copy", "Copy the pairing key")
+        copy = button("copyKey", tr("Copy"), tr("Copy the pairing key"))
         fill_row(self, self._key, self._reveal, copy, grows=self._key)
         self.setFocusProxy(self._key)
         self._reveal.toggled.connect(self._show)
@@ -37,4 +38,4 @@ class KeyField(QWidget):
     def _show(self, is_shown: bool) -> None:
         modes = QLineEdit.EchoMode
         self._key.setEchoMode(modes.Normal if is_shown else modes.Password)
-        self._reveal.setText("Hide" if is_shown else "Show")
+        self._reveal.setText(tr("Hide") if is_shown else tr("Show"))

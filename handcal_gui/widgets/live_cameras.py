@@ -14,13 +14,14 @@ from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.types import CameraIdentity, Frame
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_images import Images, LiveImages
 from handcal_gui.widgets.path_field import PathField
 
 _RECORDED = "recorded"
-_SOURCES = {REALSENSE: "RealSense, colour", _RECORDED: "Recording or video"}
+_SOURCES = {REALSENSE: tr("RealSense, colour"), _RECORDED: tr("Recording or video")}
 _PLAYBACK = PlaybackSettings(real_time=True, loop=True)
 _POLL_MS = 50
 
@@ -67,7 +68,9 @@ class LiveCameras(QWidget):
         self._sources = {title: choice("source", title, _SOURCES) for title in titles}
         self._recorded = {
             title: PathField(
-                f"Recording or video, {title.lower()}", "either", empty="No recording or video"
+                tr("Recording or video, {}").format(title.lower()),
+                "either",
+                empty=tr("No recording or video"),
             )
             for title in titles
         }
@@ -78,13 +81,13 @@ class LiveCameras(QWidget):
             source.currentIndexChanged.connect(self._refresh)
         self._lay_out()
         self._refresh()
-        self._show_message("No image yet")
+        self._show_message(tr("No image yet"))
 
     def add_cameras(self, numbers: Iterable[int]) -> None:
         """Add cameras of this computer to the choices, by their numbers."""
         for place, source in enumerate(self._sources.values()):
             for number in sorted(numbers, reverse=True):
-                source.insertItem(0, f"Camera {number}", str(number))
+                source.insertItem(0, tr("Camera {}").format(number), str(number))
             if self._live is None:
                 source.setCurrentIndex(place)
 
@@ -93,10 +96,10 @@ class LiveCameras(QWidget):
         self.stop()
         sources = {title: self._source(title) for title in self._sources}
         if "" in sources.values():
-            self.failed.emit("choose the recording or video")
+            self.failed.emit(tr("choose the recording or video"))
             return
         if len(set(sources.values())) < len(sources):
-            self.failed.emit("both are the same camera: choose another for one of them")
+            self.failed.emit(tr("both are the same camera: choose another for one of them"))
             return
         self._live = LiveImages(
             [
@@ -110,7 +113,7 @@ class LiveCameras(QWidget):
         self._live.failed.connect(self._fail)
         self._live.start()
         self._timer.start()
-        self._show_message("Opening the camera…")
+        self._show_message(tr("Opening the camera…"))
 
     def stop(self) -> None:
         """Close the cameras; safe to call twice."""
@@ -119,7 +122,7 @@ class LiveCameras(QWidget):
             self._live.stop()
             self._live = None
         self.images = None
-        self._show_message("No image")
+        self._show_message(tr("No image"))
         self.images_changed.emit()
 
     def _source(self, title: str) -> str:

@@ -13,6 +13,7 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraTimeoutError, HandcalError
 from handcal.types import UInt8
 from handcal_gui.engine.worker import Worker
+from handcal_gui.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -65,5 +66,5 @@ class LiveImages(Worker):
             _LOG.exception("unexpected error in live images")
             self._emit_later(
                 self.failed.emit,
-                f"handcal hit an unexpected error ({type(error).__name__}: {error})",
+                tr("handcal hit an unexpected error ({}: {})").format(type(error).__name__, error),
             )

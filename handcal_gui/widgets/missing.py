@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from handcal.station.snapshot import Snapshot
+from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
 
 
@@ -13,8 +14,8 @@ def missing_text(snapshot: Snapshot) -> str:
     why no hand is found.
     """
     if snapshot.camera.problem:
-        return "No image"
+        return tr("No image")
     seen = snapshot.observation
     if seen is None or not seen.problem:
         return ""
-    return "No hand" if seen.cloud is None else sentence(seen.problem)
+    return tr("No hand") if seen.cloud is None else sentence(seen.problem)

@@ -7,9 +7,10 @@ from typing import Literal
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, fill_row
 
-INTRINSICS_FILES = "Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)"
+INTRINSICS_FILES = tr("Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)")
 """File filter for a camera's intrinsics."""
 
 
@@ -51,8 +52,8 @@ class PathField(QWidget):
         buttons = []
         for one, ask in (("file", self.choose_file), ("folder", self.choose_folder)):
             if kind in (one, "either"):
-                text = f"{one.capitalize()}…" if kind == "either" else "Choose…"
-                buttons.append(button(f"{one}Choice", text, f"Choose {name.lower()}"))
+                text = f"{one.capitalize()}…" if kind == "either" else tr("Choose…")
+                buttons.append(button(f"{one}Choice", text, tr("Choose {}").format(name.lower())))
                 buttons[-1].clicked.connect(ask)
         fill_row(self, self._line, *buttons, grows=self._line)
         self.setFocusProxy(self._line)

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.translation import tr
 
 _STEPS = 60
 """The ring is painted again only if it has grown by one of so many parts."""
@@ -18,7 +19,7 @@ class ProgressRing(QWidget):
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName(name)
-        self.setAccessibleName("Progress")
+        self.setAccessibleName(tr("Progress"))
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._text = ""
         self._part: int | None = None

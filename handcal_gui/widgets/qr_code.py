@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.link.invitation import qr_matrix
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 
 _LEAST_PX = 4
 """Size of a module in logical pixels at which a headset's camera reads the code at arm's length."""
@@ -19,7 +20,7 @@ class QrCode(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("qrCode")
-        self.setAccessibleName("QR code")
+        self.setAccessibleName(tr("QR code"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._rows: tuple[tuple[bool, ...], ...] = ()
 

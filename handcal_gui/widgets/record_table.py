@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidge
 
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX, colors, flat_header, number_font
+from handcal_gui.translation import tr
 
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
 _NO_INDEX = QModelIndex()
@@ -82,10 +83,10 @@ class RecordTable(QTableView):
         across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.delete_action = add_action(
             self,
-            "Delete",
+            tr("Delete"),
             "Del",
             self._delete,
-            tooltip="Delete the selected row (Del); can be undone",
+            tooltip=tr("Delete the selected row (Del); can be undone"),
             context=Qt.ShortcutContext.WidgetShortcut,
         )
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)

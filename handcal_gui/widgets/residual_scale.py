@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from handcal.register.verdict import VerdictSettings
 from handcal.types import Float64, UInt8
 from handcal_gui.theme import SPACING_PX, colors, is_dark
+from handcal_gui.translation import tr
 from handcal_gui.widgets.splat import rgb
 
 LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
@@ -40,10 +41,12 @@ class ResidualScale(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("residual-scale")
-        self.setAccessibleName("Scale of residuals")
+        self.setAccessibleName(tr("Scale of residuals"))
         self.setToolTip(
-            "Distance of each point of the hand from its partner on the cursor after "
-            "registration, in millimetres; outliers have no partner"
+            tr(
+                "Distance of each point of the hand from its partner on the cursor after "
+                "registration, in millimetres; outliers have no partner"
+            )
         )
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(max(_BAR_PX, self.fontMetrics().height()))
@@ -52,7 +55,7 @@ class ResidualScale(QWidget):
         """Draw the bar between its limits, and then the colour of outliers."""
         painter = QPainter(self)
         width_of = painter.fontMetrics().horizontalAdvance
-        low, high, outlier = "Residual 0", f"{LARGEST_MM:.0f} mm", "Outlier"
+        low, high, outlier = tr("Residual 0"), f"{LARGEST_MM:.0f} mm", tr("Outlier")
         gap, top = SPACING_PX / 2, (self.height() - _BAR_PX) / 2
         swatch = QRectF(self.width() - width_of(outlier) - gap - _BAR_PX, top, _BAR_PX, _BAR_PX)
         left = width_of(low) + gap

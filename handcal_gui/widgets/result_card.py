@@ -12,12 +12,13 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 from handcal.register.results import Results
 from handcal.types import EYES, Eye, VerdictName
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_COLORS, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
-_NOT_MEASURED = "not measured"
+_NOT_MEASURED = tr("not measured")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +54,16 @@ def eye_results(results: Results) -> list[EyeResult]:
         if eye not in results.eyes:
             continue
         benefit, verdict = results.benefits[eye], results.verdicts[eye]
-        before = Bar("Before, expected", benefit.without_arcmin)
+        before = Bar(tr("Before, expected"), benefit.without_arcmin)
         if eye in results.measured_arcmin:
             checked, left = results.measured_arcmin[eye]
-            bars = before, Bar("Check found", checked), Bar("After the check", left)
+            bars = before, Bar(tr("Check found"), checked), Bar(tr("After the check"), left)
         else:
-            after = Bar("After, expected", benefit.after_arcmin)
-            bars = before, after, Bar("After, measured", None)
-        another = f"One more alignment: {results.expected_after_another_arcmin[eye]:.1f}′ expected"
+            after = Bar(tr("After, expected"), benefit.after_arcmin)
+            bars = before, after, Bar(tr("After, measured"), None)
+        another = tr("One more alignment: {:.1f}′ expected").format(
+            results.expected_after_another_arcmin[eye]
+        )
         found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another))
     return found
 
@@ -77,7 +80,7 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
         Facts to begin with, such as the wearer.
     """
     lines = [f"{name}: {value}" for name, value in head.items()]
-    lines.append(f"Target: {target_arcmin:.1f}′")
+    lines.append(tr("Target: {:.1f}′").format(target_arcmin))
     for one in eye_results(results):
         lines += ["", f"{EYE_NAMES[one.eye]}: {VERDICT_WORDS[one.verdict]}", one.reason]
         lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
@@ -91,7 +94,7 @@ class ResultCard(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("resultCard")
-        self.setAccessibleName("Result")
+        self.setAccessibleName(tr("Result"))
         self._results: Results | None = None
         self._columns = {eye: _Column(eye) for eye in EYES}
         grid = QGridLayout(self)
@@ -145,7 +148,7 @@ class _Column(QWidget):
         self, result: EyeResult | None, target_arcmin: float, scale_arcmin: float
     ) -> None:
         self._result = result
-        word = "– Not solved" if result is None else VERDICT_WORDS[result.verdict]
+        word = tr("– Not solved") if result is None else VERDICT_WORDS[result.verdict]
         self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
         self._another.setText(result.another if result else "")
@@ -215,7 +218,7 @@ class _Bars(QWidget):
         known = sum(bar.arcmin is not None for bar in self._result.bars)
         painter.drawLine(round(x), 0, round(x), known * line)
         painter.setPen(text)
-        label = f"target {self._target:g}′"
+        label = tr("target {:g}′").format(self._target)
         width = metrics.horizontalAdvance(label)
         left = min(max(x - width / 2, 0.0), self.width() - width)
         painter.drawText(

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
 from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
+from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed
 
-EYE_NAMES: Mapping[Eye, str] = {"left": "Left eye", "right": "Right eye"}
+EYE_NAMES: Mapping[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
 VERDICT_WORDS: Mapping[VerdictName, str] = {
-    "accept": "✓ Accept",
-    "repeat": "↻ Repeat",
-    "keep": "↩ Keep offline",
-    "implausible": "✕ Implausible",
-    "contradicted": "✕ Contradicted",
+    "accept": tr("✓ Accept"),
+    "repeat": tr("↻ Repeat"),
+    "keep": tr("↩ Keep offline"),
+    "implausible": tr("✕ Implausible"),
+    "contradicted": tr("✕ Contradicted"),
 }
 VERDICT_COLORS: Mapping[VerdictName, str] = {
     "accept": "good",
@@ -68,21 +69,27 @@ class Quantity:
 
 def _phi(index: int, direction: str) -> Quantity:
     return Quantity(
-        f"φ{index + 1} (mm)",
+        tr("φ{} (mm)").format(index + 1),
         "",
-        f"Distance of the eye {direction} the rig's viewpoint,\n± one standard deviation (σ)",
+        tr(
+            "Distance of the eye {} the rig's viewpoint,\n± one standard deviation (σ). Both eyes "
+            "are solved together:\nan alignment of one may change the other, too."
+        ).format(direction),
         lambda shift, _: 1e3 * float(shift.shift_m[index]),
         2,
         lambda shift: 1e3 * float(shift.covariance_m2[index, index]) ** 0.5,
     )
 
 
-PHI = (_phi(0, "to the right of"), _phi(1, "below"), _phi(2, "in front of"))
+PHI = (_phi(0, tr("to the right of")), _phi(1, "below"), _phi(2, tr("in front of")))
 EXPECTED_ERROR = Quantity(
-    "Expected error",
+    tr("Expected error"),
     "′",
-    "Expected angle between real and drawn points at 0.4 to 0.6 m due to the uncertainty of φ,\n"
-    "in arcminutes. 1′ is 0.15 mm at 0.5 m.",
+    tr(
+        "Expected angle between real and drawn points at 0.4 to 0.6 m due to the "
+        "uncertainty of φ,\n"
+        "in arcminutes. 1′ is 0.15 mm at 0.5 m."
+    ),
     lambda shift, display: expected_error_arcmin(display, shift),
     1,
 )
@@ -92,22 +99,26 @@ QUANTITIES = (
     Quantity(
         "RMS (mm)",
         "",
-        "Distance between hand and cursor after registration, root mean square over the inliers",
+        tr(
+            "Distance between hand and cursor after registration, root mean square over the inliers"
+        ),
         lambda shift, _: 1e3 * shift.rms_m,
         2,
     ),
     Quantity(
-        "Inliers",
+        tr("Inliers"),
         " %",
-        "Share of the hand's points with a partner on the cursor",
+        tr("Share of the hand's points with a partner on the cursor"),
         lambda shift, _: 100 * shift.inlier_ratio,
         0,
     ),
-    Quantity("Iterations", "", "Sum over all alignments", lambda s, _: float(s.iterations), 0),
+    Quantity(
+        tr("Iterations"), "", tr("Sum over all alignments"), lambda s, _: float(s.iterations), 0
+    ),
 )
-_ANOTHER = "Expected error after one more alignment like these"
-_EYE_DISTANCE = "Eye distance"
-_EYE_DISTANCE_MEANING = "Distance between the two solved eye positions"
+_ANOTHER = tr("Expected error after one more alignment like these")
+_EYE_DISTANCE = tr("Eye distance")
+_EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
 
 def result_rows(results: Results, rig: Rig) -> list[Row]:
@@ -118,18 +129,20 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
     ]
     arcmin = results.expected_after_another_arcmin
     another = tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
-    rows.insert(QUANTITIES.index(EXPECTED_ERROR) + 1, Row("With one more", another, _ANOTHER))
+    rows.insert(QUANTITIES.index(EXPECTED_ERROR) + 1, Row(tr("With one more"), another, _ANOTHER))
     rows.append(Row(_EYE_DISTANCE, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
     if measured := results.measured_eye_distance:
-        meaning = f"Used in the results; {measured.source}"
-        rows.append(Row("Eye distance measured", (str(measured),), meaning))
+        meaning = tr("Used in the results; {}").format(measured.source)
+        rows.append(Row(tr("Eye distance measured"), (str(measured),), meaning))
     if sessions := results.fused.prior.sessions:
-        learned = f"learned from {sessions} sessions"
-        rows.append(Row("Prior", (learned,), "Where eyes are expected before any alignment"))
+        learned = tr("learned from {} sessions").format(sessions)
+        rows.append(
+            Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
+        )
     return [
         *rows,
-        Row("Alignments", (str(len(results.alignments)),), "Fused into these results"),
-        Row("Method", (results.method,), "The solver"),
+        Row(tr("Alignments"), (str(len(results.alignments)),), tr("Fused into these results")),
+        Row(tr("Method"), (results.method,), tr("The solver")),
     ]
 
 
@@ -148,7 +161,7 @@ def another_text(results: Results, rig: Rig) -> str:
         f" → {_arcmin(arcmin)}"
         for eye, arcmin in results.expected_after_another_arcmin.items()
     )
-    return f"One more alignment like these: expected error {gains}."
+    return tr("One more alignment like these: expected error {}.").format(gains)
 
 
 def eye_distance_text(results: Results) -> str:

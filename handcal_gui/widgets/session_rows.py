@@ -13,44 +13,53 @@ from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
 from handcal.types import EYES, Eye, EyeShift
+from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize, signed
 from handcal_gui.widgets.record_table import RecordColumn
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
 
-_PHI = (
+_PHI = tr(
     "φ1, φ2 and φ3 of the {} from this alignment alone: distance of the eye to the right of,\n"
     "below and in front of the rig's viewpoint, in millimetres"
 )
 ALIGNMENT_COLUMNS = (
-    RecordColumn("No.", "Number of the alignment"),
-    RecordColumn("Eyes", "Eyes open during the alignment", is_number=False),
-    RecordColumn("Rotation °", "Angle between hand and cursor at the confirmation, in degrees"),
-    RecordColumn("Left φ mm", _PHI.format("left eye")),
-    RecordColumn("Right φ mm", _PHI.format("right eye")),
-    RecordColumn("RMS mm", "Distance between hand and cursor after registration, in millimetres"),
-    RecordColumn("Inliers %", "Percentage of the hand's points with a partner on the cursor"),
-    RecordColumn("Time", "Time of the confirmation"),
+    RecordColumn(tr("No."), tr("Number of the alignment")),
+    RecordColumn(tr("Eyes"), tr("Eyes open during the alignment"), is_number=False),
+    RecordColumn(
+        tr("Rotation °"), tr("Angle between hand and cursor at the confirmation, in degrees")
+    ),
+    RecordColumn(tr("Left φ mm"), _PHI.format(tr("left eye"))),
+    RecordColumn(tr("Right φ mm"), _PHI.format(tr("right eye"))),
+    RecordColumn(
+        "RMS mm", tr("Distance between hand and cursor after registration, in millimetres")
+    ),
+    RecordColumn(
+        tr("Inliers %"), tr("Percentage of the hand's points with a partner on the cursor")
+    ),
+    RecordColumn(tr("Time"), tr("Time of the confirmation")),
 )
 TRIAL_COLUMNS = (
-    RecordColumn("No.", "Number of the trial"),
-    RecordColumn("Eye", "Eye that looked at the target", is_number=False),
-    RecordColumn("Distance m", "Distance of the target, in metres"),
-    RecordColumn("Error px", "Mean over the target's four corners, in pixels of the display"),
-    RecordColumn("Error ′", "Mean over the target's four corners, in arcminutes"),
-    RecordColumn("Time", "Time of the recording"),
+    RecordColumn(tr("No."), tr("Number of the trial")),
+    RecordColumn(tr("Eye"), tr("Eye that looked at the target"), is_number=False),
+    RecordColumn(tr("Distance m"), tr("Distance of the target, in metres")),
+    RecordColumn(
+        tr("Error px"), tr("Mean over the target's four corners, in pixels of the display")
+    ),
+    RecordColumn(tr("Error ′"), tr("Mean over the target's four corners, in arcminutes")),
+    RecordColumn(tr("Time"), tr("Time of the recording")),
 )
 STATISTICS_COLUMNS = (
-    "Calibrations",
-    "Trials",
-    "Mean ′",
-    "SD of trials ′",
-    "SD of calibrations ′",
-    "Median ′",
-    "Max ′",
+    tr("Calibrations"),
+    tr("Trials"),
+    tr("Mean ′"),
+    tr("SD of trials ′"),
+    tr("SD of calibrations ′"),
+    tr("Median ′"),
+    tr("Max ′"),
 )
-_SPREAD_HELP = (
+_SPREAD_HELP = tr(
     "Each trial counts once, with the mean of its corners, in arcminutes. Trials of one\n"
     "calibration are not independent: only the spread between calibrations tells how the next\n"
     "one turns out."
@@ -141,7 +150,7 @@ def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:
 
 def statistics_rows(trials: Mapping[int, Trial]) -> list[Row]:
     """Return rows for `STATISTICS_COLUMNS`: all trials, each eye, each distance."""
-    groups = {"All": list(trials)}
+    groups = {tr("All"): list(trials)}
     for eye in EYES:
         groups[EYE_NAMES[eye]] = [number for number, one in trials.items() if one.eye == eye]
     for depth_m in sorted({one.target_depth_m for one in trials.values()}):
@@ -158,16 +167,18 @@ def statistics_rows(trials: Mapping[int, Trial]) -> list[Row]:
 def statistics_text(trials: Mapping[int, Trial]) -> str:
     """Return the errors of all trials in one line, with what they cannot tell."""
     if not trials:
-        return "No trials yet"
+        return tr("No trials yet")
     spread = trial_spread(trials, list(trials))
     sd_arcmin = spread.trial_sd_arcmin
-    between = "" if sd_arcmin is None else f", SD between trials {sd_arcmin:.1f}′"
-    calibrations = pluralize(spread.calibrations, "calibration")
-    counts = f"{pluralize(spread.trials, 'trial')} of {calibrations}"
-    text = f"{counts}: mean {spread.mean_arcmin:.1f}′{between}."
+    between = "" if sd_arcmin is None else tr(", SD between trials {:.1f}′").format(sd_arcmin)
+    calibrations = pluralize(spread.calibrations, tr("calibration"), tr("calibrations"))
+    counts = tr("{} of {}").format(
+        pluralize(spread.trials, tr("trial"), tr("trials")), calibrations
+    )
+    text = tr("{}: mean {:.1f}′{}.").format(counts, spread.mean_arcmin, between)
     if spread.calibration_sd_arcmin is None:
-        return f"{text} One calibration cannot tell how the next one turns out."
-    return f"{text} SD between calibrations {spread.calibration_sd_arcmin:.1f}′."
+        return tr("{} One calibration cannot tell how the next one turns out.").format(text)
+    return tr("{} SD between calibrations {:.1f}′.").format(text, spread.calibration_sd_arcmin)
 
 
 def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
@@ -187,7 +198,7 @@ def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
 
 def _eyes_text(eyes: Sequence[Eye]) -> str:
     """Return the name of one eye, or of both."""
-    return EYE_NAMES[eyes[0]] if len(eyes) == 1 else "Both eyes"
+    return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
 
 
 def _phi_text(shift: EyeShift | None) -> str:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QToolButton, QWidget
 
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.session_rows import Deletion
@@ -36,7 +37,11 @@ class UndoStrip(QWidget):
         self._text = ElidedLabel()
         self._text.setObjectName("undoText")
         self._undo = add_action(
-            parent, "Undo", "Ctrl+Z", self._restore, tooltip="Restore the deleted item (Ctrl+Z)"
+            parent,
+            tr("Undo"),
+            "Ctrl+Z",
+            self._restore,
+            tooltip=tr("Restore the deleted item (Ctrl+Z)"),
         )
         self._button = QToolButton()
         self._button.setDefaultAction(self._undo)
@@ -52,7 +57,9 @@ class UndoStrip(QWidget):
         self._undo.setEnabled(bool(deletions))
         self._button.setVisible(bool(deletions))
         if deletions:
-            self._text.setText(f"{deletions[-1].kind.capitalize()} {deletions[-1].number} deleted.")
+            self._text.setText(
+                tr("{} {} deleted.").format(deletions[-1].kind.capitalize(), deletions[-1].number)
+            )
         else:
             self._text.clear()
 

@@ -3,32 +3,107 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QImage, QTextCursor, QTextDocument
-from PySide6.QtWidgets import QTextBrowser, QWidget
+from PySide6.QtGui import QImage, QKeyEvent, QTextBlock, QTextCursor, QTextDocument
+from PySide6.QtWidgets import (
+    QLabel,
+    QLineEdit,
+    QTextBrowser,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
 from handcal.io.resources import resource_path
+from handcal_gui.keys import add_action
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.numbers import pluralize
 
 _SIZE_PX = 900, 750
 _WIDEST_PX = 820
 """Width to which wider pictures are reduced."""
+_FOUND_PX = 230
+_COLUMNS_PX = 150, 200, 450
+_MOST_FOUND = 200
 _PAGES = (".md", ".py", ".proto")
 
 
-class Manual(QTextBrowser):
-    """A window that shows pages in Markdown, with their links and pictures.
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the manual: a paragraph, an item of a list, or a row of a table."""
 
-    Backspace and Alt+Left go back. Pages of the web open in the web browser.
+    page: Path
+    title: str
+    """First heading of the page."""
+    section: str
+    """Heading above the line."""
+    text: str
+    block: int
+    """Number of the line's first block in the page's document."""
+
+
+def read_lines(folder: Path) -> list[Line]:
+    """Return all lines of the pages in a folder."""
+    return [line for page in sorted(folder.glob("*.md")) for line in _lines(page)]
+
+
+def find_lines(lines: Iterable[Line], words: str) -> list[Line]:
+    """Return the lines that contain all words, those in headings first; none without words."""
+    wanted = words.casefold().split()
+    found = [one for one in lines if wanted and all(word in one.text.casefold() for word in wanted)]
+    return sorted(found, key=lambda line: line.text != line.section)
+
+
+class Manual(QWidget):
+    """A window with the pages of the manual, and a search over all of them.
+
+    Attributes
+    ----------
+    page : ManualPage
+    search : QLineEdit
+    found : QTreeWidget
+        The lines found; hidden without a search.
     """
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setWindowFlag(Qt.WindowType.Window)
-        self.setWindowTitle("Manual")
+        super().__init__(parent, Qt.WindowType.Window)
+        self.setWindowTitle(tr("Manual"))
         self.setObjectName("manual")
-        self.setOpenExternalLinks(True)
         self.resize(*_SIZE_PX)
+        self.page = ManualPage(self)
+        self.search = with_name(
+            QLineEdit(placeholderText=tr("Search all pages (Ctrl+F)"), clearButtonEnabled=True),
+            "manualSearch",
+            tr("Search all pages"),
+        )
+        self.found = with_name(QTreeWidget(), "manualFound", tr("Lines found"))
+        self.found.setRootIsDecorated(False)
+        self.found.setHeaderLabels([tr("Page"), tr("Section"), tr("Line")])
+        self.found.setMaximumHeight(_FOUND_PX)
+        self.found.hide()
+        self._count = QLabel()
+        self._lines: list[Line] = []
+        self._shown: list[Line] = []
+        vbox(
+            hbox((self.search, 1), self._count, spacing=SPACING_PX),
+            self.found,
+            (self.page, 1),
+            on=self,
+            margins=SPACING_PX,
+            spacing=SPACING_PX,
+        )
+        self.search.textChanged.connect(self._search)
+        self.search.returnPressed.connect(self._show_next)
+        self.found.itemClicked.connect(self._show_current)
+        self.found.itemActivated.connect(self._show_current)
+        add_action(self, tr("Search all pages"), "Ctrl+F", self._begin_search)
 
     def open(self, page: str) -> None:
         """Show a shipped page, such as ``docs/guide.md``.
@@ -38,10 +113,67 @@ class Manual(QTextBrowser):
         FileError
             If the installation is damaged.
         """
-        self.setSource(QUrl.fromLocalFile(str(resource_path(page))))
+        self._lines = self._lines or read_lines(resource_path("docs"))
+        self.page.setSource(QUrl.fromLocalFile(str(resource_path(page))))
         self.show()
         self.raise_()
         self.activateWindow()
+        self.page.setFocus()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """End the search with Esc."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.search.clear()
+        else:
+            super().keyPressEvent(event)
+
+    def _begin_search(self) -> None:
+        self.search.setFocus()
+        self.search.selectAll()
+
+    def _search(self, words: str) -> None:
+        """List the lines that contain the words typed."""
+        found = find_lines(self._lines, words)
+        self._shown = found[:_MOST_FOUND]
+        self.found.clear()
+        for line in self._shown:
+            item = QTreeWidgetItem(self.found, [line.title, line.section, line.text])
+            item.setToolTip(2, line.text)
+        for column, width_px in enumerate(_COLUMNS_PX):
+            self.found.setColumnWidth(column, width_px)
+        self.found.setVisible(bool(words.split()))
+        most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
+        count = pluralize(len(found), tr("line"), tr("lines"))
+        self._count.setText(f"{count}{most}" if words.split() else "")
+
+    def _show_next(self) -> None:
+        """Show the next line found, after the last the first."""
+        if self._shown:
+            following = (self.found.currentIndex().row() + 1) % len(self._shown)
+            self.found.setCurrentIndex(self.found.model().index(following, 0))
+            self._show_current()
+
+    def _show_current(self) -> None:
+        line = self._shown[self.found.currentIndex().row()]
+        self.page.setSource(QUrl.fromLocalFile(str(line.page)))
+        self.page.go_to(self.page.document().findBlockByNumber(line.block))
+
+
+class ManualPage(QTextBrowser):
+    """Shows pages in Markdown, with their links and pictures.
+
+    Backspace and Alt+Left go back. Pages of the web open in the web browser.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("manualPage")
+        self.setOpenExternalLinks(True)
+
+    def go_to(self, block: QTextBlock) -> None:
+        """Scroll until a block is at the top."""
+        self.setTextCursor(QTextCursor(self.document().lastBlock()))
+        self.setTextCursor(QTextCursor(block))
 
     def doSetSource(
         self,
@@ -59,8 +191,7 @@ class Manual(QTextBrowser):
         block = self.document().begin()
         while heading and block.isValid():
             if block.blockFormat().headingLevel() and _anchor(block.text()) == heading:
-                self.setTextCursor(QTextCursor(self.document().lastBlock()))
-                self.setTextCursor(QTextCursor(block))
+                self.go_to(block)
                 return
             block = block.next()
 
@@ -72,6 +203,28 @@ class Manual(QTextBrowser):
         if image.width() <= _WIDEST_PX:
             return image
         return image.scaledToWidth(_WIDEST_PX, Qt.TransformationMode.SmoothTransformation)
+
+
+def _lines(page: Path) -> Iterator[Line]:
+    """Yield the lines of a page; the cells of a table's row are one."""
+    document = QTextDocument()
+    document.setMarkdown(page.read_text("utf-8"))
+    blocks: dict[object, list[QTextBlock]] = {}
+    block = document.begin()
+    while block.isValid():
+        cursor = QTextCursor(block)
+        table = cursor.currentTable()
+        row = table and (table.firstPosition(), table.cellAt(cursor).row())
+        blocks.setdefault(row or block.blockNumber(), []).append(block)
+        block = block.next()
+    title = section = ""
+    for line in blocks.values():
+        text = " · ".join(one.text() for one in line if one.text())
+        if line[0].blockFormat().headingLevel():
+            section = text
+            title = title or text
+        if text:
+            yield Line(page, title, section, text, line[0].blockNumber())
 
 
 def _anchor(heading: str) -> str:

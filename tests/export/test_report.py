@@ -19,10 +19,15 @@ from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
 from handcal.progress import Progress
 from handcal.register.benefit import expected_error_arcmin
+from handcal.report.document import Table
 from handcal.report.pdf import compose, write_pdf
+from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, comparison_json
+from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
 from handcal.session.trial import Trial
+from handcal.types import Eye, Float64
 
+COMPARED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0])}
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
 
 
@@ -138,3 +143,25 @@ def test_giving_up_at_any_time_leaves_no_file(
     with pytest.raises(CancelledError):
         write_pdf(tmp_path / "report.pdf", session_report(outcome), Progress(give_up))
     assert not list(tmp_path.iterdir())
+
+
+def test_it_tells_the_order_of_blinded_comparisons(outcome: SessionOutcome) -> None:
+    answers: list[tuple[Drawing, Answer]] = [
+        ("offline", "second"),
+        ("applied", "first"),
+        ("applied", "second"),
+        ("offline", "neither"),
+    ]
+    events = [
+        Event(number, "2026-11-23T08:00:00+00:00", COMPARED, comparison_json(made))
+        for number, made in enumerate((Comparison(*one, COMPARED_M) for one in answers), 100)
+    ]
+    record = replace(outcome.record, events=(*outcome.record.events, *events))
+    sections = session_report(replace(outcome, record=record)).sections
+    (blinded,) = (section for section in sections if section.title == "Blinded comparison")
+    sentence, table = blinded.items
+    assert isinstance(sentence, str)
+    assert sentence.startswith("Better with the calibration: 2; without it: 1; neither: 1.")
+    assert isinstance(table, Table)
+    assert [row[3] for row in table.rows] == ["applied", "applied", "offline", "neither"]
+    assert "Blinded comparison" not in {one.title for one in session_report(outcome).sections}

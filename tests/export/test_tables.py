@@ -10,13 +10,23 @@ import numpy as np
 import pytest
 
 from handcal.export.outcome import SessionOutcome, ShiftOrigin
-from handcal.export.tables import write_parameters, write_trials
+from handcal.export.tables import write_comparisons, write_parameters, write_trials
+from handcal.session.comparison import COMPARED, Comparison, comparison_json
+from handcal.session.journal import Event
 from handcal.types import Eye, Float64
 
 
 def read(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file, strict=True))
+
+
+def compared(outcome: SessionOutcome) -> SessionOutcome:
+    """Return the outcome with a blinded comparison."""
+    made = Comparison("applied", "second", {"left": np.array([1e-3, 2e-3, 3e-3])})
+    event = Event(99, "2026-11-23T08:00:00+00:00", COMPARED, comparison_json(made))
+    events = (*outcome.record.events, event)
+    return replace(outcome, record=replace(outcome.record, events=events))
 
 
 def triple(row: dict[str, str], name: str) -> list[float]:
@@ -97,3 +107,15 @@ def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcom
     write_parameters(tmp_path / "p.csv", replace(outcome, results=None, shifts_m=shifts_m))
     (row,) = read(tmp_path / "p.csv")
     assert triple(row, "phi{}_mm") == [-1.0, -1.0, -1.0]
+
+
+def test_comparisons_tell_the_order_and_are_only_written_if_there_are_any(
+    tmp_path: Path, outcome: SessionOutcome
+) -> None:
+    write_comparisons(tmp_path / "none.csv", outcome)
+    assert not (tmp_path / "none.csv").exists()
+    write_comparisons(tmp_path / "c.csv", compared(outcome))
+    (row,) = read(tmp_path / "c.csv")
+    assert (row["first"], row["answer"], row["better"]) == ("applied", "second", "offline")
+    assert triple(row, "left_phi{}_mm") == [1.0, 2.0, 3.0]
+    assert row["right_phi1_mm"] == ""

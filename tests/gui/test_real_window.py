@@ -214,6 +214,7 @@ class Technician:
         wait_for(f"{name} {count}", tried, self._window)
 
 
+@pytest.mark.slow  # tests/gui/test_program.py covers the keys, the held bar and the resumption
 def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
     display: Display, tmp_path: Path, preferences: Path, headset_of: Callable[[int], int]
 ) -> None:
@@ -253,48 +254,20 @@ def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
         time.sleep(0.2)
 
 
-@pytest.mark.slow  # the two others cover its parts
-def test_begin_and_finish_are_all_that_is_pressed(
-    display: Display, tmp_path: Path, preferences: Path
-) -> None:
-    """From the start page to a result that each eye has verified, in the guide alone."""
-    known = json.loads(preferences.read_text())
-    preferences.write_text(json.dumps(known | {"runs_itself": True, "arrangement": "station"}))
-    sessions = tmp_path / "sessions"
-    with Window(display, "--preferences", preferences) as window:
-        technician = Technician(window, sessions, preferences)
-        window.find()
-        time.sleep(2.0)
-        technician.start("Ada")
-
-        def is_begun() -> bool:
-            """Press once a second until a hand is asked for; more presses would do no more."""
-            if not technician.count("cursor_made"):
-                window.press("space")
-                time.sleep(1.0)
-            return technician.count("cursor_made") > 0
-
-        wait_for("the first cursor", is_begun, window)
-
-        def is_verified() -> bool:
-            session = technician.session()
-            return session is not None and set(session.facts.verified) == set(EYES)
-
-        wait_for("both verifications", is_verified, window)
-        window.shoot("real-8-verified")
-        technician.press_space_until("finished")
-        window.shoot("real-9-station")
-        window.press("ctrl+q")
-        window.end_well()
-
-
+@pytest.mark.parametrize(
+    "arrangement", ["panels", pytest.param("station", marks=pytest.mark.slow)]
+)
 def test_three_presses_lead_from_the_start_page_to_a_verified_result(
-    display: Display, tmp_path: Path, preferences: Path, record_property: Callable[..., None]
+    display: Display,
+    tmp_path: Path,
+    preferences: Path,
+    record_property: Callable[..., None],
+    arrangement: str,
 ) -> None:
     """The recommended plan; each key is pressed once, when the button is offered."""
     known = json.loads(preferences.read_text())
     known["station"]["plan"] = {"name": "recommended", "is_automatic": True}
-    preferences.write_text(json.dumps(known | {"runs_itself": True}))
+    preferences.write_text(json.dumps(known | {"runs_itself": True, "arrangement": arrangement}))
     with Window(display, "--preferences", preferences) as window:
         technician = Technician(window, tmp_path / "sessions", preferences)
         window.find()
@@ -313,10 +286,10 @@ def test_three_presses_lead_from_the_start_page_to_a_verified_result(
 
         wait_for("the end of the plan", is_over, window)
         record_property("seconds", round(time.monotonic() - started_s))
-        window.shoot("real-8-planned")
+        window.shoot(f"real-8-{arrangement}")
         window.press("space")
         technician.wait_until("finished")
-        window.shoot("real-9-planned")
+        window.shoot(f"real-9-{arrangement}")
         assert window.pressed == ["Return", "space", "space"]
         window.press("ctrl+q")
         window.end_well()

@@ -184,7 +184,7 @@ def test_no_step_needs_scrolling(
         assert window.size().toTuple() == size_px
         bars = area.horizontalScrollBar(), area.verticalScrollBar()
         assert [bar.maximum() for bar in bars] == [0, 0], state
-    card = window.findChild(ResultCard)
+    card = guide.findChild(ResultCard)
     assert isinstance(card, ResultCard)
     assert card.visibleRegion().boundingRect() == card.rect()
     assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()

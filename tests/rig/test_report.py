@@ -6,6 +6,7 @@ from handcal.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.report import missing_parts, report_rig
 from handcal.types import (
+    RIG_PARTS,
     CameraIdentity,
     DepthCheck,
     DisplayCheck,
@@ -97,3 +98,10 @@ def test_missing_parts_are_told_one_line_each() -> None:
     )
     assert missing_parts(whole) == ()
     assert len(missing_parts(replace(whole, origins={"left": origin}))) == 2
+
+
+def test_what_the_file_does_not_tell_is_neither_fine_nor_doubtful() -> None:
+    bare = replace(RIG, headset=None, depth_check=None, display_check=None, origins={})
+    unknown = [one.what for one in report_rig(bare) if not one.is_known]
+    parts = [f"Calibration of {part}" for part in RIG_PARTS]
+    assert unknown == ["Headset", "Depth check", "Display check", *parts]

@@ -97,6 +97,8 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
             station.show_target("left", 0.5)
         with pytest.raises(ProcedureError, match="solve and apply"):
             station.show_offline(True)
+        with pytest.raises(ProcedureError, match="solve and apply"):
+            station.compare()
         calibration.make_cursor(EYES)
         refused = step_until(station, "a refusal", lambda s: s.procedure.refused > 0, PATIENCE_S)
         assert "turned" in refused.procedure.refusal
@@ -127,6 +129,13 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         assert missed_px.min() > 0.0
         assert len(targeted.views["right"].target_px) == 0
 
+        station.compare()
+        compared = station.step()
+        assert (compared.comparing, compared.has_compared_both) == ("first", False)
+        assert compared.views == {}  # they would tell which drawing is shown
+        station.comparing.show("second")
+        assert station.step().has_compared_both
+        station.comparing.answer("second")
         station.show_offline(True)
         station.show_offline(False)  # nothing else may change
         solved_m = applied_m["left"]

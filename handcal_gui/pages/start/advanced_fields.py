@@ -10,10 +10,11 @@ from PySide6.QtWidgets import QCheckBox, QToolButton, QVBoxLayout, QWidget
 from handcal.camera.playback import PlaybackSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import choice, fill_row, number, whole_number, with_name
 
-_SIDES = {"": "By the seed", "left": "Left", "right": "Right"}
+_SIDES = {"": tr("By the seed"), "left": tr("Left"), "right": tr("Right")}
 
 
 class AdvancedFields(QWidget):
@@ -29,31 +30,37 @@ class AdvancedFields(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._fold = with_name(QToolButton(autoRaise=True), "advanced")
-        self._fold.setText("Advanced")
+        self._fold.setText(tr("Advanced"))
         self._fold.setCheckable(True)
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._calibration = CalibrationFields()
         self._real_time = with_name(
-            QCheckBox("Real time"),
+            QCheckBox(tr("Real time")),
             "realTime",
-            help_text="Plays at the recorded rate; otherwise every frame, as fast as possible.",
+            help_text=tr("Plays at the recorded rate; otherwise every frame, as fast as possible."),
         )
-        self._loop = with_name(QCheckBox("Loop"), "loop", help_text="Starts again at the end.")
+        self._loop = with_name(
+            QCheckBox(tr("Loop")), "loop", help_text=tr("Starts again at the end.")
+        )
         playback = QWidget()
         fill_row(playback, self._real_time, self._loop, grows=self._loop)
-        self._calibration.add_row("Recordings", playback)
+        self._calibration.add_row(tr("Recordings"), playback)
         self._seed = whole_number(
-            "seed", 0, 999_999, "Seed of the simulated wearer, hand and room."
+            "seed", 0, 999_999, tr("Seed of the simulated wearer, hand and room.")
         )
-        self._loss = number("loss", 0.0, 50.0, 1.0, " %", "Datagrams dropped in each direction.")
-        self._reorder = number("reorder", 0.0, 50.0, 1.0, " %", "Datagrams delivered out of order.")
-        self._side = choice("side", "Simulated hand", _SIDES, "The hand that is raised.")
+        self._loss = number(
+            "loss", 0.0, 50.0, 1.0, " %", tr("Datagrams dropped in each direction.")
+        )
+        self._reorder = number(
+            "reorder", 0.0, 50.0, 1.0, " %", tr("Datagrams delivered out of order.")
+        )
+        self._side = choice("side", tr("Simulated hand"), _SIDES, tr("The hand that is raised."))
         self._side.currentIndexChanged.connect(self.changed)
-        self._calibration.add_row("Simulated hand", self._side)
+        self._calibration.add_row(tr("Simulated hand"), self._side)
         for label, field in (
-            ("Simulated wearer", self._seed),
-            ("Simulated loss", self._loss),
-            ("Simulated reordering", self._reorder),
+            (tr("Simulated wearer"), self._seed),
+            (tr("Simulated loss"), self._loss),
+            (tr("Simulated reordering"), self._reorder),
         ):
             self._calibration.add_row(label, field)
             field.valueChanged.connect(self.changed)

@@ -11,15 +11,18 @@ from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
 from handcal.station.settings import Source, StationSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, choice, fill_row, with_name
 from handcal_gui.widgets.path_field import PathField
 
 _SOURCES: dict[Source, str] = {
-    "simulator": "Simulator",
+    "simulator": tr("Simulator"),
     "realsense": "RealSense",
-    "recording": "Recording",
+    "recording": tr("Recording"),
 }
-_PATTERN = f"RealSense recordings ({' '.join(f'*{suffix}' for suffix in RECORDING_SUFFIXES)})"
+_PATTERN = tr("RealSense recordings ({})").format(
+    " ".join(f"*{suffix}" for suffix in RECORDING_SUFFIXES)
+)
 
 
 class CameraField(QWidget):
@@ -34,20 +37,22 @@ class CameraField(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._source = choice("source", "Camera", _SOURCES)
+        self._source = choice("source", tr("Camera"), _SOURCES)
         self._serial = with_name(
-            QLineEdit(placeholderText="Serial number; any if empty"), "serial", "Serial number"
+            QLineEdit(placeholderText=tr("Serial number; any if empty")),
+            "serial",
+            tr("Serial number"),
         )
         self._realsense = RealSenseSettings()
         edit = button(
             "editRealSense",
-            "Settings…",
-            "Camera settings",
-            "Image size, preset, exposure, laser power and filters.",
+            tr("Settings…"),
+            tr("Camera settings"),
+            tr("Image size, preset, exposure, laser power and filters."),
         )
         camera = QWidget()
         fill_row(camera, self._serial, edit, grows=self._serial)
-        self._recording = PathField("Recording", "either", _PATTERN)
+        self._recording = PathField(tr("Recording"), "either", _PATTERN)
         details = QStackedWidget()
         for page in (QWidget(), camera, self._recording):  # in the order of _SOURCES
             details.addWidget(page)

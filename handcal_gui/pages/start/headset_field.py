@@ -9,10 +9,14 @@ from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from handcal.station.settings import HeadsetKind, StationSettings
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, fill_row, whole_number, with_name
 from handcal_gui.widgets.key_field import KeyField
 
-_HEADSETS: dict[HeadsetKind, str] = {"virtual": "Virtual headset", "network": "Network headset"}
+_HEADSETS: dict[HeadsetKind, str] = {
+    "virtual": tr("Virtual headset"),
+    "network": tr("Network headset"),
+}
 
 
 class HeadsetField(QWidget):
@@ -32,21 +36,21 @@ class HeadsetField(QWidget):
 
     def __init__(self, pairing_key: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._headset = choice("headset", "Headset", _HEADSETS)
+        self._headset = choice("headset", tr("Headset"), _HEADSETS)
         self._host = with_name(
             QLineEdit(),
             "host",
-            "Address to listen on",
-            "Address of this computer on which to listen for the headset; 0.0.0.0 for all.",
+            tr("Address to listen on"),
+            tr("Address of this computer on which to listen for the headset; 0.0.0.0 for all."),
         )
-        self._port = whole_number("port", 1, 65535, "UDP port that the headset connects to.")
+        self._port = whole_number("port", 1, 65535, tr("UDP port that the headset connects to."))
         self._address = QWidget()
-        address = (QLabel("at"), self._host, QLabel("port"), self._port)
+        address = (QLabel(tr("at")), self._host, QLabel(tr("port")), self._port)
         fill_row(self._address, *address, grows=self._host)
         self._key = KeyField()
         self._key.set_key(pairing_key)
         self._pairing = QWidget()
-        fill_row(self._pairing, QLabel("Pairing key"), self._key, grows=self._key)
+        fill_row(self._pairing, QLabel(tr("Pairing key")), self._key, grows=self._key)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX // 2)

@@ -17,6 +17,7 @@ from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, scrollable
 
@@ -55,25 +56,25 @@ class NewCalibration(Card):
 
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
-            "Start a calibration",
-            "These settings are kept for the next wearer.",
+            tr("Start a calibration"),
+            tr("These settings are kept for the next wearer."),
             "hand",
         )
         self.setObjectName("newCalibration")
         self._key = pairing_key
         self._starting: str | None = None
         self._is_opening = False
-        self._wearer = with_name(QComboBox(), "wearer", "Wearer's name or code")
+        self._wearer = with_name(QComboBox(), "wearer", tr("Wearer's name or code"))
         self._wearer.setLineEdit(
-            QLineEdit(placeholderText="Name or code", maxLength=MAX_WEARER_CHARACTERS)
+            QLineEdit(placeholderText=tr("Name or code"), maxLength=MAX_WEARER_CHARACTERS)
         )
         self._wearer.setEditable(True)
         self._wearer.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
         self._form = StationForm(self._wearer, preferences.station, pairing_key)
         self._problem = paragraph("startProblem")
-        self._button = main_button("start", "Start calibration")
+        self._button = main_button("start", tr("Start calibration"))
         self._button.setEnabled(False)
-        self._cancel = button("cancelOpening", "Cancel", help_text="Cancel the start (Esc)")
+        self._cancel = button("cancelOpening", tr("Cancel"), help_text=tr("Cancel the start (Esc)"))
         # Without focus, a second press of the key that started it does not cancel.
         self._cancel.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._cancel.hide()
@@ -150,7 +151,7 @@ class NewCalibration(Card):
         self._form.setEnabled(not is_opening)
         self._cancel.setVisible(is_opening)
         self._cancel.setEnabled(True)
-        self._problem.setText("Opening camera and headset…" if is_opening else "")
+        self._problem.setText(tr("Opening camera and headset…") if is_opening else "")
         if is_opening:
             self._button.setEnabled(False)
             self.setFocus()
@@ -194,7 +195,7 @@ class NewCalibration(Card):
             return  # outdated: an answer to the settings now shown will follow
         self._form.show_findings(findings)
         broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
-        self._problem.setText(f"Fix first: {', '.join(broken)}." if broken else "")
+        self._problem.setText(tr("Fix first: {}.").format(", ".join(broken)) if broken else "")
         self._button.setEnabled(is_ready(findings))
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
@@ -202,7 +203,7 @@ class NewCalibration(Card):
 
     def _cancel_opening(self) -> None:
         self._cancel.setEnabled(False)
-        self._problem.setText("Cancelling once camera and headset are open…")
+        self._problem.setText(tr("Cancelling once camera and headset are open…"))
         self.cancel_requested.emit()
 
     def _show_problem(self, why: str) -> None:

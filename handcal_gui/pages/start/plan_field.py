@@ -9,15 +9,20 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.station.settings import StationSettings
 from handcal.types import EYES, Eye, PlanName
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, fill_row
 
-_PLANS: dict[PlanName, str] = {"recommended": "Recommended", "paper": "As in the paper"}
-_PLAN_HELP = (
+_PLANS: dict[PlanName, str] = {"recommended": tr("Recommended"), "paper": tr("As in the paper")}
+_PLAN_HELP = tr(
     "Recommended: the hand is raised once; its cursors are placed where they tell most,\n"
     "and each eye is verified. The steps follow by themselves.\n"
     "As in the paper: each cursor is the hand where it is held; you choose the eyes in the guide."
 )
-_EYES: dict[str, str] = {"both": "Both eyes", "left": "Left eye only", "right": "Right eye only"}
+_EYES: dict[str, str] = {
+    "both": tr("Both eyes"),
+    "left": tr("Left eye only"),
+    "right": tr("Right eye only"),
+}
 _USABLE: dict[str, tuple[Eye, ...]] = {"both": EYES, "left": ("left",), "right": ("right",)}
 
 
@@ -33,8 +38,10 @@ class PlanField(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._plan = choice("plan", "Plan", _PLANS, _PLAN_HELP)
-        self._eyes = choice("usableEyes", "Eyes", _EYES, "One eye for a wearer who sees with one.")
+        self._plan = choice("plan", tr("Plan"), _PLANS, _PLAN_HELP)
+        self._eyes = choice(
+            "usableEyes", tr("Eyes"), _EYES, tr("One eye for a wearer who sees with one.")
+        )
         fill_row(self, self._plan, self._eyes, grows=self._eyes)
         self.setFocusProxy(self._plan)
         for field in (self._plan, self._eyes):

@@ -9,6 +9,7 @@ from pathlib import Path
 from handcal.errors import FileError
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
+from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.times import local_time
 
@@ -61,7 +62,9 @@ def _unfinished(session: UnfinishedSession) -> Entry:
         return Entry(session.path, text, is_enabled=False)
     text = _text(session.wearer, session.started, session.alignments, session.trials)
     if session.damaged:
-        text += f" · damaged: {pluralize(session.damaged, 'part')} left out"
+        text += tr(" · damaged: {} left out").format(
+            pluralize(session.damaged, tr("part"), tr("parts"))
+        )
     return Entry(session.path, text, wearer=session.wearer)
 
 
@@ -81,4 +84,4 @@ def _recent(path: Path) -> Entry | None:
 def _text(wearer: str, started: str, alignments: int, trials: int) -> str:
     held = ((alignments, "alignment"), (trials, "trial"))
     counts = ", ".join(pluralize(number, what) for number, what in held if number)
-    return " · ".join(filter(None, (wearer or "Without a name", local_time(started), counts)))
+    return " · ".join(filter(None, (wearer or tr("Without a name"), local_time(started), counts)))

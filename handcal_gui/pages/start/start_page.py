@@ -17,10 +17,14 @@ from handcal_gui.pages.start.session_entries import KnownSessions, find_sessions
 from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
+
+_LARGEST_PX = 1600, 1000
+"""Size beyond which a larger window leaves room around the page."""
 
 
 class StartPage(QWidget):
@@ -74,29 +78,35 @@ class StartPage(QWidget):
         self._folder = Path()
         self.new = NewCalibration(preferences, pairing_key, check)
         self._resume = Card(
-            "Resume", "These calibrations were interrupted. You can resume them.", "resume"
+            tr("Resume"), tr("These calibrations were interrupted. You can resume them."), "resume"
         )
         self._resume.setObjectName("resume")
         self._resume.hide()
-        self._unfinished = SessionList("Unfinished sessions", "Resume")
+        self._unfinished = SessionList(tr("Unfinished sessions"), tr("Resume"))
         self._resume.body.addWidget(self._unfinished)
-        self._open = Card("Open a session", "Review it, solve it again, export it.", "folder")
+        self._open = Card(
+            tr("Open a session"), tr("Review it, solve it again, export it."), "folder"
+        )
         self._open.setObjectName("open")
         self._opened = SessionList(
-            "Recent sessions", "Open", "Recent sessions will be listed here."
+            tr("Recent sessions"), tr("Open"), tr("Recent sessions will be listed here.")
         )
-        example = button("example", "Example", "Open the example session")
-        example.setToolTip("A simulated wearer's session, copied to the session folder")
-        browse = button("browse", "Choose folder…")
-        library = button("library", "All sessions…", "Search, compare, export and repair sessions")
+        example = button("example", tr("Example"), tr("Open the example session"))
+        example.setToolTip(tr("A simulated wearer's session, copied to the session folder"))
+        browse = button("browse", tr("Choose folder…"))
+        library = button(
+            "library", tr("All sessions…"), tr("Search, compare, export and repair sessions")
+        )
         for added in (browse, example):
             self._opened.add_button(added)
         self._open.body.addWidget(self._opened, 1)
         self._open.add_to_head(library)
         self._evaluate = Card(
-            "Evaluate", "Simulated studies, the cube test, and the user test.", "check"
+            tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "check"
         )
-        evaluate = button("evaluate", "Evaluate…", help_text="Measure the accuracy of calibrations")
+        evaluate = button(
+            "evaluate", tr("Evaluate…"), help_text=tr("Measure the accuracy of calibrations")
+        )
         self._evaluate.body.addWidget(evaluate, 0, Qt.AlignmentFlag.AlignRight)
         self._lay_out()
         self._find = LatestJob(lambda question: find_sessions(*question), self)
@@ -136,7 +146,7 @@ class StartPage(QWidget):
 
     def browse(self) -> None:
         """Let the user choose the folder of a session to open."""
-        folder = QFileDialog.getExistingDirectory(self, "Session folder", str(self._folder))
+        folder = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(self._folder))
         if folder:
             self.open_requested.emit(Path(folder))
 
@@ -176,12 +186,15 @@ class StartPage(QWidget):
         room_px = cards.minimumSizeHint().width() + right.verticalScrollBar().sizeHint().width()
         right.setMinimumWidth(room_px)
         right.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        grid = QGridLayout(self)
+        content = QWidget()
+        content.setMaximumSize(*_LARGEST_PX)
+        hbox(1, (content, 1000), 1, on=self, margins=0)
+        grid = QGridLayout(content)
         grid.setContentsMargins(*4 * (3 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)
-        hint = QLabel("Calibrate a see-through headset with the wearer's bare hand.")
+        hint = QLabel(tr("Calibrate a see-through headset with the wearer's bare hand."))
         grid.addLayout(hbox(title, hint, 0, spacing=2 * SPACING_PX), 0, 1, 1, 2)
         grid.addWidget(self.new, 1, 1)
         grid.addWidget(right, 1, 2)

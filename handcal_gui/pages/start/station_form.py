@@ -18,6 +18,7 @@ from handcal_gui.pages.start.camera_field import CameraField
 from handcal_gui.pages.start.headset_field import HeadsetField
 from handcal_gui.pages.start.plan_field import PlanField
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, fill_row
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
@@ -57,14 +58,16 @@ class StationForm(QWidget):
         self._settings = settings
         self._camera = CameraField()
         self._headset = HeadsetField(pairing_key)
-        self._rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "Example rig")
-        self._rig.setToolTip(
-            "The offline calibration of headset and camera; the virtual headset accepts any."
+        self._rig = PathField(
+            tr("Rig file"), "file", tr("Rig files (*.yaml *.yml)"), tr("Example rig")
         )
-        self._calibrate_rig = button("calibrateRig", "Calibrate…", "Calibrate a rig")
+        self._rig.setToolTip(
+            tr("The offline calibration of headset and camera; the virtual headset accepts any.")
+        )
+        self._calibrate_rig = button("calibrateRig", tr("Calibrate…"), tr("Calibrate a rig"))
         self._calibrate_rig.clicked.connect(self.rig_wanted)
-        self._sessions = PathField("Session folder", "folder")
-        self._sessions.setToolTip("Each calibration gets its own folder in this folder.")
+        self._sessions = PathField(tr("Session folder"), "folder")
+        self._sessions.setToolTip(tr("Each calibration gets its own folder in this folder."))
         self._plan = PlanField()
         self._advanced = AdvancedFields()
         self._parts = self._plan, self._camera, self._headset, self._advanced
@@ -105,7 +108,7 @@ class StationForm(QWidget):
             mend: Callable[[], object] = partial(self._change, changes)
             is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
             if part == "headset" and is_awaited and not fix:
-                fix, mend = "Connect…", self.connect_wanted.emit
+                fix, mend = tr("Connect…"), self.connect_wanted.emit
             self._findings[part].show_finding(finding, fix, mend)
 
     def _change(self, changes: Mapping[str, Any]) -> None:
@@ -125,8 +128,8 @@ class StationForm(QWidget):
         grid.setHorizontalSpacing(2 * SPACING_PX)
         grid.setVerticalSpacing(SPACING_PX // 2)
         grid.setColumnStretch(1, 1)
-        _add_row(grid, "Wearer", wearer)
-        _add_row(grid, "Plan", self._plan)
+        _add_row(grid, tr("Wearer"), wearer)
+        _add_row(grid, tr("Plan"), self._plan)
         grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
         for part, title in PARTS.items():
             _add_row(grid, title, fields[part])
@@ -150,11 +153,11 @@ def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, 
     is_broken = finding.health is Health.BROKEN
     is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
     if part == "camera" and is_broken:
-        return "Use the simulator", {"source": "simulator", "headset": "virtual"}
+        return tr("Use the simulator"), {"source": "simulator", "headset": "virtual"}
     if part == "headset" and is_simulated and not is_virtual:
-        return "Use the virtual headset", {"headset": "virtual"}
+        return tr("Use the virtual headset"), {"headset": "virtual"}
     if part == "headset" and is_virtual and not is_simulated:
-        return "Use a network headset", {"headset": "network"}
+        return tr("Use a network headset"), {"headset": "network"}
     if part == "rig" and is_broken and settings.rig:
-        return "Use the example", {"rig": ""}
+        return tr("Use the example"), {"rig": ""}
     return "", {}

@@ -20,14 +20,15 @@ from PySide6.QtWidgets import (
 from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.view import ButtonSpec, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import main_button, with_name
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
 _KEYS = {
-    _KEY: "Press the large button, except from a text field",
-    f"{_TEXT_KEY} Ctrl+Enter": "Press the large button from anywhere",
+    _KEY: tr("Press the large button, except from a text field"),
+    f"{_TEXT_KEY} Ctrl+Enter": tr("Press the large button from anywhere"),
 }
-_LONGEST_LABEL = "Confirm for the wearer"
+_LONGEST_LABEL = tr("Confirm for the wearer")
 _MOST_OTHERS = 3
 _ARMING_MS = 700
 """Delay before a new button can discard data: a click on its predecessor must not trigger it."""
@@ -56,7 +57,9 @@ class ActionBar(QWidget):
         self._released = (0, 0)  # key, and time in ms
         self._main = main_button("wizardMain")
         self._main.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._main.setToolTip(f"{_native(_KEY)}, or {_native(_TEXT_KEY)} from a text field")
+        self._main.setToolTip(
+            tr("{}, or {} from a text field").format(_native(_KEY), _native(_TEXT_KEY))
+        )
         self._key = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
         self._key.setObjectName("wizardMainKey")
         self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
@@ -144,7 +147,7 @@ class ActionBar(QWidget):
             self._arming.start()
         else:
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-            button.setToolTip(f"{letter}, or Return while this button has the focus")
+            button.setToolTip(tr("{}, or Return while this button has the focus").format(letter))
             button.setEnabled(spec.is_enabled)
 
     def _on_key(self) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from handcal.station.snapshot import Snapshot
-from handcal_gui.pages.wizard.view import Precondition
+from handcal_gui.pages.wizard.view import EYE_WORDS, Precondition
+from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
 
 
@@ -16,8 +17,8 @@ def still_check(snapshot: Snapshot) -> Precondition:
     """Return whether the hand is held still and can be placed in time, as a precondition."""
     seen = snapshot.observation
     if seen is not None and seen.needs_delay:
-        return Precondition("The wearer has looked slowly to the left and to the right", False)
-    return Precondition("Hand held still", is_steady(snapshot))
+        return Precondition(tr("The wearer has looked slowly to the left and to the right"), False)
+    return Precondition(tr("Hand held still"), is_steady(snapshot))
 
 
 def is_placed(snapshot: Snapshot) -> bool:
@@ -30,9 +31,9 @@ def hand_check(snapshot: Snapshot) -> Precondition:
     seen = snapshot.observation
     # A hand that is seen without a problem is placed with one of the next frames.
     if is_placed(snapshot) or (seen and seen.cloud is not None and not seen.problem):
-        return Precondition("Hand found", True)
+        return Precondition(tr("Hand found"), True)
     problem = seen.problem if seen is not None else ""
-    return Precondition(sentence(problem or "no hand in view"), False)
+    return Precondition(sentence(problem or tr("no hand in view")), False)
 
 
 def verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
@@ -42,7 +43,7 @@ def verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
         return ()
     return tuple(
         Precondition(
-            f"{eye.capitalize()} eye: {verdict.name}, {verdict.reason}",
+            tr("{} eye: {}, {}").format(EYE_WORDS[eye].capitalize(), verdict.name, verdict.reason),
             verdict.name == "accept",
             verdict.name,
         )

@@ -15,6 +15,7 @@ from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.panels.wearer_view.panel import origin_text
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.missing import missing_text
@@ -46,8 +47,8 @@ class GuidePicture(QWidget):
         self.step = Step.CONNECT
         self._has_camera = False
         self._frame: Frame | None = None
-        self._camera = ImageView("Guide camera")
-        self._eyes = {eye: EyeCanvas(f"Guide {EYE_NAMES[eye]}") for eye in EYES}
+        self._camera = ImageView(tr("Guide camera"))
+        self._eyes = {eye: EyeCanvas(tr("Guide {}").format(EYE_NAMES[eye])) for eye in EYES}
         self._titles = {eye: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for eye in EYES}
         self._columns = {eye: QWidget() for eye in EYES}
         for eye, column in self._columns.items():
@@ -115,16 +116,16 @@ class GuidePicture(QWidget):
                     overlay = HandOverlay(seen.cloud, depth_px, color_px, seen.is_over_limit)
                     outline = overlay.draw
             self._camera.show_overlay(outline)
-        self._camera.show_text(message="No image" if snapshot.camera.problem else "")
+        self._camera.show_text(message=tr("No image") if snapshot.camera.problem else "")
 
     def _show_eyes(self, snapshot: Snapshot, eyes: tuple[Eye, ...], *, is_result: bool) -> None:
         message = missing_text(snapshot)
         for eye, canvas in self._eyes.items():
             self._columns[eye].setVisible(eye in eyes)
             view, results = snapshot.views.get(eye), snapshot.procedure.results
-            canvas.show_view(view, message or ("" if view else "No hand"))
+            canvas.show_view(view, message or ("" if view else tr("No hand")))
             is_solved = results is not None and eye in results.eyes
-            when = (", before the calibration" if self._is_before else ", now") * is_result
+            when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
         self.result.setVisible(is_result)

@@ -16,7 +16,8 @@ from handcal_gui.pages.wizard.checks import (
     verdict_checks,
 )
 from handcal_gui.pages.wizard.steps import DISTANCE, UNUSABLE, Wizard, eye_names, nudge_view
-from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
+from handcal_gui.pages.wizard.view import EYE_WORDS, Action, ButtonSpec, Step, WizardView
+from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
 
 _STEPS = {
@@ -39,8 +40,8 @@ _STATES = {
 _FOLLOWS = Step.SHOW_HAND
 """The guide's own place while the plan goes on."""
 _CHECKS: dict[Eye, ButtonSpec] = {
-    "left": ButtonSpec(Action.CHECK_LEFT, "Check l&eft eye"),
-    "right": ButtonSpec(Action.CHECK_RIGHT, "Check &right eye"),
+    "left": ButtonSpec(Action.CHECK_LEFT, tr("Check l&eft eye")),
+    "right": ButtonSpec(Action.CHECK_RIGHT, tr("Check &right eye")),
 }
 
 
@@ -100,7 +101,7 @@ class PlannedWizard(Wizard):
             return self._saved(snapshot)
         if procedure.state is State.ALIGN:
             view = self._align(snapshot)
-            return replace(view, sentence=f"{view.sentence} The hand stays up.")
+            return replace(view, sentence=tr("{} The hand stays up.").format(view.sentence))
         if procedure.verifying is not None:
             return nudge_view(snapshot, procedure.verifying)
         planned = procedure.next_step
@@ -120,46 +121,47 @@ class PlannedWizard(Wizard):
         return self._raise(snapshot)
 
     def _raise(self, snapshot: Snapshot) -> WizardView:
-        others: tuple[ButtonSpec, ...] = (ButtonSpec(Action.BACK, "&Back"),)
+        others: tuple[ButtonSpec, ...] = (ButtonSpec(Action.BACK, tr("&Back")),)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
-            others += (ButtonSpec(Action.SOLVE, "Keep the alignments &so far"),)
+            others += (ButtonSpec(Action.SOLVE, tr("Keep the alignments &so far")),)
         return WizardView(
             Step.SHOW_HAND,
-            f"Raise one bare hand {DISTANCE}, palm toward you and fingers a little apart; hold it "
-            "still.",
+            tr(
+                "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
+            ).format(DISTANCE),
             (hand_check(snapshot), still_check(snapshot)),
-            ButtonSpec(Action.TAKE_STEP, "Next", False),
+            ButtonSpec(Action.TAKE_STEP, tr("Next"), False),
             others,
         )
 
     def _cursor(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         names = eye_names(planned.eyes)
-        text = f"Hold the hand still: it becomes the cursor for {names}."
+        text = tr("Hold the hand still: it becomes the cursor for {}.").format(names)
         if snapshot.procedure.alignments:
-            text = f"Keep the hand up: the next cursor, for {names}, follows at once."
+            text = tr("Keep the hand up: the next cursor, for {}, follows at once.").format(names)
         return WizardView(
             Step.MAKE_CURSOR,
             text,
             (hand_check(snapshot), still_check(snapshot)),
-            self._take_step("Make cursor", is_placed(snapshot)),
-            (ButtonSpec(Action.BACK, "&Back"),),
+            self._take_step(tr("Make cursor"), is_placed(snapshot)),
+            (ButtonSpec(Action.BACK, tr("&Back")),),
         )
 
     def _solved(self, step: Step, snapshot: Snapshot) -> WizardView:
         is_solved = snapshot.procedure.state is State.SOLVED
-        text = "Solve for the positions of the eyes; the hand stays up."
+        text = tr("Solve for the positions of the eyes; the hand stays up.")
         if is_solved:
-            text = "Send the corrected projections to the headset; the hand stays up."
+            text = tr("Send the corrected projections to the headset; the hand stays up.")
         redo = ButtonSpec(
             Action.REDO,
-            "&Discard and repeat",
-            discards="Deletes the last alignment; the session panel can restore it",
+            tr("&Discard and repeat"),
+            discards=tr("Deletes the last alignment; the session panel can restore it"),
         )
         return WizardView(
             step,
             text,
             verdict_checks(snapshot),
-            self._take_step("Send to the headset" if is_solved else "Solve", True),
+            self._take_step(tr("Send to the headset") if is_solved else tr("Solve"), True),
             (redo,) if snapshot.procedure.alignments else (),
             snapshot.problem,
         )
@@ -168,41 +170,43 @@ class PlannedWizard(Wizard):
         eye = planned.eyes[0]
         return WizardView(
             Step.VERIFY,
-            f"Keep the hand up and still, to measure the error of the {eye} eye.",
+            tr("Keep the hand up and still, to measure the error of the {} eye.").format(
+                EYE_WORDS[eye]
+            ),
             (hand_check(snapshot), still_check(snapshot), *verdict_checks(snapshot)),
-            self._take_step(f"Verify the {eye} eye", is_steady(snapshot)),
-            (ButtonSpec(Action.BACK, "&Back"),),
+            self._take_step(tr("Verify the {} eye").format(EYE_WORDS[eye]), is_steady(snapshot)),
+            (ButtonSpec(Action.BACK, tr("&Back")),),
         )
 
     def _wait(self, step: Step, snapshot: Snapshot) -> WizardView:
         planned = snapshot.procedure.next_step
-        text = "The hand stays up while the headset receives its projections."
+        text = tr("The hand stays up while the headset receives its projections.")
         is_refused = planned is not None and planned.name is StepName.WAIT
         if is_refused and planned is not None and snapshot.procedure.is_applied:
             text = f"{sentence(planned.text)}."
-        main = ButtonSpec(Action.TAKE_STEP, "Sending…", False)
-        back = (ButtonSpec(Action.BACK, "&Back"),)
+        main = ButtonSpec(Action.TAKE_STEP, tr("Sending…"), False)
+        back = (ButtonSpec(Action.BACK, tr("&Back")),)
         return WizardView(step, text, verdict_checks(snapshot), main, back, snapshot.problem)
 
     def _done(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         procedure, checks = snapshot.procedure, verdict_checks(snapshot)
-        main = ButtonSpec(Action.NEXT, "Finish as it is")
+        main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
         if any(check.verdict in UNUSABLE for check in checks):
-            text = "Do not use this result. Follow the advice below, then add alignments."
+            text = tr("Do not use this result. Follow the advice below, then add alignments.")
         elif any(check.verdict == "repeat" for check in checks) or not checks:
-            text = "Not accepted yet: add an alignment, or check an eye again."
+            text = tr("Not accepted yet: add an alignment, or check an eye again.")
         elif set(procedure.verifications) >= set(self.usable_eyes):
-            text = "The wearer has verified the result. Finish, or check an eye again."
-            main = ButtonSpec(Action.NEXT, "Finish")
+            text = tr("The wearer has verified the result. Finish, or check an eye again.")
+            main = ButtonSpec(Action.NEXT, tr("Finish"))
         else:
-            text = "Nobody has verified every eye. Finish, or check an eye again."
+            text = tr("Nobody has verified every eye. Finish, or check an eye again.")
         return WizardView(
             Step.VERIFY,
             text if checks else f"{sentence(planned.text)}.",
             checks,
             main,
             (
-                ButtonSpec(Action.ANOTHER, "&Add alignment"),
+                ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
                 *(_CHECKS[eye] for eye in self.usable_eyes),
             ),
             snapshot.problem,
@@ -213,7 +217,7 @@ class PlannedWizard(Wizard):
         view = replace(self._save(snapshot), fact=_drawn_otherwise(snapshot.procedure))
         if not snapshot.record.is_finished:
             return view
-        slipped = ButtonSpec(Action.SLIPPED, "Headset &slipped")
+        slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))
         return replace(view, others=(*view.others, slipped))
 
     def _take_step(self, label: str, can_do: bool) -> ButtonSpec:
@@ -229,4 +233,4 @@ def _drawn_otherwise(procedure: Procedure) -> str:
     solved_m = results.rendered_shift_m
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
-    return "The headset draws with another φ than this result: gone back, or set by hand."
+    return tr("The headset draws with another φ than this result: gone back, or set by hand.")

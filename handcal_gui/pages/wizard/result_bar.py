@@ -15,6 +15,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_card import ResultCard, result_text
@@ -40,13 +41,15 @@ class ResultBar(QWidget):
         self._target_arcmin = VerdictSettings().target_arcmin
         self._record: SessionRecord | None = None
         self._card = ResultCard()
-        self._blink = add_action(self, "Blink before/after", "", tooltip="Show both in turn")
+        self._blink = add_action(
+            self, tr("Blink before/after"), "", tooltip=tr("Show both in turn")
+        )
         self._blink.setCheckable(True)
         self._blink.toggled.connect(self.blink_toggled)
         actions = (
             self._blink,
-            add_action(self, "Copy", "", self.copy, tooltip="Copy the result as text"),
-            add_action(self, "Print…", "", self._ask_printer, tooltip="Print the result"),
+            add_action(self, tr("Copy"), "", self.copy, tooltip=tr("Copy the result as text")),
+            add_action(self, tr("Print…"), "", self._ask_printer, tooltip=tr("Print the result")),
         )
         self.buttons = QWidget()
         hbox(*map(_button, actions), on=self.buttons, margins=0, spacing=SPACING_PX)
@@ -88,10 +91,10 @@ class ResultBar(QWidget):
 
 def _head(record: SessionRecord) -> Mapping[str, str]:
     return {
-        "Wearer": record.wearer or "without a name",
-        "Started": local_time(record.events[0].time),
-        "Rig": record.rig.name,
-        "Session": record.path.name,
+        tr("Wearer"): record.wearer or tr("without a name"),
+        tr("Started"): local_time(record.events[0].time),
+        tr("Rig"): record.rig.name,
+        tr("Session"): record.path.name,
     }
 
 

@@ -18,24 +18,33 @@ from handcal_gui.pages.wizard.checks import (
     still_check,
     verdict_checks,
 )
-from handcal_gui.pages.wizard.view import STEPS, Action, ButtonSpec, Precondition, Step, WizardView
+from handcal_gui.pages.wizard.view import (
+    EYE_WORDS,
+    STEPS,
+    Action,
+    ButtonSpec,
+    Precondition,
+    Step,
+    WizardView,
+)
+from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
 PLANS: dict[EyePlan, str] = {
-    "each": "One eye after the other",
-    "both": "Both eyes at once",
-    "left": "Left eye only",
-    "right": "Right eye only",
+    "each": tr("One eye after the other"),
+    "both": tr("Both eyes at once"),
+    "left": tr("Left eye only"),
+    "right": tr("Right eye only"),
 }
-DISTANCE = "at forearm's length, 40 to 60 cm from the eyes"
+DISTANCE = tr("at forearm's length, 40 to 60 cm from the eyes")
 _LEAST_ALIGN_NS = 1_500_000_000
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
 _MOST_BY_ITSELF = 2
 """Most further alignments of an eye that are begun without asking."""
-_SENDS_UNUSABLE = "Draws with a result that should not be used"
+_SENDS_UNUSABLE = tr("Draws with a result that should not be used")
 
 
 def next_eyes(plan: EyePlan, alignments: Collection[Alignment]) -> tuple[Eye, ...]:
@@ -138,14 +147,18 @@ class Wizard:
         camera, link = snapshot.camera, snapshot.link
         checks = (
             Precondition(
-                "No image from the camera" if camera.problem else f"Camera: {camera.name}",
+                tr("No image from the camera")
+                if camera.problem
+                else tr("Camera: {}").format(camera.name),
                 not camera.problem and camera.rate_hz > 0,
             ),
-            Precondition(sentence(snapshot.link_problem) or "Headset connected", link.connected),
             Precondition(
-                f"Headset pose: {link.pose_rate_hz:.0f} Hz"
+                sentence(snapshot.link_problem) or tr("Headset connected"), link.connected
+            ),
+            Precondition(
+                tr("Headset pose: {:.0f} Hz").format(link.pose_rate_hz)
                 if link.pose_rate_hz
-                else "No pose from the headset yet",
+                else tr("No pose from the headset yet"),
                 link.pose_rate_hz > 0,
             ),
         )
@@ -154,20 +167,22 @@ class Wizard:
             checks = (Precondition(sentence(snapshot.contradiction), False), *checks[1:])
         return WizardView(
             Step.CONNECT,
-            "Put the headset on the wearer and wait until camera and headset are connected.",
+            tr("Put the headset on the wearer and wait until camera and headset are connected."),
             checks,
-            ButtonSpec(Action.NEXT, "Begin", is_ready),
+            ButtonSpec(Action.NEXT, tr("Begin"), is_ready),
         )
 
     def _show_hand(self, snapshot: Snapshot) -> WizardView:
-        back = ButtonSpec(Action.BACK, "&Back")
+        back = ButtonSpec(Action.BACK, tr("&Back"))
         if snapshot.procedure.state is State.SHOW_HAND and snapshot.procedure.alignments:
-            back = ButtonSpec(Action.SOLVE, "Keep the alignments &so far")
+            back = ButtonSpec(Action.SOLVE, tr("Keep the alignments &so far"))
         return WizardView(
             Step.SHOW_HAND,
-            f"Raise one bare hand {DISTANCE}, palm toward you and fingers a little apart.",
+            tr("Raise one bare hand {}, palm toward you and fingers a little apart.").format(
+                DISTANCE
+            ),
             (hand_check(snapshot),),
-            ButtonSpec(Action.NEXT, "Next", is_placed(snapshot)),
+            ButtonSpec(Action.NEXT, tr("Next"), is_placed(snapshot)),
             (back,),
             runs_after_s=_SHOWN_S,
         )
@@ -175,10 +190,12 @@ class Wizard:
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
         return WizardView(
             Step.MAKE_CURSOR,
-            f"Hold the hand still: it becomes the cursor for {eye_names(self.eyes(snapshot))}.",
+            tr("Hold the hand still: it becomes the cursor for {}.").format(
+                eye_names(self.eyes(snapshot))
+            ),
             (hand_check(snapshot), still_check(snapshot)),
-            ButtonSpec(Action.MAKE_CURSOR, "Make cursor", is_steady(snapshot)),
-            (ButtonSpec(Action.BACK, "&Back"),),
+            ButtonSpec(Action.MAKE_CURSOR, tr("Make cursor"), is_steady(snapshot)),
+            (ButtonSpec(Action.BACK, tr("&Back")),),
             runs_after_s=_STILL_S,
         )
 
@@ -186,61 +203,79 @@ class Wizard:
         procedure, seen = snapshot.procedure, snapshot.observation
         hand = hand_check(snapshot)
         is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
-        limit_deg = np.degrees(procedure.guard_limit_rad)
+        limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
         cursor = procedure.cursor
         # A second press of the key that made the cursor must not confirm a hand that has not moved.
         is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_ALIGN_NS
         close = ""
         if len(procedure.eyes) == 1:
-            close = f"Close the {'right' if procedure.eyes[0] == 'left' else 'left'} eye. "
+            close = tr("Close the {} eye. ").format(
+                EYE_WORDS["right" if procedure.eyes[0] == "left" else "left"]
+            )
         return WizardView(
             Step.ALIGN,
-            f"{close}Move the hand until it lies under the cursor, then confirm in the headset.",
-            (hand, Precondition(f"Hand rotated by less than {limit_deg:.0f}°", is_straight)),
-            ButtonSpec(Action.CONFIRM, "Confirm for the wearer", is_placed(snapshot) and is_due),
-            (ButtonSpec(Action.REDO, "&Make another cursor", discards="Discards this cursor"),),
+            tr(
+                "{}Move the hand until it lies under the cursor, then confirm in the headset."
+            ).format(close),
+            (
+                hand,
+                Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
+            ),
+            ButtonSpec(
+                Action.CONFIRM, tr("Confirm for the wearer"), is_placed(snapshot) and is_due
+            ),
+            (
+                ButtonSpec(
+                    Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")
+                ),
+            ),
             procedure.refusal,
         )
 
     def _solve(self, snapshot: Snapshot) -> WizardView:
         procedure = snapshot.procedure
         count = len(snapshot.procedure.alignments)
-        aligned = Precondition(f"{pluralize(count, 'alignment')} confirmed", True)
+        aligned = Precondition(
+            tr("{} confirmed").format(pluralize(count, tr("alignment"), tr("alignments"))), True
+        )
         redo = ButtonSpec(
             Action.REDO,
-            "&Discard and repeat",
-            discards="Deletes the last alignment; the session panel can restore it",
+            tr("&Discard and repeat"),
+            discards=tr("Deletes the last alignment; the session panel can restore it"),
         )
         if procedure.state is State.ALIGNED or procedure.results is None:
             return WizardView(
                 Step.SOLVE,
-                "The wearer may lower the hand. Solve for the positions of the eyes.",
+                tr("The wearer may lower the hand. Solve for the positions of the eyes."),
                 (aligned,),
-                ButtonSpec(Action.SOLVE, "Solve"),
+                ButtonSpec(Action.SOLVE, tr("Solve")),
                 (redo,),
                 runs_after_s=_SHOWN_S,
             )
         verdicts = verdict_checks(snapshot)
         if procedure.state is State.APPLYING:
-            wait = "Waiting for the headset to acknowledge its projections."
+            wait = tr("Waiting for the headset to acknowledge its projections.")
             return WizardView(
-                Step.SOLVE, wait, (aligned, *verdicts), ButtonSpec(Action.APPLY, "Sending…", False)
+                Step.SOLVE,
+                wait,
+                (aligned, *verdicts),
+                ButtonSpec(Action.APPLY, tr("Sending…"), False),
             )
         names = {eye: verdict.name for eye, verdict in procedure.results.verdicts.items()}
         others: tuple[ButtonSpec, ...] = (redo,)
-        send = ButtonSpec(Action.APPLY, "Send to the headset")
-        instruction = "Send the corrected projections to the headset."
+        send = ButtonSpec(Action.APPLY, tr("Send to the headset"))
+        instruction = tr("Send the corrected projections to the headset.")
         kept = tuple(eye for eye, name in names.items() if name == "keep")
         if UNUSABLE.intersection(names.values()):
-            instruction = "Do not use this result. Follow the advice below, then repeat."
-            send = ButtonSpec(Action.APPLY, "Send to the headset", False)
-            others += (ButtonSpec(Action.APPLY, "Send &anyway", discards=_SENDS_UNUSABLE),)
+            instruction = tr("Do not use this result. Follow the advice below, then repeat.")
+            send = ButtonSpec(Action.APPLY, tr("Send to the headset"), False)
+            others += (ButtonSpec(Action.APPLY, tr("Send &anyway"), discards=_SENDS_UNUSABLE),)
         elif len(kept) == len(names):
-            instruction = f"Keep the offline calibration of {eye_names(kept)}."
-            send = ButtonSpec(Action.APPLY, "Keep offline")
+            instruction = tr("Keep the offline calibration of {}.").format(eye_names(kept))
+            send = ButtonSpec(Action.APPLY, tr("Keep offline"))
         elif kept:
-            instruction = (
-                f"Send the projections to the headset, those of {eye_names(kept)} offline."
+            instruction = tr("Send the projections to the headset, those of {} offline.").format(
+                eye_names(kept)
             )
         return WizardView(
             Step.SOLVE,
@@ -255,42 +290,48 @@ class Wizard:
     def _verify(self, snapshot: Snapshot) -> WizardView:
         checks = verdict_checks(snapshot)
         if snapshot.procedure.state is State.APPLYING:
-            wait = "Waiting for the headset to acknowledge its projections."
-            sending = ButtonSpec(Action.APPLY, "Sending…", False)
+            wait = tr("Waiting for the headset to acknowledge its projections.")
+            sending = ButtonSpec(Action.APPLY, tr("Sending…"), False)
             return WizardView(Step.VERIFY, wait, checks, sending)
         if snapshot.procedure.verifying is not None:
             return nudge_view(snapshot, snapshot.procedure.verifying)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return WizardView(
                 Step.VERIFY,
-                "The alignments have changed. Solve again.",
+                tr("The alignments have changed. Solve again."),
                 checks,
-                ButtonSpec(Action.SOLVE, "Solve"),
-                (ButtonSpec(Action.ANOTHER, "&Add alignment"),),
+                ButtonSpec(Action.SOLVE, tr("Solve")),
+                (ButtonSpec(Action.ANOTHER, tr("&Add alignment")),),
             )
         if not self._is_complete(snapshot):
             eyes = eye_names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
-                f"Now repeat this with {eyes}.",
+                tr("Now repeat this with {}.").format(eyes),
                 checks,
-                ButtonSpec(Action.ANOTHER, f"Align {eyes}"),
-                (ButtonSpec(Action.NEXT, "Finish with &one eye"),),
+                ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
+                (ButtonSpec(Action.NEXT, tr("Finish with &one eye")),),
                 runs_after_s=_READ_S,
             )
         each = (
-            ButtonSpec(Action.REPEAT_LEFT, "Add l&eft eye"),
-            ButtonSpec(Action.REPEAT_RIGHT, "Add &right eye"),
+            ButtonSpec(Action.REPEAT_LEFT, tr("Add l&eft eye")),
+            ButtonSpec(Action.REPEAT_RIGHT, tr("Add &right eye")),
         )
         is_usable = not any(check.verdict in UNUSABLE for check in checks)
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
             return WizardView(
                 Step.VERIFY,
-                f"Raise the hand and hold it still, to measure the error of the {eye} eye.",
+                tr("Raise the hand and hold it still, to measure the error of the {} eye.").format(
+                    EYE_WORDS[eye]
+                ),
                 (hand_check(snapshot), still_check(snapshot), *checks),
-                ButtonSpec(Action.VERIFY, f"Verify the {eye} eye", is_steady(snapshot)),
-                (ButtonSpec(Action.SKIP, "&Skip"), *each),
+                ButtonSpec(
+                    Action.VERIFY,
+                    tr("Verify the {} eye").format(EYE_WORDS[eye]),
+                    is_steady(snapshot),
+                ),
+                (ButtonSpec(Action.SKIP, tr("&Skip")), *each),
                 runs_after_s=_STILL_S,
             )
         if advice := _advice(snapshot):
@@ -298,60 +339,66 @@ class Wizard:
             few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
             return WizardView(
                 Step.VERIFY,
-                f"Not accepted yet: align {eyes} again, or keep the result as it is.",
+                tr("Not accepted yet: align {} again, or keep the result as it is.").format(eyes),
                 checks,
-                ButtonSpec(Action.ANOTHER, f"Add {eyes}"),
-                (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
+                ButtonSpec(Action.ANOTHER, tr("Add {}").format(eyes)),
+                (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
                 runs_after_s=_ADVICE_S if few else None,
             )
         if not is_usable:
             return WizardView(
                 Step.VERIFY,
-                "Do not use this result. Follow the advice below, then add alignments.",
+                tr("Do not use this result. Follow the advice below, then add alignments."),
                 checks,
-                ButtonSpec(Action.ANOTHER, "Add alignment"),
-                (ButtonSpec(Action.NEXT, "Keep as it &is"), *each),
+                ButtonSpec(Action.ANOTHER, tr("Add alignment")),
+                (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
             )
         if not self._skipped:
             return WizardView(
                 Step.VERIFY,
-                "The wearer has verified the result. Finish, or add an alignment.",
+                tr("The wearer has verified the result. Finish, or add an alignment."),
                 checks,
-                ButtonSpec(Action.NEXT, "Finish"),
-                (ButtonSpec(Action.ANOTHER, "&Add alignment"), *each),
+                ButtonSpec(Action.NEXT, tr("Finish")),
+                (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),
             )
         return WizardView(
             Step.VERIFY,
-            "The wearer looks at the raised hand: the outline should lie on it. If it does not, "
-            "add an alignment or fine-tune φ.",
+            tr(
+                "The wearer looks at the raised hand: the outline should lie on it. If it "
+                "does not, "
+                "add an alignment or fine-tune φ."
+            ),
             checks,
-            ButtonSpec(Action.NEXT, "It fits"),
-            (ButtonSpec(Action.ANOTHER, "&Add alignment"), *each),
+            ButtonSpec(Action.NEXT, tr("It fits")),
+            (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),
         )
 
     def _save(self, snapshot: Snapshot) -> WizardView:
         checks = (
-            Precondition(f"Saved in {snapshot.session_path}", not snapshot.problem),
+            Precondition(tr("Saved in {}").format(snapshot.session_path), not snapshot.problem),
             *verdict_checks(snapshot),
         )
-        others = (ButtonSpec(Action.EXPORT, "E&xport…"), ButtonSpec(Action.BACK, "&Back"))
+        others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
         is_accepted = len(checks) > 1 and all(check.holds for check in checks[1:])
         is_verified = is_accepted and len(snapshot.procedure.verifications) == len(checks) - 1
         unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
         if snapshot.record.is_finished:
             return WizardView(
                 Step.SAVE,
-                "The session is complete. Take the headset off, or continue with the next wearer.",
+                tr(
+                    "The session is complete. Take the headset off, or continue with the "
+                    "next wearer."
+                ),
                 checks,
-                ButtonSpec(Action.NEXT_WEARER, "Next wearer"),
+                ButtonSpec(Action.NEXT_WEARER, tr("Next wearer")),
                 others,
                 unearned=unearned,
             )
         return WizardView(
             Step.SAVE,
-            "Everything is already saved. Finish the session when you are done.",
+            tr("Everything is already saved. Finish the session when you are done."),
             checks,
-            ButtonSpec(Action.FINISH, "Finish session"),
+            ButtonSpec(Action.FINISH, tr("Finish session")),
             others,
             snapshot.problem,
             runs_after_s=None if snapshot.problem else _READ_S,
@@ -389,26 +436,35 @@ def _advice(snapshot: Snapshot) -> Advice | None:
 def nudge_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
     """Return the view while an eye's outline is moved until it covers the hand."""
     eye, moved = verifying.eye, verifying.moved
-    other = "right" if eye == "left" else "left"
-    across, along = ("right", "left")[moved.right_arcmin < 0], ("down", "up")[moved.down_arcmin < 0]
+    other: Eye = "right" if eye == "left" else "left"
+    across = EYE_WORDS["left" if moved.right_arcmin < 0 else "right"]
+    along = tr("up") if moved.down_arcmin < 0 else tr("down")
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
     return WizardView(
         Step.VERIFY,
-        f"Close the {other} eye. Arrow keys move the outline, + and − change its size, until it "
-        "covers the hand.",
+        tr(
+            "Close the {} eye. Arrow keys move the outline, + and − change its size, "
+            "until it covers the hand."
+        ).format(EYE_WORDS[other]),
         (hand_check(snapshot), still_check(snapshot)),
-        ButtonSpec(Action.VERIFIED, "It covers the hand", is_steady(snapshot)),
+        ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot)),
         (
-            ButtonSpec(Action.UNDO_NUDGE, "&Undo", verifying.can_undo),
-            ButtonSpec(Action.SKIP, "&Skip"),
+            ButtonSpec(Action.UNDO_NUDGE, tr("&Undo"), verifying.can_undo),
+            ButtonSpec(Action.SKIP, tr("&Skip")),
         ),
         snapshot.procedure.refusal,
-        fact=f"{eye.capitalize()} eye moved by {total_arcmin:.1f}′: "
-        f"{abs(moved.right_arcmin):.1f}′ {across}, {abs(moved.down_arcmin):.1f}′ {along}, "
-        f"size {100 * moved.size:+.1f} %",
+        fact=tr("{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %").format(
+            EYE_WORDS[eye].capitalize(),
+            total_arcmin,
+            abs(moved.right_arcmin),
+            across,
+            abs(moved.down_arcmin),
+            along,
+            100 * moved.size,
+        ),
     )
 
 
 def eye_names(eyes: Sequence[Eye]) -> str:
     """Return eyes in words."""
-    return "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
+    return tr("both eyes") if len(eyes) == 2 else tr("the {} eye").format(EYE_WORDS[eyes[0]])

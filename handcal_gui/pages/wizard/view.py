@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from handcal.types import VerdictName
+from handcal.types import Eye, VerdictName
+from handcal_gui.translation import tr
+
+EYE_WORDS: dict[Eye, str] = {"left": tr("left"), "right": tr("right")}
+"""The eyes within a sentence."""
 
 
 class Step(StrEnum):
-    """The steps, in order; the value is the title."""
+    """The steps, in order."""
 
     CONNECT = "Connect"
     SHOW_HAND = "Show hand"
@@ -19,7 +23,21 @@ class Step(StrEnum):
     VERIFY = "Verify"
     SAVE = "Save"
 
+    @property
+    def label(self) -> str:
+        """The step in the user's language."""
+        return _TITLES[self]
 
+
+_TITLES = {
+    Step.CONNECT: tr("Connect"),
+    Step.SHOW_HAND: tr("Show hand"),
+    Step.MAKE_CURSOR: tr("Make cursor"),
+    Step.ALIGN: tr("Align"),
+    Step.SOLVE: tr("Solve"),
+    Step.VERIFY: tr("Verify"),
+    Step.SAVE: tr("Save"),
+}
 STEPS = tuple(Step)
 
 

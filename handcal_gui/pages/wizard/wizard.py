@@ -26,6 +26,7 @@ from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, Step, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
@@ -37,21 +38,21 @@ _SENTENCE_SCALE, _CHECK_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
-    ("Move the outline left", "Left"): (-_ARCMIN, 0.0, 0.0),
-    ("Move the outline right", "Right"): (_ARCMIN, 0.0, 0.0),
-    ("Move the outline up", "Up"): (0.0, -_ARCMIN, 0.0),
-    ("Move the outline down", "Down"): (0.0, _ARCMIN, 0.0),
-    ("Move the outline far left", "Shift+Left"): (-_FAR_ARCMIN, 0.0, 0.0),
-    ("Move the outline far right", "Shift+Right"): (_FAR_ARCMIN, 0.0, 0.0),
-    ("Move the outline far up", "Shift+Up"): (0.0, -_FAR_ARCMIN, 0.0),
-    ("Move the outline far down", "Shift+Down"): (0.0, _FAR_ARCMIN, 0.0),
-    ("Make the outline larger", "+ ="): (0.0, 0.0, _GROWTH),
-    ("Make the outline smaller", "-"): (0.0, 0.0, -_GROWTH),
+    (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
+    (tr("Move the outline right"), "Right"): (_ARCMIN, 0.0, 0.0),
+    (tr("Move the outline up"), "Up"): (0.0, -_ARCMIN, 0.0),
+    (tr("Move the outline down"), "Down"): (0.0, _ARCMIN, 0.0),
+    (tr("Move the outline far left"), "Shift+Left"): (-_FAR_ARCMIN, 0.0, 0.0),
+    (tr("Move the outline far right"), "Shift+Right"): (_FAR_ARCMIN, 0.0, 0.0),
+    (tr("Move the outline far up"), "Shift+Up"): (0.0, -_FAR_ARCMIN, 0.0),
+    (tr("Move the outline far down"), "Shift+Down"): (0.0, _FAR_ARCMIN, 0.0),
+    (tr("Make the outline larger"), "+ ="): (0.0, 0.0, _GROWTH),
+    (tr("Make the outline smaller"), "-"): (0.0, 0.0, -_GROWTH),
 }
 """Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
 _GO_BACK = {
-    "former": ("Draw with φ before the newest, or with the newest again", "G"),
-    "offline": ("Draw with the offline calibration", "Shift+G"),
+    "former": (tr("Draw with φ before the newest, or with the newest again"), "G"),
+    "offline": (tr("Draw with the offline calibration"), "Shift+G"),
 }
 """Name and key of each φ that the headset can go back to."""
 
@@ -159,10 +160,13 @@ class WizardPanel(QWidget):
 
     def _hold_action(self) -> QAction:
         hold = add_action(
-            self, "Hold", "H", tooltip="Hold: no step runs by itself, each waits for you (H)"
+            self,
+            tr("Hold"),
+            "H",
+            tooltip=tr("Hold: no step runs by itself, each waits for you (H)"),
         )
         hold.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        hold.setWhatsThis("Hold the steps that run by themselves, or let them run")
+        hold.setWhatsThis(tr("Hold the steps that run by themselves, or let them run"))
         hold.setCheckable(True)
         hold.triggered.connect(self._choose_hold)
         return hold
@@ -218,11 +222,15 @@ class WizardPanel(QWidget):
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._plan.addItems(list(PLANS.values()))
         self._plan.setToolTip(
-            "One eye after the other measures the position of each eye and takes two alignments.\n"
-            "Both eyes at once is quicker, but cannot measure an eye distance that differs from "
-            "the rig's."
+            tr(
+                "One eye after the other measures the position of each eye and takes two "
+                "alignments.\n"
+                "Both eyes at once is quicker, but cannot measure an eye distance that "
+                "differs from "
+                "the rig's."
+            )
         )
-        plan_label = QLabel("E&yes")
+        plan_label = QLabel(tr("E&yes"))
         plan_label.setBuddy(self._plan)
         hold = tool_button()
         hold.setDefaultAction(self._hold)
@@ -232,7 +240,7 @@ class WizardPanel(QWidget):
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
-        self._ring.setToolTip("Alignments made; the ring fills until a step runs by itself")
+        self._ring.setToolTip(tr("Alignments made; the ring fills until a step runs by itself"))
         texts = vbox(
             self._sentence, *self._checks, self._fact, self._note, 0, spacing=SPACING_PX // 2
         )
@@ -245,7 +253,7 @@ class WizardPanel(QWidget):
         if view is None:
             return
         self._rail.show_step(view.step, view.unearned)
-        self._title.setText(view.step.value)
+        self._title.setText(view.step.label)
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
         has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
@@ -297,9 +305,9 @@ class _Rail(QWidget):
             mark, color = ("✓ ", colors().good) if i < place else ("", colors().muted)
             if step in unearned:
                 mark, color = "– ", colors().warning
-            label.setText(f"{mark}{step.value}")
+            label.setText(f"{mark}{step.label}")
             if step is present:
-                label.setText(f"▸ {step.value}")
+                label.setText(f"▸ {step.label}")
                 color = self.palette().windowText().color().name()
             weight = "bold" if step is present else "normal"
             label.setStyleSheet(f"color: {color}; font-weight: {weight}")
@@ -319,7 +327,7 @@ class _CheckRow(QWidget):
         self.setVisible(check is not None)
         if check is None:
             return
-        name, word = ("check", "Yes") if check.holds else ("wait", "Not yet")
+        name, word = ("check", tr("Yes")) if check.holds else ("wait", tr("Not yet"))
         shade = colors().good if check.holds else colors().muted
         if check.verdict is not None:
             name, word = VERDICT_ICONS[check.verdict], check.verdict.capitalize()

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.types import Float64, UInt8, UInt16
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 
 NEAREST_M, FARTHEST_M = 0.2, 1.0
 _HOLE = (10, 10, 12)
@@ -75,7 +76,7 @@ class DepthLegend(QWidget):
         super().__init__(parent)
         self._colors: DepthColors | None = None
         self.setObjectName("depth-legend")
-        self.setAccessibleName("Scale of depth")
+        self.setAccessibleName(tr("Scale of depth"))
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         width_px = self.fontMetrics().horizontalAdvance("0.00 m")
         self.setFixedWidth(_BAR_PX + SPACING_PX + width_px)
@@ -85,8 +86,10 @@ class DepthLegend(QWidget):
         self._colors = depth_colors
         low_m, high_m = depth_colors.gate_m
         self.setToolTip(
-            f"Depth in metres. The hand is searched from {low_m:.2f} to {high_m:.2f} m (colour). "
-            "Grey: nearer or farther. Black: not measured."
+            tr(
+                "Depth in metres. The hand is searched from {:.2f} to {:.2f} m (colour). "
+                "Grey: nearer or farther. Black: not measured."
+            ).format(low_m, high_m)
         )
         self.update()
 

@@ -28,22 +28,23 @@ from handcal.types import Frame
 from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.sentence import sentence
 
-_EMPTY = "The camera image will appear here. Choose a camera on the start page."
-_NO_COLOR = "This camera has no colour image."
+_EMPTY = tr("The camera image will appear here. Choose a camera on the start page.")
+_NO_COLOR = tr("This camera has no colour image.")
 
 
 class Mode(StrEnum):
     """The images that are shown."""
 
-    COLOR = "Colour"
-    DEPTH = "Depth"
-    BOTH = "Both"
+    COLOR = tr("Colour")
+    DEPTH = tr("Depth")
+    BOTH = tr("Both")
 
 
 class CameraPanel(QWidget):
@@ -61,15 +62,15 @@ class CameraPanel(QWidget):
         self._caption = ""
         self._pictures = _Pictures()
         self._status = _Status()
-        self._freeze = QAction("Freeze", self, checkable=True, autoRepeat=False)
-        self._freeze.setToolTip("Freeze the image (F)")
+        self._freeze = QAction(tr("Freeze"), self, checkable=True, autoRepeat=False)
+        self._freeze.setToolTip(tr("Freeze the image (F)"))
         self._freeze.setShortcut("F")
         self._mode = QComboBox()
-        self._mode.setAccessibleName("Displayed image")
-        self._mode.setToolTip("Show the colour image, the depth image or both")
+        self._mode.setAccessibleName(tr("Displayed image"))
+        self._mode.setToolTip(tr("Show the colour image, the depth image or both"))
         self._mode.addItems(list(Mode))
         self._mode.currentTextChanged.connect(lambda text: self._pictures.set_mode(Mode(text)))
-        save = QAction("Save image…", self)
+        save = QAction(tr("Save image…"), self)
         save.triggered.connect(self._ask_where_to_save)
         self.addAction(save)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
@@ -93,8 +94,8 @@ class CameraPanel(QWidget):
         """Show the newest frame, unless frozen, and the state of the camera."""
         if not self._freeze.isChecked() and snapshot.frame is not None:
             self._show_frame(snapshot.frame, snapshot.observation)
-        message = "No image" if snapshot.camera.problem else "" if self._frame else _EMPTY
-        caption = "Frozen" if self._freeze.isChecked() else self._caption
+        message = tr("No image") if snapshot.camera.problem else "" if self._frame else _EMPTY
+        caption = tr("Frozen") if self._freeze.isChecked() else self._caption
         self._pictures.show_text(message=message, caption="" if message else caption)
         age_ms = (snapshot.t_host_ns - self._frame.t_host_ns) / 1e6 if self._frame else None
         self._status.show_status(snapshot.camera, age_ms)
@@ -128,12 +129,14 @@ class CameraPanel(QWidget):
             self._caption = _caption(seen)
 
     def _ask_where_to_save(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Save image", "image.png", "PNG images (*.png)")
+        name, _ = QFileDialog.getSaveFileName(
+            self, tr("Save image"), "image.png", tr("PNG images (*.png)")
+        )
         if name:
             try:
                 self.save_picture(Path(name).with_suffix(".png"))
             except FileError as error:
-                QMessageBox.warning(self, "Save image", str(error))
+                QMessageBox.warning(self, tr("Save image"), str(error))
 
 
 class _Pictures(QWidget):
@@ -141,8 +144,8 @@ class _Pictures(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._color = ImageView("Colour image")
-        self._depth = ImageView("Depth image", lambda depth: self._depth_colors.colorize(depth))
+        self._color = ImageView(tr("Colour image"))
+        self._depth = ImageView(tr("Depth image"), lambda depth: self._depth_colors.colorize(depth))
         self._legend = DepthLegend()
         self._depth_side = QWidget()
         hbox(
@@ -207,21 +210,23 @@ class _Status(QWidget):
         self._name.setObjectName("camera-name")
         self._name.setWordWrap(True)
         self._rate = NumberLabel(
-            "camera-rate", "999.9 fps", "Frames per second over the last second"
+            "camera-rate", "999.9 fps", tr("Frames per second over the last second")
         )
         self._age = NumberLabel(
-            "camera-age", "9999.9 ms", "Time since the displayed frame arrived, in milliseconds"
+            "camera-age", "9999.9 ms", tr("Time since the displayed frame arrived, in milliseconds")
         )
         self._dropped = NumberLabel(
-            "camera-dropped", "99999", "Frames missing from the camera's own count since it started"
+            "camera-dropped",
+            "99999",
+            tr("Frames missing from the camera's own count since it started"),
         )
         row = hbox(
             self._rate,
             0,
-            QLabel("Age"),
+            QLabel(tr("Age")),
             self._age,
             0,
-            QLabel("Dropped"),
+            QLabel(tr("Dropped")),
             self._dropped,
             spacing=SPACING_PX // 2,
         )
@@ -246,5 +251,7 @@ def _caption(seen: Observation) -> str:
     if seen.has_changed:
         return sentence(seen.shape_text)
     if seen.is_over_limit and seen.rotation_rad is not None:
-        return f"Rotated by {np.degrees(np.linalg.norm(seen.rotation_rad)):.1f}°: too far"
+        return tr("Rotated by {:.1f}°: too far").format(
+            np.degrees(np.linalg.norm(seen.rotation_rad))
+        )
     return sentence(seen.problem)

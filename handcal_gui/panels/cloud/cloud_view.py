@@ -26,6 +26,7 @@ from handcal_gui.keys import add_action
 from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.panels.cloud.orbit import Direction, Orbit
 from handcal_gui.theme import SPACING_PX, colors, number_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.splat import rgb, splat
 
 _RAD_PER_PX = 0.01
@@ -45,10 +46,12 @@ class CloudView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("cloud-view")
-        self.setAccessibleName("3D view of the hand cloud")
+        self.setAccessibleName(tr("3D view of the hand cloud"))
         self.setToolTip(
-            "Drag to rotate, drag with the right or middle button to move, scroll to zoom, "
-            "double-click to reset the view. Keys: arrows, +, −, 1, 2, 3 and R."
+            tr(
+                "Drag to rotate, drag with the right or middle button to move, scroll to zoom, "
+                "double-click to reset the view. Keys: arrows, +, −, 1, 2, 3 and R."
+            )
         )
         self.setMinimumSize(160, 120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -147,16 +150,16 @@ class CloudView(QWidget):
         """Rotate by arrow keys, zoom by + and −, select a direction by 1, 2, 3 and R."""
         turn, zoom = _KEY_TURN_RAD, _ZOOM_PER_NOTCH
         for text, keys, do in (
-            ("Rotate left", "Left", lambda: self._turn(turn, 0.0)),
-            ("Rotate right", "Right", lambda: self._turn(-turn, 0.0)),
-            ("Rotate up", "Up", lambda: self._turn(0.0, -turn)),
-            ("Rotate down", "Down", lambda: self._turn(0.0, turn)),
-            ("Zoom in", "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
-            ("Zoom out", "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
-            ("Front", "1", lambda: self.look(Direction.FRONT)),
-            ("Side", "2", lambda: self.look(Direction.SIDE)),
-            ("Top", "3", lambda: self.look(Direction.TOP)),
-            ("Reset", "R", lambda: self.look(Direction.ASLANT)),
+            (tr("Rotate left"), "Left", lambda: self._turn(turn, 0.0)),
+            (tr("Rotate right"), "Right", lambda: self._turn(-turn, 0.0)),
+            (tr("Rotate up"), "Up", lambda: self._turn(0.0, -turn)),
+            (tr("Rotate down"), "Down", lambda: self._turn(0.0, turn)),
+            (tr("Zoom in"), "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
+            (tr("Zoom out"), "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
+            (tr("Front"), "1", lambda: self.look(Direction.FRONT)),
+            (tr("Side"), "2", lambda: self.look(Direction.SIDE)),
+            (tr("Top"), "3", lambda: self.look(Direction.TOP)),
+            (tr("Reset"), "R", lambda: self.look(Direction.ASLANT)),
         ):
             add_action(self, text, keys, do, context=Qt.ShortcutContext.WidgetShortcut)
 

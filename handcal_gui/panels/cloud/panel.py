@@ -16,6 +16,7 @@ from handcal.types import Alignment, Float64, UInt8
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.orbit import Direction
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.missing import missing_text
@@ -23,15 +24,15 @@ from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
 
-_EMPTY = "The hand cloud will appear here. Hold a hand in front of the depth camera."
-_FROM_CAMERA = "mm from the depth camera"
-_FROM_CURSOR = "mm from the centre of the cursor"
-_TURNED = "The live hand is rotated too far"
+_EMPTY = tr("The hand cloud will appear here. Hold a hand in front of the depth camera.")
+_FROM_CAMERA = tr("mm from the depth camera")
+_FROM_CURSOR = tr("mm from the centre of the cursor")
+_TURNED = tr("The live hand is rotated too far")
 _DIRECTIONS = {
-    "Front": (Direction.FRONT, "As the wearer sees it (1)"),
-    "Side": (Direction.SIDE, "From the wearer's right (2)"),
-    "Top": (Direction.TOP, "From above (3)"),
-    "Reset": (Direction.ASLANT, "Oblique view of the whole scene (R, or double-click)"),
+    tr("Front"): (Direction.FRONT, tr("As the wearer sees it (1)")),
+    tr("Side"): (Direction.SIDE, tr("From the wearer's right (2)")),
+    tr("Top"): (Direction.TOP, tr("From above (3)")),
+    tr("Reset"): (Direction.ASLANT, tr("Oblique view of the whole scene (R, or double-click)")),
 }
 _MOST_POINTS = 6000
 """Maximum number of points drawn of each cloud, to keep up with the frame rate."""
@@ -86,14 +87,21 @@ class CloudPanel(QWidget):
         self._next_pairs_s = 0.0
         self._view = CloudView()
         widest = "99,999"
-        self._cursor = LegendEntry("Cursor", "cursor", "Points of the frozen hand", widest=widest)
-        self._hand = LegendEntry("Live hand", "live", "Points of the present hand", widest=widest)
+        self._cursor = LegendEntry(
+            tr("Cursor"), "cursor", tr("Points of the frozen hand"), widest=widest
+        )
+        self._hand = LegendEntry(
+            tr("Live hand"), "live", tr("Points of the present hand"), widest=widest
+        )
         self._scale = ResidualScale()
-        self._pairs = QCheckBox("Pairs")
+        self._pairs = QCheckBox(tr("Pairs"))
         self._pairs.setObjectName("cloud-pairs")
         self._pairs.setToolTip(
-            "While aligning, join points of the live hand with the nearest points of the cursor "
-            "once the hand is laid over it; updated twice a second"
+            tr(
+                "While aligning, join points of the live hand with the nearest points of "
+                "the cursor "
+                "once the hand is laid over it; updated twice a second"
+            )
         )
         self._pairs.toggled.connect(self._forget_pairs)
         self.setFocusProxy(self._view)
@@ -121,8 +129,8 @@ class CloudPanel(QWidget):
         is_red = seen is not None and seen.is_over_limit
         role = "red" if is_red else "live"
         self._show(
-            None if cursor is None else _Cloud("Cursor", "cursor", axes.mm(cursor.points_W_m)),
-            None if hand is None else _Cloud("Live hand", role, axes.mm(hand.points_W_m)),
+            None if cursor is None else _Cloud(tr("Cursor"), "cursor", axes.mm(cursor.points_W_m)),
+            None if hand is None else _Cloud(tr("Live hand"), role, axes.mm(hand.points_W_m)),
             problem or (_TURNED if is_red else axes.name),
         )
         if cursor and hand and seen and seen.rotation_rad is not None and self._pairs.isChecked():
@@ -138,8 +146,8 @@ class CloudPanel(QWidget):
         self._forget_pairs()
         self._pairs.setEnabled(False)
         self._show(
-            _Cloud("Cursor", "cursor", axes.mm(alignment.cursor_m)),
-            _Cloud("Hand", "live", axes.mm(alignment.hand_m), residuals_m),
+            _Cloud(tr("Cursor"), "cursor", axes.mm(alignment.cursor_m)),
+            _Cloud(tr("Hand"), "live", axes.mm(alignment.hand_m), residuals_m),
             axes.name,
         )
 
@@ -170,7 +178,7 @@ class CloudPanel(QWidget):
 
     def _show(self, cursor: _Cloud | None, hand: _Cloud | None, text: str) -> None:
         if hand is None:
-            self._hand.show_name("Live hand", "live")
+            self._hand.show_name(tr("Live hand"), "live")
         for entry, cloud in ((self._cursor, cursor), (self._hand, hand)):
             if cloud is not None:
                 entry.show_name(cloud.name, cloud.role if cloud.residuals_m is None else None)

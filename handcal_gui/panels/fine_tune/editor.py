@@ -18,20 +18,21 @@ from PySide6.QtWidgets import (
 from handcal.display import DrawnMove
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.numbers import signed
 
 _SLIDER_MAX_MM = 15.0
 _SLIDER_STEPS_PER_MM = 100
 _DIRECTIONS = (
-    "to the right of the rig's viewpoint (φ1); negative is to the left",
-    "below the rig's viewpoint (φ2); negative is above",
-    "in front of the rig's viewpoint, towards the display (φ3); negative is behind",
+    tr("to the right of the rig's viewpoint (φ1); negative is to the left"),
+    tr("below the rig's viewpoint (φ2); negative is above"),
+    tr("in front of the rig's viewpoint, towards the display (φ3); negative is behind"),
 )
 _EFFECTS = {
-    "Right": "Shift of the drawn target to the right",
-    "Up": "Upward shift of the drawn target",
-    "Size": "Enlargement of the drawn target",
+    tr("Right"): tr("Shift of the drawn target to the right"),
+    tr("Up"): tr("Upward shift of the drawn target"),
+    tr("Size"): tr("Enlargement of the drawn target"),
 }
 
 
@@ -57,7 +58,7 @@ class EyeShiftEditor(QWidget):
     def __init__(self, title: str, limit_m: float, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.chosen = QRadioButton(title)
-        self.chosen.setToolTip("The arrow keys move this eye (E changes)")
+        self.chosen.setToolTip(tr("The arrow keys move this eye (E changes)"))
         self._fields = [self._make_field(title, axis, 1e3 * limit_m) for axis in range(3)]
         self._sliders = [self._make_slider(title, axis) for axis in range(3)]
         self._effects = {name: _number_label(tooltip) for name, tooltip in _EFFECTS.items()}
@@ -111,7 +112,7 @@ class EyeShiftEditor(QWidget):
     def _make_field(self, title: str, axis: int, limit_mm: float) -> QDoubleSpinBox:
         field = QDoubleSpinBox()
         field.setObjectName(f"phi{axis + 1}")
-        field.setAccessibleName(f"{title} φ{axis + 1} in millimetres")
+        field.setAccessibleName(tr("{} φ{} in millimetres").format(title, axis + 1))
         field.setToolTip(_tooltip(axis))
         field.setRange(-limit_mm, limit_mm)
         field.setDecimals(2)
@@ -128,7 +129,9 @@ class EyeShiftEditor(QWidget):
         slider = QSlider(Qt.Orientation.Horizontal)
         slider.setObjectName(f"slider{axis + 1}")
         slider.setAccessibleName(f"{title} φ{axis + 1}")
-        slider.setToolTip(f"{_tooltip(axis)}\nThe slider goes to ±{_SLIDER_MAX_MM:g} mm")
+        slider.setToolTip(
+            tr("{}\nThe slider goes to ±{:g} mm").format(_tooltip(axis), _SLIDER_MAX_MM)
+        )
         slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         slider.installEventFilter(self)
         reach = round(_SLIDER_STEPS_PER_MM * _SLIDER_MAX_MM)
@@ -163,12 +166,12 @@ class EyeShiftEditor(QWidget):
 
 
 def _tooltip(axis: int) -> str:
-    return f"Distance of the eye {_DIRECTIONS[axis]}, in millimetres"
+    return tr("Distance of the eye {}, in millimetres").format(_DIRECTIONS[axis])
 
 
 def _number_label(tooltip: str) -> QLabel:
     label = QLabel("–")
-    label.setToolTip(f"{tooltip}, relative to the φ compared with")
+    label.setToolTip(tr("{}, relative to the φ compared with").format(tooltip))
     label.setFont(number_font())
     label.setAlignment(Qt.AlignmentFlag.AlignRight)
     return label

@@ -29,6 +29,7 @@ from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
@@ -44,21 +45,21 @@ _MOVES: dict[int, tuple[int, int]] = {
     Qt.Key.Key_PageUp: (2, 1),
 }
 """Axis and direction of φ, opposite to the picture's, which moves as the key points."""
-_KEYS = (
+_KEYS = tr(
     "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
     "Click here first; E changes the eye."
 )
 _OBSTACLES = {
-    State.ALIGN: "Confirm the alignment, solve and apply it first.",
-    State.ALIGNED: "Solve and apply the alignment first.",
-    State.SOLVED: "Apply the solved projections first.",
-    State.APPLYING: "The headset is receiving the solved projections.",
-    State.VERIFY: "An eye is being verified; confirm or skip that first.",
+    State.ALIGN: tr("Confirm the alignment, solve and apply it first."),
+    State.ALIGNED: tr("Solve and apply the alignment first."),
+    State.SOLVED: tr("Apply the solved projections first."),
+    State.APPLYING: tr("The headset is receiving the solved projections."),
+    State.VERIFY: tr("An eye is being verified; confirm or skip that first."),
 }
 _ARRIVALS = {
-    Arrival.SENDING: ("wait", "Sending to the headset…"),
-    Arrival.ARRIVED: ("check", "In the headset"),
-    Arrival.LATE: ("warning", "Not acknowledged by the headset; see Link"),
+    Arrival.SENDING: ("wait", tr("Sending to the headset…")),
+    Arrival.ARRIVED: ("check", tr("In the headset")),
+    Arrival.LATE: ("warning", tr("Not acknowledged by the headset; see Link")),
 }
 
 
@@ -84,7 +85,7 @@ class FineTunePanel(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._rig: Rig | None = None
         self._solved: Shifts = {}
-        self._obstacle = "Fine-tuning starts with a session."
+        self._obstacle = tr("Fine-tuning starts with a session.")
         self._history = ShiftHistory(_OFFLINE)
         self._burst: object = None
         self._sign_name = "wait"
@@ -199,10 +200,7 @@ class FineTunePanel(QWidget):
 
     def _show(self) -> None:
         self._stream.flush()
-        shown = self._shown()
-        self._stream.preview(
-            self._history.present if shown is None else {**self._history.present, **shown}
-        )
+        self._stream.preview(self._drawn())
         self._refresh()
 
     def _shown(self) -> Shifts | None:
@@ -210,6 +208,10 @@ class FineTunePanel(QWidget):
         if self._show_solved.isChecked():
             return self._solved
         return _OFFLINE if self._show_offline.isChecked() else None
+
+    def _drawn(self) -> Shifts:
+        """Return the φ that the headset is to draw with: the one set, or shown for comparison."""
+        return {**self._history.present, **(self._shown() or {})}
 
     def _stop_showing(self) -> None:
         for action in (self._show_solved, self._show_offline):
@@ -222,7 +224,7 @@ class FineTunePanel(QWidget):
         is_editable, is_ready = self._is_editable(), not self._obstacle
         for eye, editor in self._editors.items():
             editor.setEnabled(is_editable)
-            editor.show_shift(self._history.present[eye])
+            editor.show_shift(self._drawn()[eye])
             editor.show_effect(self._effect(eye))
         self._undo.setEnabled(is_editable and self._history.can_undo)
         self._redo.setEnabled(is_editable and self._history.can_redo)
@@ -231,13 +233,15 @@ class FineTunePanel(QWidget):
         self._show_offline.setEnabled(is_ready)
         can_end = self._show_solved.isChecked()
         self._show_solved.setEnabled(is_ready and (bool(self._solved) or can_end))
-        self._against.setText(f"against the {'solved' if self._solved else 'offline'} φ")
+        self._against.setText(
+            tr("against the solved φ") if self._solved else tr("against the offline φ")
+        )
 
     def _effect(self, eye: Eye) -> DrawnMove | None:
         if self._rig is None:
             return None
         before_m = self._solved.get(eye, _OFFLINE[eye])
-        after_m, depth_m = self._history.present[eye], self._depth.currentData()
+        after_m, depth_m = self._drawn()[eye], self._depth.currentData()
         return effect_at(self._rig.eyes[eye], before_m, after_m, depth_m)
 
     def _show_status(self, icon_name: str, text: str) -> None:
@@ -260,37 +264,41 @@ class FineTunePanel(QWidget):
 
     def _make_actions(self) -> None:
         add = self._add_action
-        self._undo = add("Undo", "Ctrl+Z", "Undo the last change")
+        self._undo = add(tr("Undo"), "Ctrl+Z", tr("Undo the last change"))
         self._undo.triggered.connect(lambda: self._go(self._history.undo))
-        self._redo = add("Redo", "Ctrl+Shift+Z", "Redo the change")
+        self._redo = add(tr("Redo"), "Ctrl+Shift+Z", tr("Redo the change"))
         self._redo.triggered.connect(lambda: self._go(self._history.redo))
-        self._both = add("Both eyes", "L", "Move both eyes by the same amount")
+        self._both = add(tr("Both eyes"), "L", tr("Move both eyes by the same amount"))
         self._both.setCheckable(True)
         self.reset_action = add(
-            "Reset to solved", "", "Set φ to the one solved from the alignments"
+            tr("Reset to solved"), "", tr("Set φ to the one solved from the alignments")
         )
         self.reset_action.triggered.connect(lambda: self._reset(self._solved))
-        self._reset_offline = add("Reset to offline", "", "Set φ to 0, the offline calibration")
+        self._reset_offline = add(
+            tr("Reset to offline"), "", tr("Set φ to 0, the offline calibration")
+        )
         self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
         looks = QActionGroup(self)
         looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         looks.triggered.connect(self._show)
         self._show_solved = add(
-            "Show solved", "S", "Show the solved φ in the headset while checked"
+            tr("Show solved"), "S", tr("Show the solved φ in the headset while checked")
         )
-        self._show_offline = add("Show offline", "B", "Show φ = 0 in the headset while checked")
+        self._show_offline = add(
+            tr("Show offline"), "B", tr("Show φ = 0 in the headset while checked")
+        )
         for action in (self._show_solved, self._show_offline):
             action.setCheckable(True)
             looks.addAction(action)
         self._steps = QActionGroup(self)
         self._steps.triggered.connect(self._set_step)
         for key, step_mm in enumerate(_STEPS_MM, 1):
-            step = add(f"{step_mm:g}", str(key), f"Arrows move by {step_mm:g} mm")
-            step.setWhatsThis(f"Step of {step_mm:g} mm")
+            step = add(f"{step_mm:g}", str(key), tr("Arrows move by {:g} mm").format(step_mm))
+            step.setWhatsThis(tr("Step of {:g} mm").format(step_mm))
             step.setCheckable(True)
             step.setData(1e-3 * step_mm)
             self._steps.addAction(step)
-        add("Other eye", "E", "").triggered.connect(self._change_eye)
+        add(tr("Other eye"), "E", "").triggered.connect(self._change_eye)
 
     def _add_action(self, text: str, keys: str, tooltip: str) -> QAction:
         return add_action(self, text, keys, tooltip=f"{tooltip} ({keys})" if keys else tooltip)
@@ -301,8 +309,8 @@ class FineTunePanel(QWidget):
 
     def _make_depths(self) -> None:
         self._depth = QComboBox()
-        self._depth.setAccessibleName("Distance of the target")
-        self._depth.setToolTip("Distance of the target from the eye, in metres")
+        self._depth.setAccessibleName(tr("Distance of the target"))
+        self._depth.setToolTip(tr("Distance of the target from the eye, in metres"))
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
         self._depth.setCurrentIndex(len(TARGET_DEPTHS_M) // 2)
@@ -318,10 +326,10 @@ class FineTunePanel(QWidget):
         layout = QVBoxLayout(body)
         steps = self._steps.actions()
         layout.addLayout(
-            _row(QLabel("Step"), *steps, QLabel("mm"), None, self._both, self._undo, self._redo)
+            _row(QLabel(tr("Step")), *steps, QLabel("mm"), None, self._both, self._undo, self._redo)
         )
         layout.addLayout(_row(self._editors["left"], self._editors["right"]))
-        layout.addLayout(_row(QLabel("Effect at"), self._depth, self._against, None))
+        layout.addLayout(_row(QLabel(tr("Effect at")), self._depth, self._against, None))
         layout.addLayout(_row(self._show_solved, self.reset_action, None))
         layout.addLayout(_row(self._show_offline, self._reset_offline, None))
         layout.addWidget(hint)
@@ -364,5 +372,5 @@ def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
 def _obstacle(snapshot: Snapshot) -> str:
     """Return the reason why φ cannot be set by hand now; empty if it can."""
     if not snapshot.link.connected:
-        return snapshot.link_problem or "The headset is not connected; see Link."
+        return snapshot.link_problem or tr("The headset is not connected; see Link.")
     return _OBSTACLES.get(snapshot.procedure.state, "")

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 from handcal.link.rates import LinkRates
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.plots import Plot
 
@@ -27,12 +28,16 @@ class LinkHistory(QWidget):
         super().__init__(parent)
         self.setObjectName("link-history")
         self._moments: deque[tuple[float, float, float, float]] = deque()
-        self._latency = _plot("Latency history", f"Latency, last {_LASTS_S:g} s", "ms")
-        self._latency.setToolTip(f"Latency of the last {_LASTS_S:g} s, in milliseconds")
-        self._loss = _plot("Loss history", "Lost: — to, - - from", "%")
+        self._latency = _plot(
+            tr("Latency history"), tr("Latency, last {:g} s").format(_LASTS_S), "ms"
+        )
+        self._latency.setToolTip(tr("Latency of the last {:g} s, in milliseconds").format(_LASTS_S))
+        self._loss = _plot(tr("Loss history"), tr("Lost: — to, - - from"), "%")
         self._loss.setToolTip(
-            f"Share of the datagrams of the last {_LASTS_S:g} s that did not arrive: "
-            "to the headset (solid line) and from it (dashed)"
+            tr(
+                "Share of the datagrams of the last {:g} s that did not arrive: to the "
+                "headset (solid line) and from it (dashed)"
+            ).format(_LASTS_S)
         )
         self._latency_line = self._latency.add_line("live")
         self._lost_line = self._loss.add_line("live")

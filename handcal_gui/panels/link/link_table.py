@@ -11,6 +11,7 @@ from handcal.link.rates import LinkRates
 from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.numbers import signed
 
@@ -21,36 +22,48 @@ _OUT, _IN, _BOTH = 1, 2, 3
 """Columns of the table; the last spans both."""
 _WIDEST = {_OUT: "9999.9 kB/s", _IN: "9999.9 kB/s", _BOTH: "−999999.999 s ± 9.9 ms"}
 _ROWS = {
-    "Latency": {_IN: "Half the median time of a round trip to the headset, in milliseconds"},
-    "Clock": {
-        _BOTH: "Headset's clock minus this computer's, in seconds, and its uncertainty, "
-        "in milliseconds"
+    tr("Latency"): {
+        _IN: tr("Half the median time of a round trip to the headset, in milliseconds")
     },
-    "Clock drift": {_IN: "Drift of the headset's clock, in parts per million; positive is fast"},
-    "Poses": {_IN: "Poses received from the headset per second"},
-    "Data": {
-        _OUT: f"Kilobytes per second to the headset, over {RATES_S:g} s",
-        _IN: f"Kilobytes per second from the headset, over {RATES_S:g} s",
+    tr("Clock"): {
+        _BOTH: tr(
+            "Headset's clock minus this computer's, in seconds, and its uncertainty, "
+            "in milliseconds"
+        )
     },
-    "Lost": {
-        _OUT: f"Share of the datagrams to the headset that did not arrive, over {RATES_S:g} s",
-        _IN: f"Share of the headset's datagrams that did not arrive, over {RATES_S:g} s",
+    tr("Clock drift"): {
+        _IN: tr("Drift of the headset's clock, in parts per million; positive is fast")
     },
-    "Resent": {
-        _OUT: "Fragments of messages retransmitted because they were not acknowledged in time"
+    tr("Poses"): {_IN: tr("Poses received from the headset per second")},
+    tr("Data"): {
+        _OUT: tr("Kilobytes per second to the headset, over {:g} s").format(RATES_S),
+        _IN: tr("Kilobytes per second from the headset, over {:g} s").format(RATES_S),
     },
-    "Unacknowledged": {_OUT: "Messages that the headset has not acknowledged yet"},
-    "Failed": {_OUT: "Messages that the headset did not acknowledge in time"},
-    "Rejected": {_IN: "Datagrams that were not accepted, for the reasons below"},
+    tr("Lost"): {
+        _OUT: tr("Share of the datagrams to the headset that did not arrive, over {:g} s").format(
+            RATES_S
+        ),
+        _IN: tr("Share of the headset's datagrams that did not arrive, over {:g} s").format(
+            RATES_S
+        ),
+    },
+    tr("Resent"): {
+        _OUT: tr("Fragments of messages retransmitted because they were not acknowledged in time")
+    },
+    tr("Unacknowledged"): {_OUT: tr("Messages that the headset has not acknowledged yet")},
+    tr("Failed"): {_OUT: tr("Messages that the headset did not acknowledge in time")},
+    tr("Rejected"): {_IN: tr("Datagrams that were not accepted, for the reasons below")},
 }
 """Captions, and what the numbers mean by column."""
 REJECTIONS = {
-    Rejection.UNPAIRED: "Signed with another pairing key: enter the key below in the headset",
-    Rejection.CORRUPT: "Damaged in transit, or not meant for handcal",
-    Rejection.REPLAYED: "Arrived twice or much too late; a few are normal in a wireless network",
-    Rejection.OVERSIZED: "Longer than the protocol allows: check the headset's program",
-    Rejection.WRONG_VERSION: "The headset's program uses another protocol version: update it",
-    Rejection.WRONG_SESSION: "Sent before the headset reconnected; a few are normal",
+    Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key below in the headset"),
+    Rejection.CORRUPT: tr("Damaged in transit, or not meant for handcal"),
+    Rejection.REPLAYED: tr(
+        "Arrived twice or much too late; a few are normal in a wireless network"
+    ),
+    Rejection.OVERSIZED: tr("Longer than the protocol allows: check the headset's program"),
+    Rejection.WRONG_VERSION: tr("The headset's program uses another protocol version: update it"),
+    Rejection.WRONG_SESSION: tr("Sent before the headset reconnected; a few are normal"),
 }
 """Explanation of each reason, and the remedy."""
 
@@ -66,7 +79,7 @@ class LinkTable(QWidget):
         self._grid.setHorizontalSpacing(2 * SPACING_PX)
         self._grid.setVerticalSpacing(SPACING_PX // 4)
         self._grid.setColumnStretch(0, 1)
-        for column, heading in ((_OUT, "To headset"), (_IN, "From headset")):
+        for column, heading in ((_OUT, tr("To headset")), (_IN, tr("From headset"))):
             self._grid.addWidget(QLabel(heading), 0, column, Qt.AlignmentFlag.AlignRight)
         self._numbers = {
             (caption, column): number
@@ -113,21 +126,21 @@ def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int
     """Return the texts of the rows above, by caption and column."""
     drift_ppm = link.clock_drift_ppm
     texts = {
-        ("Latency", _IN): _text(link.latency_ms, "ms"),
-        ("Clock", _BOTH): _clock(link),
-        ("Clock drift", _IN): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
-        ("Poses", _IN): _text(link.pose_rate_hz, "Hz"),
-        ("Resent", _OUT): str(link.resent),
-        ("Unacknowledged", _OUT): str(link.unacked),
-        ("Failed", _OUT): str(link.failed),
-        ("Rejected", _IN): str(sum(link.rejected.values())),
+        (tr("Latency"), _IN): _text(link.latency_ms, "ms"),
+        (tr("Clock"), _BOTH): _clock(link),
+        (tr("Clock drift"), _IN): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
+        (tr("Poses"), _IN): _text(link.pose_rate_hz, "Hz"),
+        (tr("Resent"), _OUT): str(link.resent),
+        (tr("Unacknowledged"), _OUT): str(link.unacked),
+        (tr("Failed"), _OUT): str(link.failed),
+        (tr("Rejected"), _IN): str(sum(link.rejected.values())),
     }
     if rates is not None:
         texts |= {
-            ("Data", _OUT): _text(rates.sent_bytes_s / 1e3, "kB/s"),
-            ("Data", _IN): _text(rates.received_bytes_s / 1e3, "kB/s"),
-            ("Lost", _OUT): _text(rates.lost, "%", 100.0),
-            ("Lost", _IN): _text(rates.lost_inbound, "%", 100.0),
+            (tr("Data"), _OUT): _text(rates.sent_bytes_s / 1e3, "kB/s"),
+            (tr("Data"), _IN): _text(rates.received_bytes_s / 1e3, "kB/s"),
+            (tr("Lost"), _OUT): _text(rates.lost, "%", 100.0),
+            (tr("Lost"), _IN): _text(rates.lost_inbound, "%", 100.0),
         }
     return texts
 

@@ -6,11 +6,12 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QGroupBox, QLabel, QPushButton, QWidget
 
 from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.key_field import KeyField
 from handcal_gui.widgets.layouts import hbox
 
-_RENEWING = "The new key must then be entered in the headset."
+_RENEWING = tr("The new key must then be entered in the headset.")
 
 
 class PairingBox(QGroupBox):
@@ -28,7 +29,7 @@ class PairingBox(QGroupBox):
     connect_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Pairing", parent)
+        super().__init__(tr("Pairing"), parent)
         self.setObjectName("pairing")
         self._address = QLabel()
         self._address.setObjectName("pairing-address")
@@ -37,11 +38,11 @@ class PairingBox(QGroupBox):
             Qt.TextInteractionFlag.TextSelectableByMouse
             | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
-        self._address.setToolTip("Host and port that the headset must connect to, by UDP")
+        self._address.setToolTip(tr("Host and port that the headset must connect to, by UDP"))
         self._key = KeyField()
-        renew = button("newKey", "New key…", "Make a new pairing key", _RENEWING)
+        renew = button("newKey", tr("New key…"), tr("Make a new pairing key"), _RENEWING)
         renew.clicked.connect(self.new_key_requested)
-        connect = button("connect", "Connect…", "Pair a headset by QR code, and try it")
+        connect = button("connect", tr("Connect…"), tr("Pair a headset by QR code, and try it"))
         connect.clicked.connect(self.connect_requested)
         self._lay_out(connect, renew)
 
@@ -53,9 +54,9 @@ class PairingBox(QGroupBox):
     def _lay_out(self, connect: QPushButton, renew: QPushButton) -> None:
         grid = QGridLayout(self)
         grid.setSpacing(SPACING_PX)
-        key_label = QLabel("&Key")
+        key_label = QLabel(tr("&Key"))
         key_label.setBuddy(self._key)
-        grid.addWidget(QLabel("Address"), 0, 0)
+        grid.addWidget(QLabel(tr("Address")), 0, 0)
         grid.addWidget(self._address, 0, 1)
         grid.addWidget(key_label, 1, 0)
         grid.addWidget(self._key, 1, 1)

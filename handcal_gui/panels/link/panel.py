@@ -21,6 +21,7 @@ from handcal_gui.panels.link.link_history import LinkHistory
 from handcal_gui.panels.link.link_table import RATES_S, LinkTable
 from handcal_gui.panels.link.pairing_box import PairingBox
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.sentence import sentence
 
@@ -55,8 +56,8 @@ class LinkPanel(QWidget):
         self._state = QLabel()
         self._state.setObjectName("link-state")
         self._state.setWordWrap(True)
-        self._restart = QPushButton("Restart headset")
-        self._restart.setToolTip("Restart the virtual headset's program")
+        self._restart = QPushButton(tr("Restart headset"))
+        self._restart.setToolTip(tr("Restart the virtual headset's program"))
         self._restart.clicked.connect(self.restart_headset_requested)
         self._restart.hide()
         self._table = LinkTable()
@@ -66,7 +67,7 @@ class LinkPanel(QWidget):
         self._pairing.connect_requested.connect(self.connect_requested)
         self._pairing.hide()
         self._lay_out()
-        self._show_state(is_connected=False, problem="Open a session on the start page.")
+        self._show_state(is_connected=False, problem=tr("Open a session on the start page."))
         follow_theme(self, self._draw_sign)
 
     def show_pairing(self, address: str, key: str, *, is_virtual: bool = False) -> None:
@@ -105,7 +106,7 @@ class LinkPanel(QWidget):
         if is_connected is not self._is_connected:
             self._is_connected = is_connected
             self._draw_sign()
-        word = "Connected" if is_connected else "Not connected"
+        word = tr("Connected") if is_connected else tr("Not connected")
         self._state.setText(f"{word}. {sentence(problem)}" if problem else word)
 
     def _draw_sign(self) -> None:

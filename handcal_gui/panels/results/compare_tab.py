@@ -17,16 +17,17 @@ from PySide6.QtWidgets import (
 from handcal.register.results import Results
 from handcal.types import METHODS, Method, Rig
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import comparison_rows
 
 _MEANINGS: Mapping[Method, str] = {
-    "paper": "as published by Hu et al. 2021; slow.",
-    "linear": "the paper's model, solved with all three rows of each pair.",
-    "consistent": "exact model; robust to cut edges and a rotated hand; the default.",
-    "icp": "rigid registration, the paper's baseline.",
-    "icp-open3d": "the same by Open3D, which must be installed.",
+    "paper": tr("as published by Hu et al. 2021; slow."),
+    "linear": tr("the paper's model, solved with all three rows of each pair."),
+    "consistent": tr("exact model; robust to cut edges and a rotated hand; the default."),
+    "icp": tr("rigid registration, the paper's baseline."),
+    "icp-open3d": tr("the same by Open3D, which must be installed."),
 }
 
 
@@ -50,16 +51,16 @@ class CompareTab(QWidget):
         self.setObjectName("comparison")
         self._results: Results | None = None
         self._rig: Rig | None = None
-        self.table = NumberTable("Comparison of methods")
+        self.table = NumberTable(tr("Comparison of methods"))
         _keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")
-        self._methods.setAccessibleName("Compare with method")
+        self._methods.setAccessibleName(tr("Compare with method"))
         self._methods.currentTextChanged.connect(self._explain)
-        self._compare = QPushButton("&Compare")
+        self._compare = QPushButton(tr("&Compare"))
         self._compare.setObjectName("comparison-start")
         self._compare.clicked.connect(self._ask)
-        self._cancel = QPushButton("Cance&l")
+        self._cancel = QPushButton(tr("Cance&l"))
         self._cancel.setObjectName("comparison-cancel")
         self._cancel.clicked.connect(self._request_cancel)
         self._progress = QProgressBar()
@@ -91,13 +92,14 @@ class CompareTab(QWidget):
         self._set_busy(False)
         if self._results is None or self._rig is None:
             return
-        columns = self._results.method, other.method, "Difference"
+        columns = self._results.method, other.method, tr("Difference")
         self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
         self.table.show()
         self._status.setText(
-            f"Difference: {other.method} minus {self._results.method}. "
-            "σ and expected error are realistic only for “consistent”; the other methods' are too "
-            "small."
+            tr(
+                "Difference: {} minus {}. σ and expected error are realistic only for "
+                "“consistent”; the other methods' are too small."
+            ).format(other.method, self._results.method)
         )
 
     def show_failure(self, text: str) -> None:
@@ -111,12 +113,12 @@ class CompareTab(QWidget):
     def _ask(self) -> None:
         method = self._methods.currentText()
         self._set_busy(True)
-        self._status.setText(f"Solving with {method} …")
+        self._status.setText(tr("Solving with {} …").format(method))
         self.requested.emit(method)
 
     def _request_cancel(self) -> None:
         self._set_busy(False)
-        self._status.setText("Cancelled.")
+        self._status.setText(tr("Cancelled."))
         self.cancelled.emit()
 
     def _set_busy(self, is_busy: bool) -> None:
@@ -126,7 +128,7 @@ class CompareTab(QWidget):
         self._methods.setEnabled(not is_busy)
 
     def _lay_out(self) -> None:
-        label = QLabel("Compare &with")
+        label = QLabel(tr("Compare &with"))
         label.setBuddy(self._methods)
         row = hbox(label, (self._methods, 1), self._compare, spacing=SPACING_PX)
         busy_row = hbox((self._progress, 1), self._cancel, spacing=SPACING_PX)

@@ -6,6 +6,7 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
+from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -17,12 +18,15 @@ class ConvergencePlot(Plot):
     """Shows the distance between hand and cursor by iteration, for each alignment and eye."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Convergence", "Iteration", "RMS distance (mm)", parent)
+        super().__init__(tr("Convergence"), tr("Iteration"), tr("RMS distance (mm)"), parent)
         self.setToolTip(
-            "RMS distance between matched points of hand and cursor at each iteration\n"
-            "of each alignment (1, 2, …).\n"
-            "The last iterations of “consistent” measure it to the nearest point instead of the "
-            "surface,\nwhich makes it larger."
+            tr(
+                "RMS distance between matched points of hand and cursor at each iteration\n"
+                "of each alignment (1, 2, …).\n"
+                "The last iterations of “consistent” measure it to the nearest point "
+                "instead of the "
+                "surface,\nwhich makes it larger."
+            )
         )
         self.show_legend()
 

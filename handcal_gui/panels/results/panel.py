@@ -17,6 +17,7 @@ from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
@@ -28,7 +29,7 @@ from handcal_gui.widgets.result_rows import (
     verdict_rows,
 )
 
-_EMPTY = (
+_EMPTY = tr(
     "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve. Each eye's "
     "position, its uncertainty and the verdict then appear here."
 )
@@ -52,13 +53,13 @@ class ResultsPanel(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("results-panel")
-        self.setAccessibleName("Results")
+        self.setAccessibleName(tr("Results"))
         self._results: Results | None = None
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
-        self._numbers = NumberTable("Numbers of both eyes")
+        self._numbers = NumberTable(tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable("Each alignment alone")
+        self._alignments = NumberTable(tr("Each alignment alone"))
         self._another = QLabel()
         self._another.setWordWrap(True)
         self._compare = CompareTab()
@@ -112,14 +113,14 @@ class ResultsPanel(QWidget):
         """Return all numbers shown as tab-separated text."""
         if self._results is None:
             return ""
-        verdicts = rows_as_text(("Verdict", "Reason"), verdict_rows(self._results))
+        verdicts = rows_as_text((tr("Verdict"), tr("Reason")), verdict_rows(self._results))
         tables = self._numbers, self._alignments, self._compare.table
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
     def _add_copy(self) -> None:
         add_action(
             self,
-            "Copy as text",
+            tr("Copy as text"),
             "Ctrl+C",
             lambda: QGuiApplication.clipboard().setText(self.as_text()),
         )
@@ -133,11 +134,11 @@ class ResultsPanel(QWidget):
         tabs = QTabWidget()
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
-        tabs.addTab(self._eyes_tab(), "Eyes")
-        tabs.addTab(self._convergence, "Convergence")
-        tabs.addTab(self._residuals, "Residuals")
-        tabs.addTab(self._alignments_tab(), "Alignments")
-        tabs.addTab(self._compare, "Compare")
+        tabs.addTab(self._eyes_tab(), tr("Eyes"))
+        tabs.addTab(self._convergence, tr("Convergence"))
+        tabs.addTab(self._residuals, tr("Residuals"))
+        tabs.addTab(self._alignments_tab(), tr("Alignments"))
+        tabs.addTab(self._compare, tr("Compare"))
         self._stack = QStackedLayout(self)
         self._stack.addWidget(empty)
         self._stack.addWidget(tabs)

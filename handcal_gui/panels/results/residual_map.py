@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.types import Float64
 from handcal_gui.theme import colors, follow_theme
+from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.residual_scale import LARGEST_MM, residual_ramp
 
@@ -24,14 +25,14 @@ class ResidualMap(Plot):
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Residual map", "Right (mm)", "Down (mm)", parent)
+        super().__init__(tr("Residual map"), tr("Right (mm)"), tr("Down (mm)"), parent)
         self._shown = np.empty((0, 2)), np.empty(0)
         self.scatters = (
             pg.ScatterPlotItem(size=4, pen=None),
             pg.ScatterPlotItem(size=5, symbol="x"),
         )
         self._bar = pg.ColorBarItem(
-            values=(0.0, LARGEST_MM), width=14, interactive=False, label="Residual (mm)"
+            values=(0.0, LARGEST_MM), width=14, interactive=False, label=tr("Residual (mm)")
         )
         item = self.item
         item.setAspectLocked()

@@ -13,6 +13,7 @@ from handcal.register.results import Results
 from handcal.types import Alignment, Eye, EyeShift
 from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -26,10 +27,12 @@ class ResidualsTab(QWidget):
         self._solved: dict[int, tuple[Alignment, Mapping[Eye, EyeShift]]] = {}
         self._choice = QComboBox()
         self._choice.setObjectName("residuals-choice")
-        self._choice.setAccessibleName("Alignment and eye")
+        self._choice.setAccessibleName(tr("Alignment and eye"))
         self._choice.currentIndexChanged.connect(self._show_chosen)
         self._map = ResidualMap()
-        note = QLabel("The hand as seen from the eye; × marks points without a partner (outliers).")
+        note = QLabel(
+            tr("The hand as seen from the eye; × marks points without a partner (outliers).")
+        )
         note.setWordWrap(True)
         vbox(self._choice, (self._map, 1), note, on=self, spacing=SPACING_PX)
 
@@ -43,7 +46,7 @@ class ResidualsTab(QWidget):
         self._choice.clear()
         for number, (_, shifts) in self._solved.items():
             for eye in shifts:
-                name = f"Alignment {number}, {EYE_NAMES[eye].lower()}"
+                name = tr("Alignment {}, {}").format(number, EYE_NAMES[eye].lower())
                 self._choice.addItem(name, (number, eye))
 
     def showEvent(self, event: QShowEvent) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
 from handcal.types import Eye, Verdict
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
@@ -45,8 +46,8 @@ class VerdictCard(QFrame):
         """Show a verdict; None if the eye is in no alignment."""
         self._verdict = verdict
         if verdict is None:
-            self._word.setText(f"{NOTHING} Not solved")
-            self._reason.setText("Not in any alignment")
+            self._word.setText(tr("{} Not solved").format(NOTHING))
+            self._reason.setText(tr("Not in any alignment"))
         else:
             self._word.setText(VERDICT_WORDS[verdict.name])
             self._reason.setText(sentence(verdict.reason))

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal_gui.theme import colors, number_font
+from handcal_gui.translation import tr
 
 _FROM_DEG, _SPAN_DEG = 210.0, 240.0
 """Start of the scale, counter-clockwise from three o'clock, and its extent clockwise."""
@@ -24,8 +25,8 @@ class RotationDial(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("rotation-dial")
-        self.setAccessibleName("Rotation of the hand")
-        self.setToolTip("Rotation of the hand from the cursor, and its limit")
+        self.setAccessibleName(tr("Rotation of the hand"))
+        self.setToolTip(tr("Rotation of the hand from the cursor, and its limit"))
         self.setMinimumSize(100, 72)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._angle_deg: float | None = None
@@ -62,7 +63,7 @@ class RotationDial(QWidget):
         fixed, normal = number_font(), self.font()
         digits = "–" if self._angle_deg is None else f"{self._angle_deg:.1f}°"
         _write(painter, fixed, digits, -14, 46, self._color())
-        _write(painter, normal, f"limit {self._limit_deg:.1f}°", 22, 13, text)
+        _write(painter, normal, tr("limit {:.1f}°").format(self._limit_deg), 22, 13, text)
         _write(painter, normal, self._word, 64, 22, self._color())
 
     def _color(self) -> QColor:

@@ -16,6 +16,7 @@ from handcal.types import Float64
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence
@@ -29,10 +30,10 @@ _STRAIGHT_RAD = np.radians(2.0)
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _SHAPE_M = 0.0015
 """A smaller change of shape, rms, is not worth a word."""
-_NO_CURSOR = "Make a cursor; the hand's rotation from it is then shown here."
-_TAKEN = "The alignment is confirmed."
-_NO_HAND = "Hold the hand in view of the camera."
-_STRAIGHT = "The hand is rotated like the cursor."
+_NO_CURSOR = tr("Make a cursor; the hand's rotation from it is then shown here.")
+_TAKEN = tr("The alignment is confirmed.")
+_NO_HAND = tr("Hold the hand in view of the camera.")
+_STRAIGHT = tr("The hand is rotated like the cursor.")
 
 
 class RotationPanel(QWidget):
@@ -41,7 +42,7 @@ class RotationPanel(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("rotation-panel")
-        self.setAccessibleName("Rotation")
+        self.setAccessibleName(tr("Rotation"))
         self._cursor: PlacedHand | None = None
         self._history: deque[tuple[float, float]] = deque()
         self._history_drawn_s = -np.inf
@@ -50,7 +51,7 @@ class RotationPanel(QWidget):
         self._advice = _text_label("rotation-advice", scale=1.2)
         self._advice.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._refusals = _text_label("rotation-refusals")
-        self._plot = Plot("Rotation history", f"Last {_HISTORY_S:g} s", "")
+        self._plot = Plot(tr("Rotation history"), tr("Last {:g} s").format(_HISTORY_S), "")
         self._plot.item.setXRange(-_HISTORY_S, 0.0, padding=0.0)
         self._plot.item.getAxis("bottom").setStyle(showValues=False, tickLength=0)
         self._limit_line = self._plot.add_line("red", dashed=True)
@@ -71,14 +72,14 @@ class RotationPanel(QWidget):
         if procedure.cursor is None or procedure.state is not State.ALIGN:
             self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
         elif snapshot.camera.problem:
-            self._show_nothing("? No image", _NO_HAND)
+            self._show_nothing(tr("? No image"), _NO_HAND)
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
 
     def _show_observation(self, observation: Observation) -> None:
         if observation.rotation_rad is None:
-            self._show_nothing("? No hand", sentence(observation.problem) or _NO_HAND)
+            self._show_nothing(tr("? No hand"), sentence(observation.problem) or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
         has_changed = observation.has_changed or (observation.shape_change_m or 0.0) > _SHAPE_M
@@ -87,17 +88,19 @@ class RotationPanel(QWidget):
             observation.is_over_limit and not observation.has_changed
         )
         if not is_turned and (angle_rad < _STRAIGHT_RAD or observation.has_changed):
-            word = "▲ Another shape" if observation.has_changed else "✓ Hold still"
+            word = tr("▲ Another shape") if observation.has_changed else tr("✓ Hold still")
             self._dial.show_angle(angle_rad, self._limit_rad, word)
             self._hand.show_turn("")
             self._advice.setText(shape or _STRAIGHT)
             return
-        word = "▲ Turn back" if observation.is_over_limit else "✓ Within limit"
+        word = tr("▲ Turn back") if observation.is_over_limit else tr("✓ Within limit")
         advice = turn_advice(observation.rotation_rad)
         self._dial.show_angle(angle_rad, self._limit_rad, word)
         self._hand.show_turn(advice.axis, positive=advice.angle_rad > 0)
         self._advice.setText(
-            f"{advice.text} by {abs(np.degrees(advice.angle_rad)):.0f}°. {shape}".strip()
+            tr("{} by {:.0f}°. {}")
+            .format(advice.text, abs(np.degrees(advice.angle_rad)), shape)
+            .strip()
         )
 
     def _show_nothing(self, word: str, text: str) -> None:
@@ -122,16 +125,16 @@ class RotationPanel(QWidget):
         self._limit_rad = limit_rad
         limit_deg = float(np.degrees(limit_rad))
         self._plot.item.setYRange(0.0, _HISTORY_LIMITS * limit_deg, padding=0.0)
-        self._plot.item.getAxis("left").setTicks([[(0.0, "0°"), (limit_deg, f"{limit_deg:g}°")]])
+        self._plot.item.getAxis("left").setTicks([[(limit_deg, f"{limit_deg:g}°")]])
         self._limit_line.setData([-_HISTORY_S, 0.0], [limit_deg, limit_deg])
 
     def _show_refusals(self, count: int, last: str) -> None:
         """Show the count of the journal, which the report shows too, and the last reason."""
         if not count and not last:
-            self._refusals.setText("No confirmation refused.")
+            self._refusals.setText(tr("No confirmation refused."))
         else:
             # The journal may follow the refusal by a frame.
-            self._refusals.setText(f"Refused: {max(count, 1)}. {last}")
+            self._refusals.setText(tr("Refused: {}. {}").format(max(count, 1), last))
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.types import Float64
 from handcal_gui.theme import colors
+from handcal_gui.translation import tr
 
 # The drawing is 200 units wide and high; its origin is the centre of the hand.
 _FINGERS = ((-16, 10, -50, -14), (-21, 0, -33, -52), (-7, -4, -11, -68), (7, -4, 10, -64),
@@ -36,8 +37,8 @@ class TurningHand(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("turning-hand")
-        self.setAccessibleName("Direction to turn the hand")
-        self.setToolTip("Direction to turn the hand, as the wearer sees it")
+        self.setAccessibleName(tr("Direction to turn the hand"))
+        self.setToolTip(tr("Direction to turn the hand, as the wearer sees it"))
         self.setMinimumSize(80, 72)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._turn = ("", False)

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel, QPlainTextEdit, QWidget
 
 from handcal.session.session import MAX_NOTES_CHARACTERS
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 
 SAVE_MS = 800
@@ -30,8 +31,8 @@ class NotesEditor(QWidget):
         self._session: Path | None = None
         self._saved = ""
         self._edit = QPlainTextEdit()
-        self._edit.setAccessibleName("Notes on the session")
-        self._edit.setPlaceholderText("Notes on this session; saved automatically")
+        self._edit.setAccessibleName(tr("Notes on the session"))
+        self._edit.setPlaceholderText(tr("Notes on this session; saved automatically"))
         self._edit.setTabChangesFocus(True)
         self._edit.setEnabled(False)
         self._edit.textChanged.connect(self._begin)
@@ -80,7 +81,7 @@ class NotesEditor(QWidget):
         if self._edit.isReadOnly() or self._session is None:
             text = ""
         elif self._too_many() > 0:
-            text = f"⚠ Too long by {self._too_many():,} characters: not saved"
+            text = tr("⚠ Too long by {:,} characters: not saved").format(self._too_many())
         else:
-            text = "Saved ✓" if self._edit.toPlainText() == self._saved else "Not saved yet"
+            text = tr("Saved ✓") if self._edit.toPlainText() == self._saved else tr("Not saved yet")
         self._state.setText(text)

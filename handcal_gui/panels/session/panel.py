@@ -20,6 +20,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.types import EyeDistance
 from handcal_gui.panels.session.notes_editor import NotesEditor
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -36,7 +37,7 @@ from handcal_gui.widgets.session_rows import (
 from handcal_gui.widgets.times import local_time
 from handcal_gui.widgets.undo_strip import UndoStrip
 
-_EYE_DISTANCE_HELP = (
+_EYE_DISTANCE_HELP = tr(
     "Distance between the wearer's pupils in millimetres, by a ruler or pupillometer (± 1 mm);\n"
     "empty: not measured. Alignments with both eyes open hardly show it.\n"
     "A change discards the results: solve again."
@@ -73,16 +74,16 @@ class SessionPanel(QWidget):
         self._is_read_only = False
         self._wearer, self._folder, self._started = ElidedLabel(), ElidedLabel(), QLabel()
         self._eye_distance = with_name(
-            QLineEdit(), "eyeDistance", "Eye distance in millimetres", _EYE_DISTANCE_HELP
+            QLineEdit(), "eyeDistance", tr("Eye distance in millimetres"), _EYE_DISTANCE_HELP
         )
         self._eye_distance.editingFinished.connect(self._take_eye_distance)
         self._eye_distance_problem = paragraph("eyeDistanceProblem")
         self._alignments = RecordTable(
-            "Alignments", ALIGNMENT_COLUMNS, "Confirmed alignments appear here"
+            tr("Alignments"), ALIGNMENT_COLUMNS, tr("Confirmed alignments appear here")
         )
         self._alignments.delete_requested.connect(partial(self.delete_requested.emit, "alignment"))
         self._trials = RecordTable(
-            "Trials of the session", TRIAL_COLUMNS, "Recorded trials appear here"
+            tr("Trials of the session"), TRIAL_COLUMNS, tr("Recorded trials appear here")
         )
         self._trials.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
         self._notes = NotesEditor()
@@ -92,9 +93,9 @@ class SessionPanel(QWidget):
             lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
         )
         self._tabs = RecordTabs()
-        self._open_folder = QPushButton("Open folder")
-        self._inspect = QPushButton("Inspect in 3D")
-        self._export = QPushButton("Export…")
+        self._open_folder = QPushButton(tr("Open folder"))
+        self._inspect = QPushButton(tr("Inspect in 3D"))
+        self._export = QPushButton(tr("Export…"))
         self._lay_out()
         self._refresh()
 
@@ -141,22 +142,24 @@ class SessionPanel(QWidget):
         self._eye_distance.setEnabled(record is not None and not self._is_read_only)
         if record is None:
             self._wearer.setText("–")
-            self._folder.setText("Start or open a session to see it here")
+            self._folder.setText(tr("Start or open a session to see it here"))
             self._started.setText("–")
             return
         self._wearer.setText(record.wearer or "–")
         self._folder.setText(str(record.path))
         began = local_time(record.events[0].time, "%Y-%m-%d %H:%M:%S")
-        self._started.setText(f"{began}, finished" if record.is_finished else began)
+        self._started.setText(tr("{}, finished").format(began) if record.is_finished else began)
         if not self._eye_distance.isModified():
             self._show_eye_distance(record.facts.eye_distance)
         self._strip.show_deletions([] if self._is_read_only else deletions(record))
-        self._tabs.setTabText(0, f"Alignments ({len(record.alignments)})")
-        self._tabs.setTabText(1, f"Trials ({len(record.trials)})")
+        self._tabs.setTabText(0, tr("Alignments ({})").format(len(record.alignments)))
+        self._tabs.setTabText(1, tr("Trials ({})").format(len(record.trials)))
 
     def _show_eye_distance(self, stored: EyeDistance | None) -> None:
         is_told = stored is not None and stored.source == "headset"
-        self._eye_distance.setPlaceholderText(f"{stored} (headset)" if is_told else "Not measured")
+        self._eye_distance.setPlaceholderText(
+            tr("{} (headset)").format(stored) if is_told else tr("Not measured")
+        )
         self._eye_distance.setText(
             "" if stored is None or is_told else f"{1e3 * stored.value_m:.1f}"
         )
@@ -170,7 +173,7 @@ class SessionPanel(QWidget):
         try:
             typed = _read_eye_distance(text) if text else None
         except ValueError as error:
-            self._eye_distance_problem.setText(f"Not used: {error}.")
+            self._eye_distance_problem.setText(tr("Not used: {}.").format(error))
             self._eye_distance_problem.show()
             return
         self._show_eye_distance(stored)  # until the session holds the new one
@@ -181,25 +184,28 @@ class SessionPanel(QWidget):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._record.path.absolute())))
 
     def _lay_out(self) -> None:
-        self._open_folder.setToolTip("Show the session's folder in the file manager")
+        self._open_folder.setToolTip(tr("Show the session's folder in the file manager"))
         self._open_folder.clicked.connect(self._show_folder)
         self._inspect.setToolTip(
-            "Show clouds, residuals, eyes and displays in a 3D window of their own (needs Open3D)"
+            tr(
+                "Show clouds, residuals, eyes and displays in a 3D window of their own "
+                "(needs Open3D)"
+            )
         )
         self._inspect.clicked.connect(self.inspect_requested)
-        self._export.setToolTip("Write a report, tables and calibration files")
+        self._export.setToolTip(tr("Write a report, tables and calibration files"))
         self._export.clicked.connect(self.export_requested)
         form = QFormLayout()
         form.setVerticalSpacing(SPACING_PX // 2)
-        form.addRow("Wearer", self._wearer)
-        form.addRow("Folder", self._folder)
-        form.addRow("Started", self._started)
-        form.addRow("Eye distance (mm)", self._eye_distance)
+        form.addRow(tr("Wearer"), self._wearer)
+        form.addRow(tr("Folder"), self._folder)
+        form.addRow(tr("Started"), self._started)
+        form.addRow(tr("Eye distance (mm)"), self._eye_distance)
         form.addRow(self._eye_distance_problem)
         self._eye_distance_problem.hide()
-        self._tabs.addTab(self._alignments, "Alignments")
-        self._tabs.addTab(self._trials, "Trials")
-        self._tabs.addTab(self._notes, "Notes")
+        self._tabs.addTab(self._alignments, tr("Alignments"))
+        self._tabs.addTab(self._trials, tr("Trials"))
+        self._tabs.addTab(self._notes, tr("Notes"))
         buttons = hbox(
             (self._strip, 1), self._open_folder, self._inspect, self._export, spacing=SPACING_PX
         )

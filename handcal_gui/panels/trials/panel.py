@@ -15,14 +15,18 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.display import TARGET_DEPTHS_M
+from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
 from handcal.session.trial import summarise_trials
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
+from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
@@ -39,16 +43,16 @@ from handcal_gui.widgets.session_rows import (
 )
 from handcal_gui.widgets.undo_strip import UndoStrip
 
-_HOW = (
+_HOW = tr(
     "Fine-tune φ until the drawn target covers the real one, then record. A trial is the error of "
     "the solved φ relative to the fine-tuned one."
 )
 
-_UNTOUCHED = (
+_UNTOUCHED = tr(
     "φ of the {} has not been touched since its last trial at this distance. "
     "Press T again if this is a trial of its own."
 )
-_ZERO = (
+_ZERO = tr(
     "φ of the {} is still the solved one: the error would be 0 px. "
     "Press T again if the wearer sees no error."
 )
@@ -65,6 +69,9 @@ class TrialsPanel(QWidget):
     show_target_requested : Signal(str, float)
         Eye and distance of the target to show in the headset instead of the present one.
     hide_target_requested : Signal()
+    compare_requested, end_comparison_requested : Signal()
+    show_compared_requested, comparison_answered : Signal(str)
+        As in `ComparisonRow`.
     doubted : Signal(str)
         Reason why the user must confirm the trial by requesting it again.
     delete_requested, restore_requested : Signal(str, int)
@@ -74,6 +81,10 @@ class TrialsPanel(QWidget):
     trial_requested = Signal(str, float)
     show_target_requested = Signal(str, float)
     hide_target_requested = Signal()
+    compare_requested = Signal()
+    end_comparison_requested = Signal()
+    show_compared_requested = Signal(str)
+    comparison_answered = Signal(str)
     doubted = Signal(str)
     delete_requested = Signal(str, int)
     restore_requested = Signal(str, int)
@@ -86,19 +97,22 @@ class TrialsPanel(QWidget):
         self._record: SessionRecord | None = None
         self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
-        self._shows_target = QCheckBox("Show the target in the headset")
+        self._shows_target = QCheckBox(tr("Show the target in the headset"))
         self._target: tuple[Eye, float] | None = None  # requested
+        self._comparison = ComparisonRow()
+        self._comparison.begun.connect(self.compare_requested)
+        self._comparison.ended.connect(self.end_comparison_requested)
+        self._comparison.show_requested.connect(self.show_compared_requested)
+        self._comparison.answered.connect(self.comparison_answered)
         self._fill_choices()
         self._make_record_action()
-        self._message = QLabel()
-        self._message.setObjectName("message")
-        self._summary = QLabel()
-        self._summary.setObjectName("summary")
+        self._message = paragraph("message")
+        self._summary = paragraph("summary")
         self._table = RecordTable(
-            "Trials", TRIAL_COLUMNS, "Trials appear here as they are recorded"
+            tr("Trials"), TRIAL_COLUMNS, tr("Trials appear here as they are recorded")
         )
         self._table.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
-        self._statistics = NumberTable("Statistics of trials")
+        self._statistics = NumberTable(tr("Statistics of trials"))
         self._plot = TrialPlot()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
@@ -143,14 +157,14 @@ class TrialsPanel(QWidget):
     def _obstacle(self) -> str:
         """Return the reason why no trial can be recorded now; empty if one can."""
         if self._is_read_only:
-            return "This session is open read-only."
+            return tr("This session is open read-only.")
         if self._snapshot is None:
-            return "Trials are recorded while a session runs."
+            return tr("Trials are recorded while a session runs.")
         procedure, eye = self._snapshot.procedure, self._next_eye()
         if procedure.state is not State.APPLIED or procedure.results is None:
-            return "Solve and apply the alignments first."
+            return tr("Solve and apply the alignments first.")
         if eye not in procedure.results.eyes:
-            return f"The {EYE_NAMES[eye].lower()} has not been aligned."
+            return tr("The {} has not been aligned.").format(EYE_NAMES[eye].lower())
         return ""
 
     def _is_zero(self) -> bool:
@@ -187,12 +201,24 @@ class TrialsPanel(QWidget):
         obstacle = self._obstacle()
         self._is_doubtful = self._is_doubtful and bool(self._doubt())
         self.record_action.setEnabled(not obstacle)
-        self._message.setText(obstacle or f"Next: {EYE_NAMES[self._next_eye()].lower()}")
+        self._message.setText(
+            obstacle or tr("Next: {}").format(EYE_NAMES[self._next_eye()].lower())
+        )
         can_show = not (obstacle or (self._record and self._record.is_finished))
         self._shows_target.setEnabled(can_show)
         if not can_show:
             self._shows_target.setChecked(False)
         self._request_target()
+        self._show_comparison(can_compare=can_show)
+
+    def _show_comparison(self, *, can_compare: bool) -> None:
+        snapshot, record = self._snapshot, self._record
+        self._comparison.show_comparison(
+            None if snapshot is None else snapshot.comparing,
+            has_seen_both=snapshot is not None and snapshot.has_compared_both,
+            can_begin=can_compare,
+            count=0 if record is None else len(read_comparisons(record.events)),
+        )
 
     def _request_target(self) -> None:
         """Request another target in the headset if the choice has changed."""
@@ -225,31 +251,34 @@ class TrialsPanel(QWidget):
         self._refresh()
 
     def _fill_choices(self) -> None:
-        self._eyes.setAccessibleName("Eye")
-        self._eyes.setToolTip("The eye that looks at the target; the other is closed")
+        self._eyes.setAccessibleName(tr("Eye"))
+        self._eyes.setToolTip(tr("The eye that looks at the target; the other is closed"))
         for eye in EYES:
             self._eyes.addItem(EYE_NAMES[eye], eye)
-        self._eyes.addItem("Eyes in turn", None)
+        self._eyes.addItem(tr("Eyes in turn"), None)
         self._eyes.setCurrentIndex(len(EYES))
         self._eyes.currentIndexChanged.connect(self._choose_eye)
-        self._depth.setAccessibleName("Distance of the target")
-        self._depth.setToolTip("Distance of the target from the eye, in metres")
+        self._depth.setAccessibleName(tr("Distance of the target"))
+        self._depth.setToolTip(tr("Distance of the target from the eye, in metres"))
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
         self._depth.currentIndexChanged.connect(self._request_target)
         self._shows_target.setToolTip(
-            "Draw the target for this eye, at this distance straight ahead, until a cursor is made "
-            "or the session is finished"
+            tr(
+                "Draw the target for this eye, at this distance straight ahead, until a "
+                "cursor is made "
+                "or the session is finished"
+            )
         )
         self._shows_target.toggled.connect(self._request_target)
 
     def _make_record_action(self) -> None:
         self.record_action = add_action(
             self,
-            "Record trial",
+            tr("Record trial"),
             "T",
             self._ask,
-            tooltip="Record the error of the solved φ relative to the φ set by hand (T)",
+            tooltip=tr("Record the error of the solved φ relative to the φ set by hand (T)"),
             # Also from the fine-tune panel, where the study leader works.
             context=Qt.ShortcutContext.WindowShortcut,
         )
@@ -261,16 +290,16 @@ class TrialsPanel(QWidget):
         choices = hbox(self._eyes, self._depth, record, 1, spacing=SPACING_PX)
         tabs = RecordTabs()
         for page, title in (
-            (self._table, "Trials"),
-            (self._statistics, "Statistics"),
-            (self._plot, "Plot"),
+            (self._table, tr("Trials")),
+            (self._statistics, tr("Statistics")),
+            (self._plot, tr("Plot")),
         ):
             tabs.addTab(page, title)
         vbox(
             hint,
             choices,
-            self._shows_target,
-            self._message,
+            hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
+            self._comparison,
             (tabs, 1),
             self._summary,
             self._strip,

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 from handcal.display import TARGET_DEPTHS_M
 from handcal.session.trial import Trial, TrialStatistics
 from handcal.types import EYES, Eye, Float64
+from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -24,7 +25,9 @@ class TrialPlot(Plot):
     """Shows each corner of each trial, and the median at each distance."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Errors of trials", "Distance of the target (m)", "Error (′)", parent)
+        super().__init__(
+            tr("Errors of trials"), tr("Distance of the target (m)"), tr("Error (′)"), parent
+        )
         self.item.getAxis("bottom").setTicks([[(m, f"{m:g}") for m in TARGET_DEPTHS_M]])
         self.item.setXRange(
             min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M + _LEGEND_M

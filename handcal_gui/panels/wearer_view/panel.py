@@ -9,26 +9,27 @@ from handcal.station.wearer_view import EyeView, Overlay
 from handcal.types import EYES, Eye
 from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
-_TITLES: dict[Eye, str] = {"left": "Left eye", "right": "Right eye"}
-_EMPTY = "This eye's view will appear here. Hold a hand in front of the depth camera."
-_CLOSED = "Closed: this alignment is for the other eye."
-_ERROR = (
+_TITLES: dict[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
+_EMPTY = tr("This eye's view will appear here. Hold a hand in front of the depth camera.")
+_CLOSED = tr("Closed: this alignment is for the other eye.")
+_ERROR = tr(
     "Mean distance between the hand's outline as the eye sees it and as {}, "
     "in the display's pixels and in minutes of arc (′)"
 )
 _LEGEND = {
-    "hand": ("Hand", "The hand, and the target of a trial, as seen by the eye"),
+    "hand": (tr("Hand"), tr("The hand, and the target of a trial, as seen by the eye")),
     "drawn": (
-        "Drawn",
-        "Hand and target as drawn by the headset; they cover the others if φ is right",
+        tr("Drawn"),
+        tr("Hand and target as drawn by the headset; they cover the others if φ is right"),
     ),
-    "cursor": ("Cursor", "The frozen hand as drawn by the headset"),
-    "offline": ("Before", "The hand's outline as drawn before calibration, with φ = 0"),
+    "cursor": (tr("Cursor"), tr("The frozen hand as drawn by the headset")),
+    "offline": (tr("Before"), tr("The hand's outline as drawn before calibration, with φ = 0")),
 }
 
 _NUMBER_SCALE = 0.85
@@ -50,9 +51,9 @@ class WearerViewPanel(QWidget):
             what: LegendEntry(name, LINES[what][0], tooltip, LINES[what][1])
             for what, (name, tooltip) in _LEGEND.items()
         }
-        whole, before = QCheckBox("Whole display"), QCheckBox("Before calibration")
+        whole, before = QCheckBox(tr("Whole display")), QCheckBox(tr("Before calibration"))
         whole.setObjectName("wearer-view-whole")
-        whole.setToolTip("Show each whole display instead of the part with the hand")
+        whole.setToolTip(tr("Show each whole display instead of the part with the hand"))
         before.setObjectName("wearer-view-before")
         before.setToolTip(_LEGEND["offline"][1])
         before.toggled.connect(self._entries["offline"].setVisible)
@@ -93,8 +94,10 @@ class _EyeColumn(QWidget):
         self._name = title
         self._title = QLabel(title)
         self.canvas = EyeCanvas(title)
-        self._now = _ErrorRow("Now", _ERROR.format("the headset draws it"))
-        self._before = _ErrorRow("Before", _ERROR.format("drawn before calibration (φ = 0)"))
+        self._now = _ErrorRow(tr("Now"), _ERROR.format(tr("the headset draws it")))
+        self._before = _ErrorRow(
+            tr("Before"), _ERROR.format(tr("drawn before calibration (φ = 0)"))
+        )
         self._now.emphasise()
         vbox(
             self._title,
@@ -121,8 +124,8 @@ def origin_text(view: EyeView | None, *, is_solved: bool) -> str:
     if view is None:
         return ""
     if view.is_true:
-        return ", simulated"
-    return ", predicted" if is_solved else ", not solved yet"
+        return tr(", simulated")
+    return tr(", predicted") if is_solved else tr(", not solved yet")
 
 
 class _ErrorRow(QWidget):

@@ -17,17 +17,18 @@ from PySide6.QtCore import (
 from handcal.session.library import LibraryEntry
 from handcal.types import EYES, VerdictName
 from handcal_gui.theme import number_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
 
 Filter: TypeAlias = Literal["all", "accepted", "repeat", "unfinished", "damaged"]
 FILTERS: Mapping[Filter, str] = {
-    "all": "All sessions",
-    "accepted": "Accepted",
-    "repeat": "Not accepted",
-    "unfinished": "Unfinished",
-    "damaged": "Damaged",
+    "all": tr("All sessions"),
+    "accepted": tr("Accepted"),
+    "repeat": tr("Not accepted"),
+    "unfinished": tr("Unfinished"),
+    "damaged": tr("Damaged"),
 }
 _Index: TypeAlias = QModelIndex | QPersistentModelIndex
 _NO_INDEX = QModelIndex()
@@ -64,10 +65,10 @@ def worst_arcmin(entry: LibraryEntry, kind: Literal["measured", "expected"]) -> 
 
 def _state(entry: LibraryEntry) -> str:
     if entry.problem:
-        return "Unreadable"
+        return tr("Unreadable")
     if entry.damaged:
-        return f"Damaged: {pluralize(entry.damaged, 'part')}"
-    return "Finished" if entry.is_finished else "Unfinished"
+        return tr("Damaged: {}").format(pluralize(entry.damaged, tr("part"), tr("parts")))
+    return tr("Finished") if entry.is_finished else tr("Unfinished")
 
 
 def _verdicts(entry: LibraryEntry) -> str:
@@ -78,7 +79,7 @@ def _verdicts(entry: LibraryEntry) -> str:
     if len(words) == len(EYES) and len(set(words.values())) == 1:
         return words[EYES[0]]
     return ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items()) or (
-        NOTHING if entry.problem else "Not solved"
+        NOTHING if entry.problem else tr("Not solved")
     )
 
 
@@ -99,7 +100,7 @@ def _errors(kind: Literal["measured", "expected"]) -> Callable[[LibraryEntry], s
 def _trials(entry: LibraryEntry) -> str:
     if entry.trials_arcmin is None:
         return NOTHING
-    return f"{entry.trials_arcmin:.1f} (n = {entry.trials})"
+    return tr("{:.1f} (n = {})").format(entry.trials_arcmin, entry.trials)
 
 
 def _known_first(value: float | None) -> float:
@@ -107,36 +108,53 @@ def _known_first(value: float | None) -> float:
 
 
 COLUMNS = (
-    _Column("Wearer", "Name or code", lambda e: e.wearer or NOTHING, lambda e: e.wearer.casefold()),
     _Column(
-        "Date", "Start, local time", lambda e: local_time(e.started) or NOTHING, lambda e: e.started
+        tr("Wearer"),
+        tr("Name or code"),
+        lambda e: e.wearer or NOTHING,
+        lambda e: e.wearer.casefold(),
     ),
-    _Column("Rig", "Name of the rig", lambda e: e.rig or NOTHING, lambda e: e.rig.casefold()),
-    _Column("Headset", "Name of the headset", lambda e: e.headset or NOTHING, lambda e: e.headset),
-    _Column("Verdict", "Of the newest results", _verdicts, _verdicts),
     _Column(
-        "Measured ′",
-        "Error that is left after the wearer's check, left / right, in arcminutes;\n"
-        "– was not measured",
+        tr("Date"),
+        tr("Start, local time"),
+        lambda e: local_time(e.started) or NOTHING,
+        lambda e: e.started,
+    ),
+    _Column(
+        tr("Rig"), tr("Name of the rig"), lambda e: e.rig or NOTHING, lambda e: e.rig.casefold()
+    ),
+    _Column(
+        tr("Headset"),
+        tr("Name of the headset"),
+        lambda e: e.headset or NOTHING,
+        lambda e: e.headset,
+    ),
+    _Column(tr("Verdict"), tr("Of the newest results"), _verdicts, _verdicts),
+    _Column(
+        tr("Measured ′"),
+        tr(
+            "Error that is left after the wearer's check, left / right, in arcminutes;\n"
+            "– was not measured"
+        ),
         _errors("measured"),
         lambda e: _known_first(worst_arcmin(e, "measured")),
         is_number=True,
     ),
     _Column(
-        "Expected ′",
-        "Error that the solver expects, left / right, in arcminutes; not a measurement",
+        tr("Expected ′"),
+        tr("Error that the solver expects, left / right, in arcminutes; not a measurement"),
         _errors("expected"),
         lambda e: _known_first(worst_arcmin(e, "expected")),
         is_number=True,
     ),
     _Column(
-        "Trials ′",
-        "Mean error of the user test in arcminutes, each trial counting once, and their number",
+        tr("Trials ′"),
+        tr("Mean error of the user test in arcminutes, each trial counting once, and their number"),
         _trials,
         lambda e: _known_first(e.trials_arcmin),
         is_number=True,
     ),
-    _Column("State", "Check names what is damaged; Repair copies the rest", _state, _state),
+    _Column(tr("State"), tr("Check names what is damaged; Repair copies the rest"), _state, _state),
 )
 
 

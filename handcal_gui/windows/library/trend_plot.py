@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.session.library import LibraryEntry
 from handcal.types import EYES, Eye
+from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -19,7 +20,9 @@ class TrendPlot(Plot):
     """Shows measured errors by filled symbols, and those only expected by hollow ones."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Trend", "Calibration of this wearer, oldest first", "Error (′)", parent)
+        super().__init__(
+            tr("Trend"), tr("Calibration of this wearer, oldest first"), tr("Error (′)"), parent
+        )
         self.show_legend()
         self.item.setLimits(yMin=0.0)
         self._measured = {

@@ -30,6 +30,7 @@ from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX, flat_header
+from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, choice, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -44,7 +45,7 @@ from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
 _MOST_NAMED = 3
 _MOST_SHOWN_PX = 150
-_LONG_NAMES_PX = {"Rig": 100, "Headset": 100}
+_LONG_NAMES_PX = {tr("Rig"): 100, tr("Headset"): 100}
 _TREND_PX = 20 * SPACING_PX
 
 
@@ -71,17 +72,17 @@ class LibraryWindow(QDialog):
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("library")
-        self.setWindowTitle("Sessions")
+        self.setWindowTitle(tr("Sessions"))
         self._folder = folder
         self._deleted: tuple[Path, ...] = ()
         self._is_read = False
         self._job: Job | None = None
         self._sessions = SessionsModel()
         self._filter = SessionsFilter(self._sessions)
-        self._search = with_name(QLineEdit(), "search", "Search")
-        self._search.setPlaceholderText("Search wearer, date, rig, headset")
+        self._search = with_name(QLineEdit(), "search", tr("Search"))
+        self._search.setPlaceholderText(tr("Search wearer, date, rig, headset"))
         self._search.setClearButtonEnabled(True)
-        self._kind = choice("kind", "Sessions shown", FILTERS)
+        self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = _table(self._filter)
         self._count = paragraph("count")
         self._trend = TrendPlot()
@@ -169,23 +170,29 @@ class LibraryWindow(QDialog):
         self._delete.setEnabled(is_free and bool(chosen))
         self._undo.setVisible(bool(self._deleted))
         last = self._deleted[-1].name if self._deleted else ""
-        self._deleted_text.setText(f"{last} deleted." if last else "")
+        self._deleted_text.setText(tr("{} deleted.").format(last) if last else "")
         shown, total = self._filter.rowCount(), self._sessions.rowCount()
-        count = pluralize(total, "session") if shown == total else f"{shown} of {total} sessions"
-        selected = f", {len(chosen)} selected" if chosen else ""
-        shown_count = f"{count} in {self._folder}{selected}"
-        self._count.setText(shown_count if self._is_read else f"Reading {self._folder}…")
+        count = (
+            pluralize(total, tr("session"), tr("sessions"))
+            if shown == total
+            else tr("{} of {} sessions").format(shown, total)
+        )
+        selected = tr(", {} selected").format(len(chosen)) if chosen else ""
+        shown_count = tr("{} in {}{}").format(count, self._folder, selected)
+        self._count.setText(
+            shown_count if self._is_read else tr("Reading {}…").format(self._folder)
+        )
         self._show_trend(chosen[0].wearer if chosen else "")
 
     def _show_trend(self, wearer: str) -> None:
         found = calibrations_of(wearer, self._sessions.entries)
         self._trend.setVisible(len(found) > 1)
         if len(found) > 1:
-            self._trend_title.setText(f"{wearer}: {len(found)} calibrations")
+            self._trend_title.setText(tr("{}: {} calibrations").format(wearer, len(found)))
             self._trend.show_calibrations(found)
         else:
             self._trend_title.setText(
-                "Select a wearer with several calibrations to see how their errors went on."
+                tr("Select a wearer with several calibrations to see how their errors went on.")
             )
 
     def _open_chosen(self) -> None:
@@ -207,7 +214,7 @@ class LibraryWindow(QDialog):
         def work(progress: Progress) -> str:
             lines = []
             for done, path in enumerate(paths):
-                progress.at(done / len(paths), f"Checking {path.name}")
+                progress.at(done / len(paths), tr("Checking {}").format(path.name))
                 found = check_session(path)
                 if found.state == "sound":
                     continue
@@ -215,7 +222,8 @@ class LibraryWindow(QDialog):
                 more = len(found.damaged) - _MOST_NAMED
                 lines.append(f"{path.name}: {named}{f' (and {more} more)' if more > 0 else ''}")
             sound = len(paths) - len(lines)
-            return "\n".join((f"{pluralize(sound, 'session')} sound, every file read.", *lines))
+            count = pluralize(sound, tr("session"), tr("sessions"))
+            return "\n".join((tr("{} sound, every file read.").format(count), *lines))
 
         self._start(work)
 
@@ -224,10 +232,12 @@ class LibraryWindow(QDialog):
         output = _free(path.with_name(f"{path.name}-repaired"))
 
         def work(progress: Progress) -> str:
-            progress.at(0.0, f"Repairing {path.name}")
+            progress.at(0.0, tr("Repairing {}").format(path.name))
             made = repair_session(path, output)
-            kept = pluralize(len(made.alignments), "alignment")
-            return f"{output.name}: a copy with {kept} and {pluralize(len(made.trials), 'trial')}."
+            kept = pluralize(len(made.alignments), tr("alignment"), tr("alignments"))
+            return tr("{}: a copy with {} and {}.").format(
+                output.name, kept, pluralize(len(made.trials), tr("trial"), tr("trials"))
+            )
 
         self._start(work)
 
@@ -236,15 +246,17 @@ class LibraryWindow(QDialog):
 
         def work(progress: Progress) -> str:
             for done, path in enumerate(paths):
-                progress.at(done / len(paths), f"Deleting {path.name}")
+                progress.at(done / len(paths), tr("Deleting {}").format(path.name))
                 delete_session(path)
-            return f"{pluralize(len(paths), 'session')} deleted; Restore brings the last one back."
+            return tr("{} deleted; Restore brings the last one back.").format(
+                pluralize(len(paths), tr("session"), tr("sessions"))
+            )
 
         self._start(work)
 
     def _restore_last(self) -> None:
         last = self._deleted[-1]
-        self._start(lambda _: f"{restore_session(last).name} is back.")
+        self._start(lambda _: tr("{} is back.").format(restore_session(last).name))
 
     def _start(self, work: Work) -> None:
         if self._job is not None:
@@ -271,18 +283,43 @@ class LibraryWindow(QDialog):
 
     def _make_buttons(self) -> None:
         made: list[tuple[str, str, str, Callable[[], None]]] = [
-            ("openSession", "Open", "Review the selected session", self._open_chosen),
-            ("resumeSession", "Resume", "Continue the selected session", self._resume_chosen),
-            ("exportSessions", "Export…", "Export the selected sessions", self._export_chosen),
-            ("checkSessions", "Check", "Read every file of the selected", self._check_chosen),
+            ("openSession", tr("Open"), tr("Review the selected session"), self._open_chosen),
+            (
+                "resumeSession",
+                tr("Resume"),
+                tr("Continue the selected session"),
+                self._resume_chosen,
+            ),
+            (
+                "exportSessions",
+                tr("Export…"),
+                tr("Export the selected sessions"),
+                self._export_chosen,
+            ),
+            (
+                "checkSessions",
+                tr("Check"),
+                tr("Read every file of the selected"),
+                self._check_chosen,
+            ),
             (
                 "repairSession",
-                "Repair",
-                "Copy what is sound to a new one",
+                tr("Repair"),
+                tr("Copy what is sound to a new one"),
                 self._repair_chosen,
             ),
-            ("deleteSessions", "Delete", "Move the selected away (Del)", self._delete_chosen),
-            ("restoreSession", "Restore", "Bring the last deleted back", self._restore_last),
+            (
+                "deleteSessions",
+                tr("Delete"),
+                tr("Move the selected away (Del)"),
+                self._delete_chosen,
+            ),
+            (
+                "restoreSession",
+                tr("Restore"),
+                tr("Bring the last deleted back"),
+                self._restore_last,
+            ),
         ]
         found = []
         for name, text, help_text, do in made:
@@ -292,8 +329,8 @@ class LibraryWindow(QDialog):
             found.append(one)
         self._open, self._resume, self._export, self._check, self._repair = found[:5]
         self._delete, self._undo = found[5:]
-        add_action(self._table, "Delete sessions", "Del", self._delete.click)
-        add_action(self._table, "Open the session", "Return", self._open_chosen)
+        add_action(self._table, tr("Delete sessions"), "Del", self._delete.click)
+        add_action(self._table, tr("Open the session"), "Return", self._open_chosen)
 
     def _lay_out(self) -> None:
         self._deleted_text = ElidedLabel()
@@ -331,7 +368,7 @@ class LibraryWindow(QDialog):
 
 
 def _table(model: SessionsFilter) -> QTableView:
-    table = with_name(QTableView(), "sessionTable", "Sessions")
+    table = with_name(QTableView(), "sessionTable", tr("Sessions"))
     table.setModel(model)
     table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)

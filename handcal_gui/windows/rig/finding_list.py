@@ -44,7 +44,8 @@ class FindingList(QTreeWidget):
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
             item = QTreeWidgetItem([one.what, one.found, expected])
-            item.setIcon(0, good if one.is_fine else doubtful)
+            if one.is_known:
+                item.setIcon(0, good if one.is_fine else doubtful)
             for column in range(3):
                 item.setToolTip(column, item.text(column))
             self.addTopLevelItem(item)

@@ -53,3 +53,4 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
     assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names
     assert {"start", "window-trial-doubt", "export-done", "review", "preferences"} <= names
+    assert {"station", "sessions", "rig", "evaluate", "support", "manual"} <= names

@@ -55,6 +55,23 @@ def test_a_slow_computer_is_named_once_until_it_is_fast_again(snapshot: Maker) -
     assert watch(conditions, fast, [12.0]) == [""]
 
 
+@pytest.mark.parametrize(
+    ("is_usb", "dropped", "advice"),
+    [
+        (False, 0, "close other programs"),
+        (True, 0, "plug the camera into a USB 3 port"),
+        (True, 40, "close other programs"),
+    ],
+)
+def test_advice_names_usb_only_for_a_camera_that_sends_few_frames(
+    snapshot: Maker, is_usb: bool, dropped: int, advice: str
+) -> None:
+    conditions = Conditions(is_usb=is_usb)
+    watch(conditions, snapshot(camera={"rate_hz": 2.0}), [0.0, 1.0])
+    later = snapshot(camera={"rate_hz": 2.0, "dropped": dropped})
+    assert watch(conditions, later, [4.0, 5.0])[-1].endswith(f"needed; {advice}")
+
+
 @pytest.mark.parametrize("rate_hz", [8.0, 15.0, 30.0])
 def test_a_camera_that_is_fast_enough_is_not_named(snapshot: Maker, rate_hz: float) -> None:
     conditions = Conditions()

@@ -15,6 +15,7 @@ from handcal.errors import CancelledError
 from handcal.progress import Progress
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
+from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 
@@ -76,7 +77,9 @@ def test_a_session_is_shown_and_closed_again(
     program.open_session(record.path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 0 trials")
-    assert child(program, QLabel, "reviewLefteye").text()
+    card = child(program, ReviewPage, "reviewPage").findChild(QLabel, "card-verdict-left")
+    assert isinstance(card, QLabel)
+    assert card.text().startswith("Left eye: ")
     assert program.preferences.sessions == (str(record.path),)
     child(program, QPushButton, "reviewClose").click()
     assert program.window.page == "start"

@@ -106,10 +106,14 @@ def test_what_is_chosen_is_exported_and_remembered(
     box(dialog, "csv").click()
     box(dialog, "json").click()
     assert far.isEnabled()
+    box(dialog, "json").click()
+    assert not far.isEnabled()
+    box(dialog, "unity").click()
+    assert far.isEnabled()
     far.setValue(50.0)
     with qtbot.waitSignal(dialog.remembered) as remembered:
         press(dialog, "export").click()
-    expected = ExportSettings(("report", "json"), far_m=50.0)
+    expected = ExportSettings(("report", "unity"), far_m=50.0)
     assert remembered.args == [expected, tmp_path / "out"]
     bar = dialog.findChild(QProgressBar, "progress")
     assert isinstance(bar, QProgressBar)
@@ -179,10 +183,11 @@ def test_closing_while_it_runs_cancels_and_then_closes(
 
 
 def test_a_real_session_is_exported(qtbot: QtBot, record: SessionRecord, tmp_path: Path) -> None:
-    dialog = ExportDialog(record, ExportSettings(("csv", "yaml")), tmp_path / "out")
+    dialog = ExportDialog(record, ExportSettings(("csv", "unity", "yaml")), tmp_path / "out")
     qtbot.addWidget(dialog)
     dialog.start()
     qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.", timeout=20_000)
     target = tmp_path / "out" / f"{record.path.name}-export"
     made = sorted(path.name for path in target.iterdir())
-    assert made == ["calibration.yaml", "parameters.csv", "trials.csv"] == sorted(files(dialog))
+    wanted = ["calibration.yaml", "parameters.csv", "trials.csv", "unity.json"]
+    assert made == wanted == sorted(files(dialog))

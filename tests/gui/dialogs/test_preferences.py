@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QSpinBox
 from pytestqt.qtbot import QtBot
 
+from handcal.bridge.bridges import BridgeSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.preferences import Preferences
@@ -26,6 +27,13 @@ def test_untouched_preferences_stay_as_they_are(qtbot: QtBot) -> None:
     assert dialog.preferences() == BEFORE
 
 
+def test_an_address_typed_into_the_file_is_kept(qtbot: QtBot) -> None:
+    before = replace(BEFORE, bridges=BridgeSettings("192.0.2.1"))
+    dialog = PreferencesDialog(before)
+    qtbot.addWidget(dialog)
+    assert dialog.preferences() == before
+
+
 def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
     dialog = PreferencesDialog(BEFORE)
     qtbot.addWidget(dialog)
@@ -42,7 +50,18 @@ def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
     assert isinstance(learn, QCheckBox)
     target.setValue(6.5)
     learn.click()
+    slicer, port = dialog.findChild(QComboBox, "slicer"), dialog.findChild(QSpinBox, "slicerPort")
+    lsl = dialog.findChild(QCheckBox, "lsl")
+    assert isinstance(slicer, QComboBox)
+    assert isinstance(port, QSpinBox)
+    assert isinstance(lsl, QCheckBox)
+    assert not port.isEnabled()
+    slicer.setCurrentIndex(slicer.findText("For this computer"))
+    assert port.isEnabled()
+    port.setValue(20_000)
+    lsl.click()
     after = dialog.preferences()
+    assert after.bridges == BridgeSettings("127.0.0.1", 20_000, lsl=True)
     assert after.theme == "dark"
     assert after.station.sessions == "/b"
     assert np.degrees(after.station.calibration.guard.limit_rad) == 10.5
@@ -51,6 +70,6 @@ def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
     station = replace(
         after.station, sessions="/a", learn_prior=True, calibration=BEFORE.station.calibration
     )
-    assert replace(after, theme="light", station=station) == BEFORE
+    assert replace(after, theme="light", station=station, bridges=BEFORE.bridges) == BEFORE
     folder.set_path("")  # no folder is no choice
     assert dialog.preferences().station.sessions == "/a"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -10,11 +11,15 @@ from typing import Any, cast
 import pytest
 from pytestqt.qtbot import QtBot
 
+from handcal.bridge.bridge import Bridge
+from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.io.closable import Closable
 from handcal.station.procedure import ProcedureError
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import EngineThread
+
+LOCAL = "127.0.0.1"
 
 
 class FakeStation(Closable):
@@ -25,6 +30,7 @@ class FakeStation(Closable):
         self.is_closed = False
         self.notes = ""
         self.breaks_at: int | None = None
+        self.watchers: list[object] = []
 
     def step(self) -> Any:
         time.sleep(0.002)
@@ -32,6 +38,9 @@ class FakeStation(Closable):
         if self.steps == self.breaks_at:
             raise ZeroDivisionError("oh")
         return self.steps
+
+    def watch(self, watcher: object) -> None:
+        self.watchers.append(watcher)
 
     def close(self) -> None:
         self.is_closed = True
@@ -137,3 +146,37 @@ def test_an_engine_that_breaks_down_closes_the_station_and_says_so(qtbot: QtBot)
         "handcal hit an unexpected error (ZeroDivisionError: oh); the session is kept"
     ]
     assert station.is_closed
+
+
+def test_bridges_watch_the_station_and_end_before_it(qtbot: QtBot) -> None:
+    pytest.importorskip("pyigtl")
+    station, port = FakeStation(), free_tcp_port()
+    engine = EngineThread(lambda: cast(Station, station), bridges=BridgeSettings(LOCAL, port))
+    with qtbot.waitSignal(engine.opened, timeout=5000):
+        engine.start()
+    (bridge,) = station.watchers
+    assert isinstance(bridge, Bridge)
+    assert not bridge.is_over
+    engine.close()
+    assert bridge.is_over
+    socket.create_server((LOCAL, port)).close()  # the port is free again
+
+
+def test_a_bridge_that_cannot_be_opened_is_told_and_the_calibration_goes_on(qtbot: QtBot) -> None:
+    pytest.importorskip("pyigtl")
+    station = FakeStation()
+    with socket.create_server((LOCAL, 0)) as taken:
+        bridges = BridgeSettings(LOCAL, taken.getsockname()[1])
+        engine = EngineThread(lambda: cast(Station, station), bridges=bridges)
+        told: list[str] = []
+        engine.told.connect(told.append)
+        with qtbot.waitSignal(engine.opened, timeout=5000):
+            engine.start()
+        qtbot.waitUntil(lambda: station.steps > 2)
+        engine.close()
+    assert ["cannot listen" in line for line in told] == [True]
+
+
+def free_tcp_port() -> int:
+    with socket.create_server((LOCAL, 0)) as server:
+        return int(server.getsockname()[1])

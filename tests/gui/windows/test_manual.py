@@ -7,15 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QTextDocument
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.windows.manual import Manual
+from handcal_gui.windows.manual import Manual, find_lines, read_lines
 from tests.helpers import ROOT
 
 PAGES = sorted((ROOT / "docs").glob("*.md"))
+_WORD = re.compile(r"\w+")
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
@@ -28,28 +30,59 @@ def manual(qtbot: QtBot) -> Iterator[Manual]:
 
 
 def heading_in_view(manual: Manual) -> str:
-    return manual.textCursor().block().text()
+    return manual.page.textCursor().block().text()
 
 
 def test_a_link_leads_to_the_heading_of_another_page_and_back(manual: Manual) -> None:
     manual.open("docs/index.md")
-    assert "bare hand" in manual.toPlainText()
-    manual.setSource(QUrl("protocol.md#what-the-headset-shows-and-when"))
-    assert manual.source().fileName() == "protocol.md"
+    assert "bare hand" in manual.page.toPlainText()
+    manual.page.setSource(QUrl("protocol.md#what-the-headset-shows-and-when"))
+    assert manual.page.source().fileName() == "protocol.md"
     assert heading_in_view(manual) == "What the headset shows, and when"
-    assert manual.verticalScrollBar().value() > 0
-    manual.backward()
-    assert manual.source().fileName() == "index.md"
+    assert manual.page.verticalScrollBar().value() > 0
+    manual.page.backward()
+    assert manual.page.source().fileName() == "index.md"
 
 
 def test_a_picture_is_no_page_and_never_wider_than_the_window(manual: Manual) -> None:
     manual.open("docs/index.md")
-    manual.setSource(QUrl("pictures/start.png"))
-    assert manual.source().fileName() == "index.md"
+    manual.page.setSource(QUrl("pictures/start.png"))
+    assert manual.page.source().fileName() == "index.md"
     kind = QTextDocument.ResourceType.ImageResource.value
-    picture = manual.loadResource(kind, QUrl("pictures/start.png"))
+    picture = manual.page.loadResource(kind, QUrl("pictures/start.png"))
     assert isinstance(picture, QImage)
     assert 0 < picture.width() <= manual.width()
+
+
+def test_a_search_lists_lines_of_all_pages_and_return_goes_from_one_to_the_next(
+    manual: Manual,
+) -> None:
+    manual.open("docs/index.md")
+    assert not manual.found.isVisible()
+    QTest.keyClick(manual.page, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClicks(manual.search, "projection SKEW")
+    rows = range(manual.found.topLevelItemCount())
+    lines = [line for row in rows if (line := manual.found.topLevelItem(row))]
+    assert {"Export", "Architecture"} <= {line.text(0) for line in lines}
+    assert all({"projection", "skew"} <= set(_WORD.findall(line.text(2).lower())) for line in lines)
+    for line in lines[:2]:
+        QTest.keyClick(manual.search, Qt.Key.Key_Return)
+        assert manual.found.currentItem() is line
+        assert line.text(0) in manual.page.toPlainText()
+        assert manual.page.textCursor().block().text() in line.text(2)
+    QTest.keyClick(manual.search, Qt.Key.Key_Escape)
+    assert not manual.search.text()
+    assert not manual.found.isVisible()
+
+
+def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
+    text = "# Page\n\n## Keys\n\n| key | does |\n|---|---|\n| **F1** | shows *keys* |\n"
+    (tmp_path / "page.md").write_text(text)
+    lines = read_lines(tmp_path)
+    rows = [(line.title, line.section, line.text) for line in find_lines(lines, "f1 keys")]
+    assert rows == [("Page", "Keys", "F1 · shows keys")]
+    assert find_lines(lines, "key")[0].text == "Keys"  # headings come first
+    assert find_lines(lines, "  ") == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -255,3 +255,33 @@ def test_a_finished_session_is_only_looked_at(panel: TrialsPanel, tried: Session
     panel.show_record(tried)
     assert not button(panel, QToolButton, "Record trial").isEnabled()
     assert text(panel, "undoText") == ""
+
+
+def test_a_blinded_comparison_is_asked_for_step_by_step(
+    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
+) -> None:
+    begin = button(panel, QPushButton, "Blinded comparison")
+    assert not begin.isEnabled()
+    applied = snapshot(State.APPLIED)
+    panel.show_snapshot(applied)
+    with qtbot.waitSignal(panel.compare_requested):
+        begin.click()
+    first = replace(applied, comparing="first")
+    panel.show_snapshot(first)
+    assert not begin.isVisible()
+    better = button(panel, QPushButton, "Second is better")
+    assert not better.isEnabled()  # before both were shown
+    second = button(panel, QPushButton, "Show second")
+    with qtbot.waitSignal(panel.show_compared_requested) as asked:
+        second.click()
+    assert asked.args == ["second"]
+    assert not second.isChecked()  # until the station shows it
+    panel.show_snapshot(replace(first, comparing="second", has_compared_both=True))
+    assert second.isChecked()
+    with qtbot.waitSignal(panel.comparison_answered) as answered:
+        better.click()
+    assert answered.args == ["second"]
+    with qtbot.waitSignal(panel.end_comparison_requested):
+        button(panel, QPushButton, "Cancel").click()
+    panel.show_snapshot(applied)
+    assert begin.isVisible()

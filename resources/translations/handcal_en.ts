@@ -1,0 +1,3656 @@
+<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE TS>
+<TS version="2.1" language="en" sourcelanguage="en">
+<context>
+    <name></name>
+    <message>
+        <source>Starting handcal…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Starting…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>plug the camera into a USB 3 port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>close other programs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>frames per second: only {:.0f} of the {:.0f} that are needed; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>record the trial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>move the outline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>go back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>restart the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>set φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>record φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>show the target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>hide the target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>delete the {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>restore the {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>set the eye distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Could not {}: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>save the notes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} was not opened: cancelled</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reading the session…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It contains no alignments yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the camera&apos;s setting</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest available</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Default</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>High accuracy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>High density</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Medium density</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera settings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Image size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Size of both depth and colour images, at 30 Hz.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth preset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The RealSense SDK&apos;s visual preset; the settings below take precedence.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exposure</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Of the depth image; a frame lasts 33,333 µs.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Automatic</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Laser power</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Power of the projector; 0 mW switches it off.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For the whole image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measures the exposure of colour on the whole image, not on the hand once found.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Spatial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Smooths each depth image, keeping edges.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Temporal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Averages over the last depth images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hole filling</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fills in depth where none was measured.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exposure of colour</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth filters</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Filters smooth and invent depth: calibrate without them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restore defaults</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} filter</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>sent, not acknowledged yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>acknowledged by the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not acknowledged; try again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Connect a headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Code to type in the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>New code</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Invite another headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A headset is connected. New code pairs another one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Scan the code with the headset&apos;s app. Without a camera: choose this computer ({}, port {}) in the app and type the digits.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no headset is connected yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Paired. The headset connects by itself from now on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The code has expired. New code makes another one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Test square, 8 cm at 0.5 m</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show to {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer sees it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: the wearer sees it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verdict, eye shifts, figures and settings, to read and archive</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The report for a browser, and each figure with its data</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One row for each eye, alignment and trial, for statistics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Projection, K, H0 and φ of each eye, read by cv2.FileStorage</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The projections in the convention of each system</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cursor and hand of each alignment, with residuals</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All recorded data, to archive or to open elsewhere</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The final calibration for Unity&apos;s JsonUtility</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The final calibration as views of OpenXR: poses and angles</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The final calibration for Monado&apos;s North Star driver</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The eyes as transforms and the clouds as models</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Anything nearer is not drawn.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Anything farther is not drawn.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For one program each:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Near plane (OpenGL, Unity)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Far plane (OpenGL, Unity)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The folder {} is created there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the session and earlier exports are unchanged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Files</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Starting</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Done.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} in {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>files</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing was exported.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelling…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Paired headsets</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Paired headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Device</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No headset is paired yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rename</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rename the chosen headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Revoke…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Revoke the chosen headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It can then no longer connect</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Without a name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Revoke {}? Its session ends, and it connects again only after it has been paired again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Revoke</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Same as the system</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Light</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Dark</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>High contrast</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest expected error of a calibration that is accepted, in arcminutes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Learn where wearers&apos; eyes are from the finished sessions in this folder with the same rig,
+once there are enough.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Off</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For this computer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For other computers, too</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Serve OpenIGTLink during calibrations, for 3D Slicer and others. It has no password:
+any computer that reaches the address can read.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>TCP port of OpenIGTLink.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the events of calibrations to the Lab Streaming Layer, on which any computer of the
+local network can read them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Preferences</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Theme</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Session folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Learn from earlier sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send events to the Lab Streaming Layer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Prior</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Told to other programs, from the next calibration on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Program</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One file to send with a bug report: the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced. It holds nothing of any session, and frames of the camera only if you add a recording here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Support bundle</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recording to add</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>None</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is written; it holds {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Window</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press the button, or open the list, that has the focus</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press a button at the lower left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close the message at the top</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move to the next button or field</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fine-tune</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Arrows, PgUp, PgDown</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move what the chosen eye sees, as the key points</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({}: {}). Everything captured is saved; restart the program if it no longer works.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Export…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Resume this session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open camera and headset to add alignments, fine-tuning or trials</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrate a&amp;gain</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The same wearer, or the headset has slipped: begins with this result, which each eye checks first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close &amp;session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Session without a name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Started</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not finished</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>finished</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>alignments</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>trial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>trials</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Contents</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Note</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Damaged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Journal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The last line is incomplete, as after a crash.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>By the seed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Advanced</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Real time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Plays at the recorded rate; otherwise every frame, as fast as possible.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Loop</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Starts again at the end.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recordings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Seed of the simulated wearer, hand and room.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Datagrams dropped in each direction.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Datagrams delivered out of order.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulated hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand that is raised.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulated wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulated loss</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulated reordering</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulator</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RealSense recordings ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Serial number; any if empty</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Serial number</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Settings…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Image size, preset, exposure, laser power and filters.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Virtual headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Network headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address to listen on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address of this computer on which to listen for the headset; 0.0.0.0 for all.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>UDP port that the headset connects to.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start a calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>These settings are kept for the next wearer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Wearer&apos;s name or code</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name or code</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancel the start (Esc)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Opening camera and headset…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fix first: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelling once camera and headset are open…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recommended</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>As in the paper</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recommended: the hand is raised once; its cursors are placed where they tell most,
+and each eye is verified. The steps follow by themselves.
+As in the paper: each cursor is the hand where it is held; you choose the eyes in the guide.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Both eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Left eye only</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Right eye only</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Plan</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One eye for a wearer who sees with one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source> · damaged: {} left out</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>part</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>parts</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Resume</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>These calibrations were interrupted. You can resume them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unfinished sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Review it, solve it again, export it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recent sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recent sessions will be listed here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Example</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open the example session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A simulated wearer&apos;s session, copied to the session folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose folder…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All sessions…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search, compare, export and repair sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Evaluate</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulated studies, the cube test, and the user test.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Evaluate…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measure the accuracy of calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrate a see-through headset with the wearer&apos;s bare hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rig files (*.yaml *.yml)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Example rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The offline calibration of headset and camera; the virtual headset accepts any.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrate…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrate a rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Each calibration gets its own folder in this folder.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Connect…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use the simulator</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use the virtual headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use a network headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use the example</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press the large button, except from a text field</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press the large button from anywhere</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Confirm for the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, or {} from a text field</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, or Return while this button has the focus</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer has looked slowly to the left and to the right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand held still</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand found</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no hand in view</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} eye: {}, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Guide camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Guide {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, before the calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, now</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check l&amp;eft eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check &amp;right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} The hand stays up.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the alignments &amp;so far</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Raise one bare hand {}, palm toward you and fingers a little apart; hold it still.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the hand still: it becomes the cursor for {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the hand up: the next cursor, for {}, follows at once.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Make cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solve for the positions of the eyes; the hand stays up.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the corrected projections to the headset; the hand stays up.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Discard and repeat</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Deletes the last alignment; the session panel can restore it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send to the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solve</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the hand up and still, to measure the error of the {} eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verify the {} eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand stays up while the headset receives its projections.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sending…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finish as it is</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do not use this result. Follow the advice below, then add alignments.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted yet: add an alignment, or check an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer has verified the result. Finish, or check an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finish</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nobody has verified every eye. Finish, or check an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Add alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset &amp;slipped</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset draws with another φ than this result: gone back, or set by hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Blink before/after</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show both in turn</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy the result as text</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print the result</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>without a name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One eye after the other</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Both eyes at once</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at forearm&apos;s length, 40 to 60 cm from the eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Draws with a result that should not be used</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No image from the camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset connected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset pose: {:.0f} Hz</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No pose from the headset yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the headset on the wearer and wait until camera and headset are connected.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Begin</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Raise one bare hand {}, palm toward you and fingers a little apart.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close the {} eye. </source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}Move the hand until it lies under the cursor, then confirm in the headset.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand rotated by less than {:g}°</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Make another cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Discards this cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} confirmed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer may lower the hand. Solve for the positions of the eyes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Waiting for the headset to acknowledge its projections.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the corrected projections to the headset.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do not use this result. Follow the advice below, then repeat.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send &amp;anyway</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the offline calibration of {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep offline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the projections to the headset, those of {} offline.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The alignments have changed. Solve again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Now repeat this with {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finish with &amp;one eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add l&amp;eft eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add &amp;right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Raise the hand and hold it still, to measure the error of the {} eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Skip</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted yet: align {} again, or keep the result as it is.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep as it &amp;is</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer has verified the result. Finish, or add an alignment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer looks at the raised hand: the outline should lie on it. If it does not, add an alignment or fine-tune φ.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It fits</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Saved in {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>E&amp;xport…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The session is complete. Take the headset off, or continue with the next wearer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Everything is already saved. Finish the session when you are done.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finish session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>down</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close the {} eye. Arrow keys move the outline, + and − change its size, until it covers the hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It covers the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Undo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>both eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the {} eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Connect</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verify</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline down</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline far left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline far right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline far up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the outline far down</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Make the outline larger</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Make the outline smaller</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Draw with φ before the newest, or with the newest again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Draw with the offline calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold: no step runs by itself, each waits for you (H)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the steps that run by themselves, or let them run</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One eye after the other measures the position of each eye and takes two alignments.
+Both eyes at once is quicker, but cannot measure an eye distance that differs from the rig&apos;s.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>E&amp;yes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments made; the ring fills until a step runs by itself</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Yes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Scale of depth</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth in metres. The hand is searched from {:.2f} to {:.2f} m (colour). Grey: nearer or farther. Black: not measured.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The camera image will appear here. Choose a camera on the start page.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This camera has no colour image.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colour</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Both</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Freeze</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Freeze the image (F)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Displayed image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the colour image, the depth image or both</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save image…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Frozen</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>PNG images (*.png)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colour image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Frames per second over the last second</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Time since the displayed frame arrived, in milliseconds</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Frames missing from the camera&apos;s own count since it started</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Age</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Dropped</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotated by {:.1f}°: too far</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>3D view of the hand cloud</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drag to rotate, drag with the right or middle button to move, scroll to zoom, double-click to reset the view. Keys: arrows, +, −, 1, 2, 3 and R.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotate left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotate right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotate up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotate down</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Zoom in</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Zoom out</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Front</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Side</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Top</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand cloud will appear here. Hold a hand in front of the depth camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>mm from the depth camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>mm from the centre of the cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The live hand is rotated too far</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>As the wearer sees it (1)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From the wearer&apos;s right (2)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From above (3)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Oblique view of the whole scene (R, or double-click)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Points of the frozen hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Live hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Points of the present hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pairs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>While aligning, join points of the live hand with the nearest points of the cursor once the hand is laid over it; updated twice a second</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to the right of the rig&apos;s viewpoint (φ1); negative is to the left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>below the rig&apos;s viewpoint (φ2); negative is above</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>in front of the rig&apos;s viewpoint, towards the display (φ3); negative is behind</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Shift of the drawn target to the right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Upward shift of the drawn target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Enlargement of the drawn target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The arrow keys move this eye (E changes)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} φ{} in millimetres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}
+The slider goes to ±{:g} mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the eye {}, in millimetres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, relative to the φ compared with</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). Click here first; E changes the eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Confirm the alignment, solve and apply it first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solve and apply the alignment first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Apply the solved projections first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset is receiving the solved projections.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>An eye is being verified; confirm or skip that first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sending to the headset…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not acknowledged by the headset; see Link</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fine-tuning starts with a session.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>against the solved φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>against the offline φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Undo the last change</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Redo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Redo the change</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move both eyes by the same amount</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reset to solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Set φ to the one solved from the alignments</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reset to offline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Set φ to 0, the offline calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the solved φ in the headset while checked</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show offline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show φ = 0 in the headset while checked</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Arrows move by {:g} mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Step of {:g} mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Other eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the target from the eye, in metres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Step</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Effect at</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset is not connected; see Link.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Latency history</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Latency, last {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Latency of the last {:g} s, in milliseconds</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Loss history</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Lost: — to, - - from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Share of the datagrams of the last {:g} s that did not arrive: to the headset (solid line) and from it (dashed)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Latency</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Half the median time of a round trip to the headset, in milliseconds</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Clock</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset&apos;s clock minus this computer&apos;s, in seconds, and its uncertainty, in milliseconds</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Clock drift</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drift of the headset&apos;s clock, in parts per million; positive is fast</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses received from the headset per second</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Data</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Kilobytes per second to the headset, over {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Kilobytes per second from the headset, over {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Lost</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Share of the datagrams to the headset that did not arrive, over {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Share of the headset&apos;s datagrams that did not arrive, over {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Resent</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fragments of messages retransmitted because they were not acknowledged in time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unacknowledged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Messages that the headset has not acknowledged yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Failed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Messages that the headset did not acknowledge in time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rejected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Datagrams that were not accepted, for the reasons below</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Signed with another pairing key: enter the key below in the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Damaged in transit, or not meant for handcal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Arrived twice or much too late; a few are normal in a wireless network</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Longer than the protocol allows: check the headset&apos;s program</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset&apos;s program uses another protocol version: update it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sent before the headset reconnected; a few are normal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>To headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The new key must then be entered in the headset.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pairing</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Host and port that the headset must connect to, by UDP</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>New key…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Make a new pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pair a headset by QR code, and try it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restart headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restart the virtual headset&apos;s program</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a session on the start page.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Connected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not connected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>as published by Hu et al. 2021; slow.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the paper&apos;s model, solved with all three rows of each pair.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>exact model; robust to cut edges and a rotated hand; the default.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>rigid registration, the paper&apos;s baseline.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the same by Open3D, which must be installed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Comparison of methods</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Compare with method</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Compare</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cance&amp;l</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Difference</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Difference: {} minus {}. σ and expected error are realistic only for “consistent”; the other methods&apos; are too small.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solving with {} …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelled.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Compare &amp;with</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Convergence</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Iteration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS distance (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS distance between matched points of hand and cursor at each iteration
+of each alignment (1, 2, …).
+The last iterations of “consistent” measure it to the nearest point instead of the surface,
+which makes it larger.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing is solved yet.
+
+Make a cursor, align the hand with it and solve. Each eye&apos;s position, its uncertainty and the verdict then appear here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Results</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbers of both eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Each alignment alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verdict</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reason</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy as text</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Residuals</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Compare</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Residual map</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Right (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Down (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Residual (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignment and eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand as seen from the eye; × marks points without a partner (outliers).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignment {}, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} Not solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not in any alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation of the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation of the hand from the cursor, and its limit</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>limit {:.1f}°</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Make a cursor; the hand&apos;s rotation from it is then shown here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The alignment is confirmed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the hand in view of the camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand is rotated like the cursor.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation history</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>? No image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>? No hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>▲ Another shape</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>✓ Hold still</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>▲ Turn back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>✓ Within limit</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} by {:.0f}°. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No confirmation refused.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Refused: {}. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Direction to turn the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Direction to turn the hand, as the wearer sees it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Notes on the session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Notes on this session; saved automatically</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>⚠ Too long by {:,} characters: not saved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Saved ✓</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not saved yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance between the wearer&apos;s pupils in millimetres, by a ruler or pupillometer (± 1 mm);
+empty: not measured. Alignments with both eyes open hardly show it.
+A change discards the results: solve again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye distance in millimetres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Confirmed alignments appear here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials of the session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recorded trials appear here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Inspect in 3D</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start or open a session to see it here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, finished</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} (headset)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not used: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the session&apos;s folder in the file manager</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show clouds, residuals, eyes and displays in a 3D window of their own (needs Open3D)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write a report, tables and calibration files</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye distance (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Notes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show second</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>First is better</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Second is better</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Neither</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the wearer the drawing without and with the calibration, in an order that nobody knows,
+and record which fits the hand better. The report tells which was which.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Blinded comparison</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} recorded</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>comparison</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>comparisons</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fine-tune φ until the drawn target covers the real one, then record. A trial is the error of the solved φ relative to the fine-tuned one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ of the {} has not been touched since its last trial at this distance. Press T again if this is a trial of its own.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ of the {} is still the solved one: the error would be 0 px. Press T again if the wearer sees no error.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the target in the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials appear here as they are recorded</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Statistics of trials</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This session is open read-only.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials are recorded while a session runs.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solve and apply the alignments first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The {} has not been aligned.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The eye that looks at the target; the other is closed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eyes in turn</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Draw the target for this eye, at this distance straight ahead, until a cursor is made or the session is finished</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Record trial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Record the error of the solved φ relative to the φ set by hand (T)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Statistics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Plot</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Errors of trials</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the target (m)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error (′)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Left eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This eye&apos;s view will appear here. Hold a hand in front of the depth camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Closed: this alignment is for the other eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean distance between the hand&apos;s outline as the eye sees it and as {}, in the display&apos;s pixels and in minutes of arc (′)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand, and the target of a trial, as seen by the eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drawn</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand and target as drawn by the headset; they cover the others if φ is right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The frozen hand as drawn by the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Before</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand&apos;s outline as drawn before calibration, with φ = 0</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Whole display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Before calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show each whole display instead of the part with the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Now</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the headset draws it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>drawn before calibration (φ = 0)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, simulated</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, predicted</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, not solved yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The preferences could not be read and were reset; the old file was kept as {}: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The preferences are of a newer version of handcal. Settings that this one does not know are left out; they are kept in {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>There is no alignment to export yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>There is no alignment to inspect yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The 3D window opens in a few seconds.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Next wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Open session…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Sessions…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Inspect in 3D</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Connect a &amp;headset…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Calibrate a rig…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>E&amp;valuate…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Preferences…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Quit</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Reset layout</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Guide</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Manual</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset &amp;protocol</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Examples in Python</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Unity package</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Support bundle…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Keys</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Licences</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;About handcal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a session&apos;s folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>New pairing key created. Enter it in the headset; all others are disconnected, and the key is used from the next calibration on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The preferences could not be saved: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keys</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No file manager was found; the folder is {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>About handcal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&lt;b&gt;handcal {}&lt;/b&gt;&lt;p&gt;Calibrates an optical see-through headset with the wearer&apos;s bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR 2021.&lt;p&gt;Apache-2.0</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close this message (Esc)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Consistent (recommended)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Linear</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rigid ICP</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rigid ICP by Open3D</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solver of the eye shift φ from an alignment.
+Consistent: exact model; robust to cut edges and a rotated hand.
+Linear: assumes a scale of 1, which underestimates φ3.
+As in the paper: Hu et al. 2021; slow.
+Rigid ICP: the paper&apos;s baseline; by Open3D the same, if it is installed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colour and depth</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colour and depth, leftmost</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colour and depth, rightmost</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Method of finding the hand.
+Colour and depth: the hand detector selects where to search; of several hands
+the nearest, or the leftmost or rightmost in the camera&apos;s image.
+Depth alone: the nearest hand-sized object.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Limit of the hand&apos;s rotation from the cursor; beyond it an alignment is refused.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Anything nearer to the camera is ignored.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Anything farther from the camera is ignored.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand found by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solver</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation guard</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth gate from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth gate to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Good</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Problem</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Enter this key in the headset and nowhere else: any device with it can connect.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy the pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hide</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RealSense, colour</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recording or video</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recording or video, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No recording or video</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No image yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose the recording or video</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>both are the same camera: choose another for one of them</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Opening the camera…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({}: {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Delete</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Delete the selected row (Del); can be undone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Scale of residuals</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of each point of the hand from its partner on the cursor after registration, in millimetres; outliers have no partner</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Residual 0</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Outlier</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Before, expected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check found</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>After the check</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>After, expected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>After, measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One more alignment: {:.1f}′ expected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Target: {:.1f}′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Result</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>– Not solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>target {:g}′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>✓ Accept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>↻ Repeat</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>↩ Keep offline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>✕ Implausible</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>✕ Contradicted</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ{} (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the eye {} the rig&apos;s viewpoint,
+± one standard deviation (σ). Both eyes are solved together:
+an alignment of one may change the other, too.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to the right of</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>in front of</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expected error</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expected angle between real and drawn points at 0.4 to 0.6 m due to the uncertainty of φ,
+in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance between hand and cursor after registration, root mean square over the inliers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Inliers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Share of the hand&apos;s points with a partner on the cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Iterations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sum over all alignments</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expected error after one more alignment like these</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance between the two solved eye positions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>With one more</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Used in the results; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye distance measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>learned from {} sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where eyes are expected before any alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fused into these results</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Method</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The solver</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One more alignment like these: expected error {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ1, φ2 and φ3 of the {} from this alignment alone: distance of the eye to the right of,
+below and in front of the rig&apos;s viewpoint, in millimetres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Number of the alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eyes open during the alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation °</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle between hand and cursor at the confirmation, in degrees</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Left φ mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>left eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Right φ mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance between hand and cursor after registration, in millimetres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Inliers %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Percentage of the hand&apos;s points with a partner on the cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Time of the confirmation</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Number of the trial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye that looked at the target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance m</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the target, in metres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error px</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean over the target&apos;s four corners, in pixels of the display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean over the target&apos;s four corners, in arcminutes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Time of the recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>SD of trials ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>SD of calibrations ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Median ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Max ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Each trial counts once, with the mean of its corners, in arcminutes. Trials of one
+calibration are not independent: only the spread between calibrations tells how the next
+one turns out.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No trials yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, SD between trials {:.1f}′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: mean {:.1f}′{}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} One calibration cannot tell how the next one turns out.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} SD between calibrations {:.1f}′.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Undo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restore the deleted item (Ctrl+Z)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} {} deleted.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand cloud</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Wearer&apos;s view</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Link</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;File</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;View</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Help</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Go to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Station: the guide alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Accepted</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unfinished</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unreadable</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Damaged: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finished</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:.1f} (n = {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Date</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start, local time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name of the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name of the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Of the newest results</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error that is left after the wearer&apos;s check, left / right, in arcminutes;
+– was not measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expected ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error that the solver expects, left / right, in arcminutes; not a measurement</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean error of the user test in arcminutes, each trial counting once, and their number</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>State</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check names what is damaged; Repair copies the rest</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trend</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibration of this wearer, oldest first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search wearer, date, rig, headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sessions shown</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} deleted.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of {} sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, {} selected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} in {}{}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reading {}…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: {} calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Select a wearer with several calibrations to see how their errors went on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Checking {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} sound, every file read.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Repairing {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: a copy with {} and {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Deleting {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} deleted; Restore brings the last one back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Review the selected session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Continue the selected session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export the selected sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Read every file of the selected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Repair</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy what is sound to a new one</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the selected away (Del)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restore</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bring the last deleted back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Delete sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open the session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Manual</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search all pages (Ctrl+F)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search all pages</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Lines found</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Page</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Section</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Line</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, the first {} listed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>line</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>lines</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>QR code</source>
+        <translation type="unfinished"></translation>
+    </message>
+</context>
+</TS>
