@@ -34,7 +34,7 @@ def test_a_cube_in_slow_motion_is_not_at_rest() -> None:
     assert not any(filter_.take(T, n * _FRAME_NS).is_at_rest for n, T in enumerate(poses))
 
 
-def test_a_cube_comes_to_rest_after_the_camera_has_started_again() -> None:
+def test_a_cube_is_at_rest_again_after_the_camera_has_started_again() -> None:
     filter_, T = CubeFilter(), rigid(None, [0.0, 0.0, 0.5])
     before = [filter_.take(T, n * _FRAME_NS + 10**12) for n in range(40)]
     after = [filter_.take(T, n * _FRAME_NS) for n in range(40)]
