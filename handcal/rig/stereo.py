@@ -126,8 +126,12 @@ def calibrate_stereo(
     if headset is None:
         of_headset = _solved([second for _, second in pairs], "headset", settings.camera)
         headset, lenses[1] = of_headset.intrinsics, of_headset.lens
-    fit = _fit(both, each_alone(both, depth, headset), (depth, headset), lenses)
+    alone = each_alone(both, depth, headset)
+    fit = _fit(both, alone, (depth, headset), lenses)
     if fit.rms_px > settings.max_rms_px:
+        # Pairs that contradict each other bend intrinsics that are free until nothing is sound.
+        lenses = [None, None]
+        fit = _fit(both, alone, (depth, headset), lenses)
         _check_not_swapped(both, (depth, headset), fit.rms_px, are_given)
         _check_not_mirrored(both, (depth, headset), fit.rms_px)
     depth, headset = fit.setup.cameras
@@ -140,7 +144,8 @@ def calibrate_stereo(
         name: rms(np.vstack(off_px[2 * number : 2 * number + 2]))
         for number, name in enumerate(both)
     }
-    alone = each_alone(both, depth, headset)
+    if lenses != [None, None]:
+        alone = each_alone(both, depth, headset)
     worst = _worst(both, fit, T_H_D, T_D_B)
     apart = differences(T_H_D, alone.T_H_D)
     covariance = fit.covariance()
