@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,7 +64,7 @@ def test_a_fisheye_is_recognised(shared_data: Path) -> None:
     assert "moved between the two exposures" in result.verdict.reason
 
 
-Pairs = list[tuple[BoardImage, BoardImage]]
+Pairs = Sequence[tuple[BoardImage, BoardImage]]
 
 
 @pytest.fixture(scope="module")
