@@ -27,7 +27,7 @@ from handcal.rig.accept import (
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.display import DisplayHomography, fit_homography
 from handcal.rig.formats import read_intrinsics
-from handcal.rig.grid import find_grid, grid_on
+from handcal.rig.grid import Grid, GridView, find_grid, grid_on
 from handcal.rig.rig_file import read_rig
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import TrackedView
@@ -40,8 +40,8 @@ class AcceptanceSettings:
     """Settings of an acceptance."""
 
     folder: Path
-    """Images: EYE/grid.png, EYE/viewpoint and EYE/depth; EYE/tracked.json, poses T_H_B of the board
-    by the viewpoint camera's images, if the headset tracks it."""
+    """Images: EYE/grid.png, or a folder EYE/grid; EYE/viewpoint and EYE/depth; EYE/tracked.json,
+    poses T_H_B of the board by the viewpoint camera's images, if the headset tracks it."""
     rig: Path
     output: Path
     """Folder for the page with the result."""
@@ -155,17 +155,17 @@ def _read_eye(
 ) -> _Images:
     folder = settings.folder
     camera = read_intrinsics(settings.camera or folder / "camera.json")
-    picture, poses = folder / eye / "grid.png", folder / eye / "tracked.json"
     grid = grid_on(display.width_px, display.height_px, settings.square_px)
-    try:
-        seen = find_grid(read_image(picture, cv2.IMREAD_GRAYSCALE), grid)
-    except BoardError as error:
-        raise HandcalError(f"{picture}: {error}") from error
-    homography = fit_homography({"grid": seen}, camera, display.width_px, display.height_px)
+    pictures = [folder / eye / "grid.png"]
+    if not pictures[0].exists():
+        pictures = image_files([folder / eye / "grid"])
+    seen = {path.name: _find_grid(path, grid) for path in pictures}
+    homography = fit_homography(seen, camera, display.width_px, display.height_px)
     viewpoint, depth = (
         read_views(image_files([folder / eye / who]), settings.board, progress.part(*share))
         for who, share in (("viewpoint", (0.0, 0.5)), ("depth", (0.5, 1.0)))
     )
+    poses = folder / eye / "tracked.json"
     T_H_B = read_tracked(poses) if poses.exists() else {}
     pairs: dict[str, tuple[BoardView, BoardView]] = {}
     tracked: dict[str, TrackedView] = {}
@@ -178,6 +178,13 @@ def _read_eye(
         if by_depth.found is not None and name in T_H_B:
             tracked[name] = TrackedView(by_depth.found, T_H_B[name])
     return _Images(homography, camera, pairs, tracked)
+
+
+def _find_grid(picture: Path, grid: Grid) -> GridView:
+    try:
+        return find_grid(read_image(picture, cv2.IMREAD_GRAYSCALE), grid)
+    except BoardError as error:
+        raise HandcalError(f"{picture}: {error}") from error
 
 
 def _page(
