@@ -154,6 +154,18 @@ ARRANGEMENTS = {
         [(430, 95, "board")],
         "0.3 to 0.6 m",
     ),
+    "setup-viewpoint": (
+        "Viewpoint camera alone: focus as behind the display",
+        [(40, 95, "viewpoint camera C")],
+        [(430, 95, "board")],
+        "all parts of the view, tilted",
+    ),
+    "setup-board": (
+        "Display off: the camera unmoved, the headset tracks the board",
+        [(40, 60, "headset H tracks"), (40, 130, "viewpoint camera C")],
+        [(230, 130, "combiner (off)"), (430, 95, "board")],
+        "several distances and angles",
+    ),
     "setup-display": (
         "Display: the viewpoint camera in the eye's place, dark room",
         [(40, 95, "viewpoint camera C")],

@@ -45,6 +45,10 @@ class UserEntries:
 
     sessions: str = ""
     output: str = field(default_factory=lambda: _folder("users"))
+    headset: str = "network"
+    """``network`` or ``virtual``: the headset of trials with a cube."""
+    cube: str = ""
+    """Description of that cube; empty for a 60 mm cube."""
 
     @property
     def settings(self) -> UserTestSettings:

@@ -14,7 +14,12 @@ from handcal.types import EYES
 
 
 @command(
-    arg("folder", type=Path, help="images: EYE/grid.png, EYE/viewpoint, EYE/depth; camera.json"),
+    arg(
+        "folder",
+        type=Path,
+        help="images: EYE/grid.png, EYE/viewpoint, EYE/depth; camera.json; EYE/tracked.json if the "
+        "headset tracks the board",
+    ),
     arg("--rig", type=Path, metavar="FILE", required=True, help="rig file to accept"),
     arg("--eyes", choices=("both", *EYES), default="both", help="eyes to check"),
     arg(
@@ -81,6 +86,8 @@ def accept(arguments: argparse.Namespace) -> None:
             f"{triple(1e3 * one.shift_m)} mm from C0",
             markup=False,
         )
+    if found.move is not None:
+        console.print(f"depth camera: {found.move.words}, by tracked boards", markup=False)
     if found.cause:
         raise HandcalError(f"the rig fails: {found.cause}")
     console.print(f"passed: at most {settings.limit_arcmin:g}′ at every distance")

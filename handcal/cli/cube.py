@@ -138,11 +138,17 @@ def net(arguments: argparse.Namespace) -> None:
         help="names of the drawing methods to compare (default: a single one, unnamed)",
     ),
     arg("--no-grid", action="store_true", help="do not capture the display's grid"),
+    arg(
+        "--automatic",
+        action="store_true",
+        help="take each image once the cube or the grid is at rest, without Enter; between two "
+        "images of the cube, cover it",
+    ),
 )
 def capture(arguments: argparse.Namespace) -> None:
     """Capture the real and the drawn cube with a camera, guided step by step."""
     from handcal.camera.viewpoint import open_viewpoint
-    from handcal.lab.evaluate.cube_capture import take_captures
+    from handcal.lab.evaluate.cube_capture import take_at_rest, take_captures
     from handcal.lab.evaluate.cube_folder import missing_captures
     from handcal.lab.evaluate.run import cube_and_grid
 
@@ -164,7 +170,10 @@ def capture(arguments: argparse.Namespace) -> None:
         return
     which = _only_camera() if arguments.camera is None else arguments.camera
     with open_viewpoint(which, arguments.size) as camera:
-        take_captures(camera, arguments.folder, plan, cube, grid, ask, console.out)
+        if arguments.automatic:
+            take_at_rest(camera, arguments.folder, plan, cube, grid, console.out)
+        else:
+            take_captures(camera, arguments.folder, plan, cube, grid, ask, console.out)
 
 
 @command(

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from handcal.link.server import HeadsetServer
-    from handcal.rig.cube import Cube
     from handcal.sim.cube_bench import CubeBench
     from handcal.station.cube_tracking import CubeTracker
     from handcal.types import Eye, Float64, Rig
@@ -141,36 +140,25 @@ def track(arguments: argparse.Namespace) -> None:
 )
 def trials(arguments: argparse.Namespace) -> None:
     """Record the user test's trials with a cube in the room, for a calibrated session."""
-    from handcal.session.session import Session
     from handcal.session.trial import trial_json
-    from handcal.station.user_test import TrialSettings, run_user_trials
+    from handcal.station.user_test import (
+        StudyLeader,
+        TrialOrder,
+        TrialSettings,
+        record_user_trials,
+    )
 
     if (arguments.headset == "virtual") != (arguments.camera == "simulator"):
         raise HandcalError("--headset virtual and --camera simulator go together")
     settings = TrialSettings(
         EYES if arguments.eyes == "both" else (arguments.eyes,), patience_s=arguments.patience_s
     )
-    record = Session.open(arguments.session)
-    seed = (record.settings.get("station") or {}).get("seed", 1)
-    if arguments.headset == "virtual" and "station" not in record.settings:
-        raise HandcalError(
-            f"{arguments.session}: it is not of a simulated wearer; make one with handcal demo"
-        )
-    with (
-        Session(arguments.session) as session,
-        _setup(arguments, record.rig, True, seed) as setup,
-    ):
-        bench, server = setup.bench, setup.server
-        if server is None:
-            raise HandcalError("the trials need a headset")
-        made = run_user_trials(
-            session,
-            server,
-            setup.tracker,
-            _adjust if bench is None else bench.adjust,
-            _ask_to_place if bench is None else bench.place,
-            settings,
-        )
+    made = record_user_trials(
+        TrialOrder(arguments.session, arguments.cube, settings),
+        None if arguments.headset == "virtual" else lambda: network_server(arguments),
+        lambda: open_source(arguments.camera, realsense_of(arguments)),
+        StudyLeader(_ask_to_place, _adjust),
+    )
     save(arguments.json, {"trials": [trial_json(trial) for trial in made]})
     shown = table("eye", "distance, m", "error, arcmin", "error, px")
     for trial in made:
@@ -184,19 +172,18 @@ def trials(arguments: argparse.Namespace) -> None:
 
 
 @contextmanager
-def _setup(
-    arguments: argparse.Namespace, rig: Rig, has_headset: bool, seed: int = 1
-) -> Iterator[_Setup]:
+def _setup(arguments: argparse.Namespace, rig: Rig, has_headset: bool) -> Iterator[_Setup]:
     """Yield the link, the tracker and, with the simulator, the simulated wearer."""
     import numpy as np
 
     from handcal.rig.cube import Cube
     from handcal.rig.cube_file import read_cube
+    from handcal.sim.cube_bench import simulated_wearer
     from handcal.station.cube_tracking import CubeTracker
 
     cube = Cube() if arguments.cube is None else read_cube(arguments.cube)
     if arguments.camera == "simulator":
-        with _simulated(rig, cube, seed) as (server, bench):
+        with simulated_wearer(rig, cube, 1) as (server, bench):
             tracker = CubeTracker(bench, cube, rig.T_H_D, server.pose_at_host_ns)
             yield _Setup(server, tracker, bench)
         return
@@ -206,29 +193,6 @@ def _setup(
             return
         with network_server(arguments) as server:
             yield _Setup(server, CubeTracker(camera, cube, rig.T_H_D, server.pose_at_host_ns), None)
-
-
-@contextmanager
-def _simulated(rig: Rig, cube: Cube, seed: int) -> Iterator[tuple[HeadsetServer, CubeBench]]:
-    import numpy as np
-
-    from handcal.link.client import HeadsetClient
-    from handcal.link.pairing import new_device_id, new_pairing_key
-    from handcal.link.server import HeadsetServer
-    from handcal.sim.cube_bench import CubeBench
-    from handcal.sim.wearer import WearerSettings, draw_eyes
-    from handcal.types import HeadsetIdentity
-
-    key = new_pairing_key().encode()
-    identity = HeadsetIdentity(new_device_id(), "Simulated headset", "simulator")
-    eyes = draw_eyes(np.random.default_rng(seed), WearerSettings())
-    with (
-        HeadsetServer(key) as server,
-        HeadsetClient(server.address, key, identity) as client,
-    ):
-        server.wait_connected(10.0)
-        with CubeBench(client, rig, cube, eyes, seed) as bench:
-            yield server, bench
 
 
 def _ask_to_place(depth_m: float) -> None:

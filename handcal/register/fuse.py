@@ -13,6 +13,10 @@ a usual wearer is far too sure of a careless one. So the precision is unknown to
 `FuseSettings.wearer_scales`, and the estimate is the mean over them, weighted by how well each
 explains the alignments. One alignment says little about it, several say much by their scatter.
 
+An error of the depth camera's depth, as its check against a board leaves it (`DepthCheck`), is
+common to all observations of a wearer: it is added to the covariance of the estimate, and more
+alignments do not reduce it. Without a check it is taken as zero.
+
 A verification, in which the wearer moves the drawing of the resting hand until it covers the hand
 (`handcal.register.nudge`), is one more observation of one eye's φ, more precise than an alignment.
 """
@@ -27,9 +31,16 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import softmax
 
-from handcal.display import eye_projection
+from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import invert, project, transform
-from handcal.register.prior import EyePrior, Observed, PriorSettings, eye_prior, posterior
+from handcal.register.prior import (
+    EyePrior,
+    Observed,
+    PriorSettings,
+    depth_covariance_m2,
+    eye_prior,
+    posterior,
+)
 from handcal.register.surface import describe_surface
 from handcal.types import (
     EYES,
@@ -95,6 +106,8 @@ class Fused:
     """The φ found by each eye's verifications."""
     unverified: Mapping[Eye, Observation] = field(default_factory=dict)
     """The verification to expect of each solved eye that was not verified; its φ is zero."""
+    by_depth_m2: Float64 = field(default_factory=lambda: np.zeros((6, 6)))
+    """(6, 6); part of the covariance by errors of the depth camera."""
 
     @property
     def all_observed(self) -> tuple[Observation, ...]:
@@ -121,7 +134,8 @@ class Fused:
             for eye in eyes:
                 H[:, eye_slice(eye)] = np.eye(3) / len(eyes)
             known.append((H, np.zeros(3), noise_m2))
-        return posterior(self.prior, [*known, *(one.at(self.wearer_scale) for one in then)])[1]
+        known += [one.at(self.wearer_scale) for one in then]
+        return posterior(self.prior, known)[1] + self.by_depth_m2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,6 +150,8 @@ class Observation:
     """(3, 3); covariance of the registration."""
     wearer_m2: Float64
     """(3, 3); covariance of a usual wearer's overlay."""
+    by_depth: Float64 = field(default_factory=lambda: np.zeros((3, 2)))
+    """(3, 2); derivatives of the displacement by scale and offset, m, of the measured depth."""
 
     def at(self, scale: float) -> Observed:
         """Return H, displacement and covariance for a wearer of a precision."""
@@ -201,6 +217,14 @@ def fuse_alignments(
         weight * (covariance_m2 + np.outer(mean_m - estimate_m, mean_m - estimate_m))
         for weight, (mean_m, covariance_m2) in zip(weights, found, strict=True)
     )
+    wearer_scale = float(np.sqrt(weights @ np.square(settings.wearer_scales)))
+    by_depth_m2 = depth_covariance_m2(
+        rig.depth_check,
+        prior,
+        [one.at(wearer_scale) for one in known],
+        [one.by_depth for one in known],
+    )
+    joint_m2 = joint_m2 + by_depth_m2
     of_eye = {
         eye: found_shifts
         for eye in EYES
@@ -215,14 +239,25 @@ def fuse_alignments(
         },
         prior=prior,
         observed=observed,
-        wearer_scale=float(np.sqrt(weights @ np.square(settings.wearer_scales))),
+        wearer_scale=wearer_scale,
         verified=checks,
         unverified={
             eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
             for eye in of_eye
             if eye not in checks
         },
+        by_depth_m2=by_depth_m2,
     )
+
+
+def _by_depth(point_E_m: Float64, display: EyeDisplay, rig: Rig) -> Float64:
+    """Return derivatives (3, 2), E axes, of φ by scale and offset of the depth of a hand."""
+    T_E_D = view_of_eye(display, np.eye(4)) @ rig.T_H_D
+    point_D_m = transform(invert(T_E_D), point_E_m[None])[0]
+    ray_E = T_E_D[:3, :3] @ (point_D_m / point_D_m[2])
+    gain = 1.0 / (1.0 - point_E_m[2] / display.z_C0_S_m)
+    moved: Float64 = gain * np.outer(ray_E, [point_D_m[2], 1.0])
+    return moved
 
 
 def eye_slice(eye: Eye) -> slice:
@@ -297,14 +332,17 @@ def _observe(
         settings,
     )
     R_W_A = _common_axes(alignment.T_E_W)
-    seen_m = np.zeros(3)
+    seen_m, by_depth = np.zeros(3), np.zeros((3, 2))
     registrations = []
+    middle_m = alignment.cursor_m.mean(axis=0)
     for eye, shift in shifts.items():
         R_A_E = R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
         registrations.append(R_A_E @ shift.covariance_m2 @ R_A_E.T)
         seen_m += H[:, eye_slice(eye)] @ shift.shift_m
+        middle_E_m = transform(alignment.T_E_W[eye], middle_m[None])[0]
+        by_depth += H[:, eye_slice(eye)] @ _by_depth(middle_E_m, rig.eyes[eye], rig)
     registration_m2 = np.mean(registrations, axis=0) + alignment.time_sigma_m**2 * np.eye(3)
-    return Observation(H, seen_m, registration_m2, wearer_m2)
+    return Observation(H, seen_m, registration_m2, wearer_m2, by_depth)
 
 
 def seen_by(
@@ -364,7 +402,11 @@ def verified_observation(
     H = np.zeros((3, 6))
     H[:, eye_slice(eye)] = R_A_E
     return Observation(
-        H, R_A_E @ np.asarray(shift_m), np.zeros((3, 3)), R_A_E @ wearer_m2 @ R_A_E.T
+        H,
+        R_A_E @ np.asarray(shift_m),
+        np.zeros((3, 3)),
+        R_A_E @ wearer_m2 @ R_A_E.T,
+        R_A_E @ _by_depth(np.asarray(hand_E_m, np.float64), rig.eyes[eye], rig),
     )
 
 

@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.types import Float64
+from handcal.types import DepthCheck, Float64
 
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""
@@ -110,6 +110,41 @@ def posterior(prior: EyePrior, observed: Sequence[Observed]) -> tuple[Float64, F
     known = np.linalg.inv(prior.covariance_m2)
     covariance_m2 = np.asarray(np.linalg.inv(known + information))
     return covariance_m2 @ (known @ prior.mean_m + state), covariance_m2
+
+
+def depth_covariance_m2(
+    check: DepthCheck | None,
+    prior: EyePrior,
+    observed: Sequence[Observed],
+    by_depth: Sequence[Float64],
+) -> Float64:
+    """Return the covariance (6, 6) of [φ_left; φ_right] by errors of the depth camera.
+
+    They are common to all observations. The bias that the check found is not corrected, and counts
+    like an uncertainty of its size.
+
+    Parameters
+    ----------
+    check : DepthCheck or None
+        None: zero.
+    prior : EyePrior
+    observed : sequence of Observed
+    by_depth : sequence of (3, 2) float64
+        Of each, derivatives by scale and offset, m, of the measured depth.
+    """
+    if check is None:
+        return np.zeros((6, 6))
+    bias = np.array([check.scale - 1.0, check.offset_m])
+    nothing = EyePrior(np.zeros(6), prior.covariance_m2)
+    moved = [
+        posterior(
+            nothing,
+            [(H, by[:, which], m2) for (H, _, m2), by in zip(observed, by_depth, strict=True)],
+        )[0]
+        for which in range(2)
+    ]
+    S = np.column_stack(moved)
+    return np.asarray(S @ (check.covariance + np.outer(bias, bias)) @ S.T, np.float64)
 
 
 def _information(observed: Sequence[Observed]) -> tuple[Float64, Float64]:

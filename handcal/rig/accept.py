@@ -6,8 +6,10 @@ sees too. The depth camera's picture gives the place of the board and, with the 
 the camera's own place φ. The pixels at which the rig draws the board's corners for an eye at φ are
 compared with those at which the camera sees them. Nothing is fitted.
 
-A depth camera that has only shifted moves φ and the board alike, and is hardly seen. A wearer's
-calibration compensates it in the same way.
+A depth camera that has only shifted moves φ and the board alike. What is drawn then moves by the
+shift divided by the virtual image's distance, 1.7′ for 1 mm at 2 m, at every distance of the board,
+as with a turned camera. A wearer's calibration compensates most of it. Poses of the board tracked
+by the headset tell a shift from a rotation, and find it to fractions of a millimetre.
 """
 
 from __future__ import annotations
@@ -18,12 +20,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from handcal.display import arcmin_from_px, eye_projection, view_of_eye
 from handcal.geometry import invert, project, rigid, transform
 from handcal.rig.board import BoardView
 from handcal.rig.display import DisplayHomography, undistort
-from handcal.rig.viewpoint import board_pose
+from handcal.rig.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.views import ViewsError
 from handcal.types import EyeDisplay, Float64, Intrinsics, Rig, freeze
 
@@ -31,6 +34,8 @@ FEWEST_VIEWS = 5
 LIMIT_ARCMIN = 5.0
 """Largest accepted mean error at any distance; calibrated wearers have 4 to 9 arcmin in all."""
 LARGEST_SHIFT_M = 0.015
+LARGEST_MOVE_M = 0.001
+"""Largest accepted shift of the depth camera, beyond twice its standard deviation."""
 _LEAST_SPREAD = 1.2
 _EXPLAINED = 0.5
 _SAME_TURN = 0.35
@@ -60,6 +65,8 @@ class EyeAcceptance:
     """(3,); rotation of the depth camera, H axes, that would explain the errors best."""
     left_arcmin: float
     """Mean error that this rotation leaves."""
+    image_distance_m: float
+    """Of the virtual image from C0."""
 
     def __post_init__(self) -> None:
         freeze(self, "shift_m", np.float64, 3)
@@ -74,6 +81,69 @@ class EyeAcceptance:
     def worst_arcmin(self) -> float:
         """The largest mean of a view."""
         return max(view.mean_arcmin for view in self.views)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraMove:
+    """The depth camera's pose as tracked boards give it, relative to the rig's."""
+
+    shift_m: Float64
+    """(3,); H axes."""
+    turn_rad: Float64
+    """(3,); rotation vector, H axes."""
+    sigma_m: float
+    sigma_rad: float
+    """Standard deviations along the worst axis, over views."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "shift_m", np.float64, 3)
+        freeze(self, "turn_rad", np.float64, 3)
+
+    @property
+    def words(self) -> str:
+        """The move in words."""
+        x_mm, y_mm, z_mm = 1e3 * self.shift_m
+        return (
+            f"shifted by {x_mm:.1f} {y_mm:.1f} {z_mm:.1f} mm (± {1e3 * self.sigma_m:.1f} mm) and "
+            f"turned by {np.degrees(np.linalg.norm(self.turn_rad)):.2f}° (± "
+            f"{np.degrees(self.sigma_rad):.2f}°)"
+        )
+
+    @property
+    def problem(self) -> str:
+        """Likely cause of a failure; empty if the camera has not shifted too far."""
+        if np.linalg.norm(self.shift_m) <= LARGEST_MOVE_M + 2.0 * self.sigma_m:
+            return ""
+        return (
+            f"the depth camera is {self.words} from its place in the rig: fasten it, and calibrate "
+            "its pose again (handcal rig stereo, rig make)"
+        )
+
+
+def camera_move(rig: Rig, views: Mapping[str, TrackedView], depth_camera: Intrinsics) -> CameraMove:
+    """Return the depth camera's move from views of a board that the headset tracks.
+
+    Parameters
+    ----------
+    rig : Rig
+    views : mapping of name to TrackedView
+        By the depth camera.
+    depth_camera : Intrinsics
+        Of its images.
+
+    Raises
+    ------
+    ViewsError
+        If there are too few views.
+    """
+    found = locate_viewpoint(views, depth_camera)
+    turn = Rotation.from_matrix(found.T_H_C[:3, :3] @ rig.T_H_D[:3, :3].T)
+    sigma_rad, sigma_m = (
+        float(np.sqrt(np.linalg.eigvalsh(part).max()))
+        for part in (found.covariance[:3, :3], found.covariance[3:, 3:])
+    )
+    shift_m = found.T_H_C[:3, 3] - rig.T_H_D[:3, 3]
+    return CameraMove(shift_m, turn.as_rotvec(), sigma_m, sigma_rad)
 
 
 def accept_eye(
@@ -151,6 +221,7 @@ def accept_eye(
         shift_m,
         fitted.x,
         float(_arcmin(display, np.reshape(fitted.fun, (-1, 2))).mean()),
+        display.z_C0_S_m,
     )
 
 
@@ -168,8 +239,10 @@ def problem(found: EyeAcceptance, limit_arcmin: float = LIMIT_ARCMIN) -> str:
     return f"{where.mean_arcmin:.1f}′ at {where.depth_m:.2f} m, more than {limit_arcmin:g}′"
 
 
-def likely_cause(found: Sequence[EyeAcceptance]) -> str:
+def likely_cause(found: Sequence[EyeAcceptance], move: CameraMove | None = None) -> str:
     """Return in words what has probably moved on a rig that fails."""
+    if move is not None and move.problem:
+        return move.problem
     if any(one.left_arcmin > _EXPLAINED * one.mean_arcmin for one in found):
         return (
             "no rotation explains the errors: check the board's measured sides, the intrinsics, "
@@ -182,12 +255,21 @@ def likely_cause(found: Sequence[EyeAcceptance]) -> str:
     if len(found) > 1 and apart_rad <= _SAME_TURN * np.linalg.norm(mean_rad):
         return (
             f"both eyes' errors are those of a depth camera turned by {degrees:.2f}° on the "
-            "headset: fasten it, and calibrate its pose again (handcal rig stereo, rig make)"
+            f"headset{_or_shifted(mean_rad, found[0]) if move is None else ''}: fasten it, and "
+            "calibrate its pose again (handcal rig stereo, rig make)"
         )
     return (
         "each eye's errors are those of a rotation of its own: calibrate the displays again "
         "(handcal rig display), and see with handcal rig compare what has changed"
     )
+
+
+def _or_shifted(turn_rad: Float64, found: EyeAcceptance) -> str:
+    """Return the shift with the effect of a small rotation, in words; empty if it is large."""
+    shift_m = float(np.linalg.norm(turn_rad)) * found.image_distance_m
+    if shift_m > LARGEST_SHIFT_M:
+        return ""
+    return f" or shifted by {1e3 * shift_m:.0f} mm (EYE/tracked.json would tell which)"
 
 
 def _middle_m(T_C_B: Float64, seen: BoardView) -> float:

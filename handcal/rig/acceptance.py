@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 
@@ -15,14 +15,24 @@ from handcal.progress import Progress
 from handcal.report.document import Column, Report, Section, Table, facts
 from handcal.report.provenance import made_with
 from handcal.report.write import write_report
-from handcal.rig.accept import LIMIT_ARCMIN, EyeAcceptance, accept_eye, likely_cause, problem
+from handcal.rig.accept import (
+    LIMIT_ARCMIN,
+    CameraMove,
+    EyeAcceptance,
+    accept_eye,
+    camera_move,
+    likely_cause,
+    problem,
+)
 from handcal.rig.board import Board, BoardError, BoardView
-from handcal.rig.display import fit_homography
+from handcal.rig.display import DisplayHomography, fit_homography
 from handcal.rig.formats import read_intrinsics
-from handcal.rig.grid import find_grid, grid_on
+from handcal.rig.grid import Grid, GridView, find_grid, grid_on
 from handcal.rig.rig_file import read_rig
+from handcal.rig.tracked_file import read_tracked
+from handcal.rig.viewpoint import TrackedView
 from handcal.rig.views import image_files, pair_views, read_views
-from handcal.types import EYES, Eye, Rig
+from handcal.types import EYES, Eye, EyeDisplay, Intrinsics, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +40,8 @@ class AcceptanceSettings:
     """Settings of an acceptance."""
 
     folder: Path
-    """Images: EYE/grid.png, EYE/viewpoint and EYE/depth."""
+    """Images: EYE/grid.png, or a folder EYE/grid; EYE/viewpoint and EYE/depth; EYE/tracked.json,
+    poses T_H_B of the board by the viewpoint camera's images, if the headset tracks it."""
     rig: Path
     output: Path
     """Folder for the page with the result."""
@@ -55,6 +66,8 @@ class Acceptance:
     """For each eye; empty if it passes."""
     cause: str
     """Likely cause of the problems; empty if there are none."""
+    move: CameraMove | None
+    """Of the depth camera from its place in the rig; None without tracked poses of the board."""
     left_out: Mapping[str, str]
     """Reasons why images were left out, by name."""
     files: tuple[Path, ...]
@@ -66,6 +79,14 @@ class Acceptance:
             "passed": not self.cause,
             "limit_arcmin": limit_arcmin,
             "cause": self.cause,
+            "depth_camera": None
+            if self.move is None
+            else {
+                "shift_mm": (1e3 * self.move.shift_m).tolist(),
+                "turn_rad": self.move.turn_rad.tolist(),
+                "sigma_mm": 1e3 * self.move.sigma_m,
+                "sigma_rad": self.move.sigma_rad,
+            },
             "eyes": {
                 eye: {
                     "problem": self.problems[eye],
@@ -93,49 +114,85 @@ def run_acceptance(settings: AcceptanceSettings, progress: Progress = Progress()
     CancelledError
     """
     rig = read_rig(settings.rig)
+    depth_file = settings.depth_camera or settings.folder / "depth.json"
+    is_given = settings.depth_camera is not None or depth_file.exists()
+    depth_camera = read_intrinsics(depth_file) if is_given else rig.depth_intrinsics
     found: dict[Eye, EyeAcceptance] = {}
+    tracked: dict[str, TrackedView] = {}
     left_out: dict[str, str] = {}
     for number, eye in enumerate(settings.eyes):
         share = 0.8 * number / len(settings.eyes), 0.8 * (number + 1) / len(settings.eyes)
-        found[eye] = _accept_eye(settings, rig, eye, left_out, progress.part(*share))
+        images = _read_eye(settings, rig.eyes[eye], eye, left_out, progress.part(*share))
+        found[eye] = accept_eye(
+            rig, rig.eyes[eye], images.homography, images.camera, images.pairs, depth_camera
+        )
+        tracked |= {f"{eye}/{name}": one for name, one in images.tracked.items()}
+    move = camera_move(rig, tracked, depth_camera) if tracked else None
     problems = {eye: problem(one, settings.limit_arcmin) for eye, one in found.items()}
     failed = [found[eye] for eye, text in problems.items() if text]
-    cause = likely_cause(failed) if failed else ""
-    page = _page(rig, found, problems, cause)
+    has_moved = move is not None and bool(move.problem)
+    cause = likely_cause(failed, move) if failed or has_moved else ""
+    page = _page(rig, found, problems, cause, move)
     files = write_report(settings.output, page, progress.part(0.8, 1.0))
-    return Acceptance(found, problems, cause, left_out, files)
+    return Acceptance(found, problems, cause, move, left_out, files)
 
 
-def _accept_eye(
-    settings: AcceptanceSettings, rig: Rig, eye: Eye, left_out: dict[str, str], progress: Progress
-) -> EyeAcceptance:
-    folder, display = settings.folder, rig.eyes[eye]
+class _Images(NamedTuple):
+    """Contents of one eye's images."""
+
+    homography: DisplayHomography
+    camera: Intrinsics
+    pairs: dict[str, tuple[BoardView, BoardView]]
+    tracked: dict[str, TrackedView]
+
+
+def _read_eye(
+    settings: AcceptanceSettings,
+    display: EyeDisplay,
+    eye: Eye,
+    left_out: dict[str, str],
+    progress: Progress,
+) -> _Images:
+    folder = settings.folder
     camera = read_intrinsics(settings.camera or folder / "camera.json")
-    depth_file = settings.depth_camera or folder / "depth.json"
-    is_given = settings.depth_camera is not None or depth_file.exists()
-    depth_camera = read_intrinsics(depth_file) if is_given else rig.depth_intrinsics
-    picture = folder / eye / "grid.png"
     grid = grid_on(display.width_px, display.height_px, settings.square_px)
-    try:
-        seen = find_grid(read_image(picture, cv2.IMREAD_GRAYSCALE), grid)
-    except BoardError as error:
-        raise HandcalError(f"{picture}: {error}") from error
-    homography = fit_homography({"grid": seen}, camera, display.width_px, display.height_px)
+    pictures = [folder / eye / "grid.png"]
+    if not pictures[0].exists():
+        pictures = image_files([folder / eye / "grid"])
+    seen = {path.name: _find_grid(path, grid) for path in pictures}
+    homography = fit_homography(seen, camera, display.width_px, display.height_px)
     viewpoint, depth = (
         read_views(image_files([folder / eye / who]), settings.board, progress.part(*share))
         for who, share in (("viewpoint", (0.0, 0.5)), ("depth", (0.5, 1.0)))
     )
+    poses = folder / eye / "tracked.json"
+    T_H_B = read_tracked(poses) if poses.exists() else {}
     pairs: dict[str, tuple[BoardView, BoardView]] = {}
+    tracked: dict[str, TrackedView] = {}
     for by_viewpoint, by_depth in pair_views(viewpoint, depth):
+        name = by_viewpoint.name
         if by_viewpoint.found is not None and by_depth.found is not None:
-            pairs[by_viewpoint.name] = by_viewpoint.found, by_depth.found
+            pairs[name] = by_viewpoint.found, by_depth.found
         else:
-            left_out[f"{eye}/{by_viewpoint.name}"] = by_viewpoint.problem or by_depth.problem
-    return accept_eye(rig, display, homography, camera, pairs, depth_camera)
+            left_out[f"{eye}/{name}"] = by_viewpoint.problem or by_depth.problem
+        if by_depth.found is not None and name in T_H_B:
+            tracked[name] = TrackedView(by_depth.found, T_H_B[name])
+    return _Images(homography, camera, pairs, tracked)
+
+
+def _find_grid(picture: Path, grid: Grid) -> GridView:
+    try:
+        return find_grid(read_image(picture, cv2.IMREAD_GRAYSCALE), grid)
+    except BoardError as error:
+        raise HandcalError(f"{picture}: {error}") from error
 
 
 def _page(
-    rig: Rig, found: Mapping[Eye, EyeAcceptance], problems: Mapping[Eye, str], cause: str
+    rig: Rig,
+    found: Mapping[Eye, EyeAcceptance],
+    problems: Mapping[Eye, str],
+    cause: str,
+    move: CameraMove | None,
 ) -> Report:
     titles = "distance, m", "corners", "mean, arcmin", "largest, arcmin"
     rows = [[eye, *row] for eye, one in found.items() for row in view_rows(one)]
@@ -143,6 +200,7 @@ def _page(
     for eye, one in found.items():
         x_mm, y_mm, z_mm = 1e3 * one.shift_m
         about[f"camera from C0, {eye}"] = f"{x_mm:.1f} {y_mm:.1f} {z_mm:.1f} mm"
+    about["depth camera"] = "not tracked" if move is None else move.words
     return Report(
         title="Acceptance of a rig",
         subject=f"Rig: {rig.name}",

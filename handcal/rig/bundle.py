@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -31,13 +32,13 @@ from handcal.rig.lens import (
 from handcal.types import Float64
 
 _MAX_STEPS = 100
-_LEAST_GAIN = 1e-8
+# Least relative gain of a step, round by round; the first only finds corners to leave out.
+_LEAST_GAINS = 1e-2, 1e-7, 1e-7
 _STRAY_SIGMAS = 10.0
 # Of a view, and of all: more indicate a fault of the view or of the lens model.
 _MAX_STRAY_SHARES = 0.1, 0.01
 _LEAST_SIGMA_PX = 0.01
 _NEIGHBOURS = 6
-_ROUNDS = 3
 _COEFFICIENT_SIGMA = 10.0
 
 
@@ -125,30 +126,29 @@ def adjust(
     steps : int
         Limit.
     """
-    kept = [np.ones(len(one.seen.pixels), np.bool_) for one in sightings]
     beside = [_beside(one.seen) for one in sightings]
-    problem = _Problem(sightings, lenses, solve_place and setup.place is not None)
-    for _ in range(_ROUNDS):
-        setup = problem.minimised(setup, kept, steps)
-        off_px = problem.residuals(setup)
+    whole = _Problem(sightings, lenses, solve_place and setup.place is not None)
+    problem, kept = whole, [np.ones(len(near), np.bool_) for near in beside]
+    for least_gain in _LEAST_GAINS:
+        setup = problem.minimised(setup, steps, least_gain)
+        off_px = whole.residuals(setup)
         before, kept = kept, _regular(off_px, beside)
-        if all(np.array_equal(old, new) for old, new in zip(before, kept, strict=True)):
+        if not all(np.array_equal(old, new) for old, new in zip(before, kept, strict=True)):
+            some = [
+                replace(one, seen=one.seen.only(keep))
+                for one, keep in zip(sightings, kept, strict=True)
+            ]
+            problem = _Problem(some, lenses, solve_place and setup.place is not None)
+        elif least_gain == _LEAST_GAINS[-1]:
             break
-    return Adjusted(
-        setup,
-        tuple(off_px),
-        tuple(before),
-        problem.blocks(setup, before),
-        problem.is_coefficient,
-    )
+    return Adjusted(setup, tuple(off_px), tuple(kept), problem.blocks(setup), whole.is_coefficient)
 
 
 def linearised(
     sightings: Sequence[Sighting], setup: Setup, lenses: Sequence[LensModel | None]
 ) -> tuple[tuple[Float64, Float64, Float64], ...]:
     """Return `Adjusted.blocks` of a setup as it is, with the second camera's pose as unknown."""
-    kept = [np.ones(len(one.seen.pixels), np.bool_) for one in sightings]
-    return _Problem(sightings, lenses, setup.place is not None).blocks(setup, kept)
+    return _Problem(sightings, lenses, setup.place is not None).blocks(setup)
 
 
 def _beside(seen: BoardView) -> NDArray[np.int64]:
@@ -172,6 +172,20 @@ def _regular(
     return [~(stray & is_few & (stray.mean() <= of_view)) for stray in strays]
 
 
+class _Corners(NamedTuple):
+    """All corners that one camera sees, sighting after sighting."""
+
+    points_m: Float64
+    pixels: Float64
+    frame: NDArray[np.int64]
+    parts: list[tuple[int, int, slice]]
+    """Number of each sighting, its frame, and its corners."""
+    free: list[int]
+    """Numbers of the camera's parameters that are solved for."""
+    used: NDArray[np.int64]
+    """(Q,); numbers of the shared parameters that concern this camera."""
+
+
 class _Problem:
     """The sightings, and which parameters of a setup are free."""
 
@@ -184,87 +198,108 @@ class _Problem:
         ends = np.cumsum([6 * has_place, *(len(free) for free in self._free)])
         self._columns = [slice(a, b) for a, b in pairwise(ends)]
         self._count = int(ends[-1])
+        self._frames = 1 + max(one.frame for one in sightings)
+        self._corners = [
+            _corners_of(sightings, camera, free, np.r_[0 : 6 * (has_place and camera > 0), columns])
+            for camera, (free, columns) in enumerate(zip(self._free, self._columns, strict=True))
+        ]
         coefficients = [number >= 4 for free in self._free for number in free]
         self.is_coefficient = np.array([False] * (6 * has_place) + coefficients, np.bool_)
 
-    def minimised(self, setup: Setup, kept: Sequence[NDArray[np.bool_]], steps: int) -> Setup:
+    def minimised(self, setup: Setup, steps: int, least_gain: float) -> Setup:
         """Return the setup of least squares."""
-        cost = _cost(self.residuals(setup), kept)
-        damping = 1e-3
+        linear = self._linear(setup)
+        cost, damping = _cost(linear), 1e-3
         for _ in range(steps):
-            normal = self._normal(setup, kept)
+            normal = self._normal(linear)
             while damping < 1e10:
                 trial = self._moved(setup, *_step(*normal, damping))
-                gain = cost - _cost(self.residuals(trial), kept)
+                linear = self._linear(trial)
+                gain = cost - _cost(linear)
                 if gain >= 0.0:
                     break
                 damping *= 10.0
             else:
                 return setup
             setup, cost, damping = trial, cost - gain, max(damping / 10.0, 1e-12)
-            if gain <= _LEAST_GAIN * cost:
+            if gain <= least_gain * cost:
                 break
         return setup
 
     def residuals(self, setup: Setup) -> list[Float64]:
         """Return detected minus predicted corners, (N, 2) each."""
-        return [
-            one.seen.pixels
-            - predict(
-                one.seen.points_m, board_in(setup, one.frame, one.camera), setup.cameras[one.camera]
-            )[0]
-            for one in self._sightings
-        ]
+        linear, found = self._linear(setup), {}
+        for corners, of_camera in zip(self._corners, linear, strict=True):
+            for sighting, _, part in corners.parts:
+                found[sighting] = of_camera[_rows(part), -1].reshape(-1, 2)
+        return [found[number] for number in range(len(found))]
 
-    def blocks(
-        self, setup: Setup, kept: Sequence[NDArray[np.bool_]]
-    ) -> tuple[tuple[Float64, Float64, Float64], ...]:
+    def blocks(self, setup: Setup) -> tuple[tuple[Float64, Float64, Float64], ...]:
         """Return `Adjusted.blocks`."""
-        parts: list[list[tuple[Float64, Float64, Float64]]] = [[] for _ in setup.poses]
-        for one, keep in zip(self._sightings, kept, strict=True):
-            shared, own, off_px = self._linear(setup, one)
-            rows = np.repeat(keep, 2)
-            parts[one.frame].append((shared[rows], own[rows], off_px.ravel()[rows]))
-        return tuple(
-            (
-                np.vstack([a for a, _, _ in part]),
-                np.vstack([b for _, b, _ in part]),
-                np.concatenate([c for _, _, c in part]),
-            )
-            for part in parts
-        )
+        parts: list[list[Float64]] = [[] for _ in range(self._frames)]
+        for corners, linear in zip(self._corners, self._linear(setup), strict=True):
+            wide = np.zeros((len(linear), self._count + 7))
+            wide[:, [*corners.used, *range(self._count, self._count + 7)]] = linear
+            for _, frame, part in corners.parts:
+                parts[frame].append(wide[_rows(part)])
+        of_frames = [np.vstack(part) for part in parts]
+        return tuple((one[:, :-7], one[:, -7:-1], one[:, -1]) for one in of_frames)
 
-    def _linear(self, setup: Setup, one: Sighting) -> tuple[Float64, Float64, Float64]:
-        """Return derivatives by the shared parameters and the frame's pose, and residuals."""
-        camera = setup.cameras[one.camera]
-        pixels, by = predict(one.seen.points_m, board_in(setup, one.frame, one.camera), camera)
-        shared = np.zeros((len(by), self._count))
-        own = by[:, :6]
-        if one.camera > 0 and setup.place is not None:
-            by_board, by_place = _composed(setup.poses[one.frame], setup.place)
-            if self._has_place:
-                shared[:, :6] = own @ by_place
-            own = own @ by_board
-        free = [6 + number for number in self._free[one.camera]]
-        shared[:, self._columns[one.camera]] = by[:, free]
-        return shared, own, one.seen.pixels - pixels
+    def _linear(self, setup: Setup) -> list[Float64]:
+        """Return for each camera, (2 N, Q + 7), of each corner's x and y the derivatives.
+
+        By the shared parameters that concern the camera and by the frame's pose; in the last column
+        detected minus predicted.
+        """
+        found = []
+        boards = np.stack(setup.poses)
+        R, J = _rotations(boards[:, :3])
+        for number, (camera, corners) in enumerate(zip(setup.cameras, self._corners, strict=True)):
+            if not corners.parts:
+                found.append(np.empty((0, len(corners.used) + 7)))
+                continue
+            turned_m = np.concatenate(
+                [corners.points_m[part] @ R[frame].T for _, frame, part in corners.parts]
+            )
+            points_m = turned_m + boards[corners.frame, 3:]
+            place = setup.place if number > 0 else None
+            if place is not None:
+                (R_place,), (J_place,) = _rotations(place[None, :3])
+                replaced_m = points_m @ R_place.T
+                points_m = replaced_m + place[3:]
+            pixels, by = predict(points_m, np.zeros(6), camera)
+            by_point = by[:, 3:6]
+            shared = [by[:, [6 + free for free in corners.free]]]
+            if place is not None:
+                if self._has_place:
+                    shared = [_crossed(replaced_m, by_point) @ J_place, by_point, *shared]
+                by_point = by_point @ R_place
+            by_turn = _crossed(turned_m, by_point)
+            for _, frame, part in corners.parts:
+                by_turn[_rows(part)] = by_turn[_rows(part)] @ J[frame]
+            off_px = (corners.pixels - pixels).reshape(-1, 1)
+            found.append(np.hstack([*shared, by_turn, by_point, off_px]))
+        return found
 
     def _normal(
-        self, setup: Setup, kept: Sequence[NDArray[np.bool_]]
+        self, linear: Sequence[Float64]
     ) -> tuple[Float64, Float64, Float64, Float64, Float64]:
         """Return the blocks of the normal equations, and the gradients."""
-        frames, count = len(setup.poses), self._count
-        U, V = np.zeros((count, count)), np.zeros((frames, 6, 6))
-        W, g_shared, g_own = np.zeros((frames, count, 6)), np.zeros(count), np.zeros((frames, 6))
-        for one, keep in zip(self._sightings, kept, strict=True):
-            shared, own, off_px = self._linear(setup, one)
-            rows = np.repeat(keep, 2)
-            shared, own, residuals = shared[rows], own[rows], off_px.ravel()[rows]
-            U += shared.T @ shared
-            W[one.frame] += shared.T @ own
-            V[one.frame] += own.T @ own
-            g_shared += shared.T @ residuals
-            g_own[one.frame] += own.T @ residuals
+        count = self._count
+        U, W = np.zeros((count, count)), np.zeros((self._frames, count, 6))
+        V, g_own = np.zeros((self._frames, 6, 6)), np.zeros((self._frames, 6))
+        g_shared = np.zeros(count)
+        for corners, of_camera in zip(self._corners, linear, strict=True):
+            used = corners.used
+            shared = of_camera[:, : len(used)].T @ of_camera
+            U[np.ix_(used, used)] += shared[:, : len(used)]
+            g_shared[used] += shared[:, -1]
+            for _, frame, part in corners.parts:
+                rows = of_camera[_rows(part)]
+                own = rows[:, -7:-1].T @ rows
+                W[frame, used] += own[:, : len(used)].T
+                V[frame] += own[:, -7:-1]
+                g_own[frame] += own[:, -1]
         return U, W, V, g_shared, g_own
 
     def _moved(self, setup: Setup, shared: Float64, own: Float64) -> Setup:
@@ -308,18 +343,67 @@ def _step(
     return shared, by_own - by_shared @ shared
 
 
-def _cost(off_px: Sequence[Float64], kept: Sequence[NDArray[np.bool_]]) -> float:
-    """Return the sum of squares of the corners kept; infinite if a prediction is not finite."""
-    cost = sum(float(np.sum(off[keep] ** 2)) for off, keep in zip(off_px, kept, strict=True))
+def _cost(linear: Sequence[Float64]) -> float:
+    """Return the sum of squared residuals; infinite if a prediction is not finite."""
+    cost = sum(float(one[:, -1] @ one[:, -1]) for one in linear)
     return cost if np.isfinite(cost) else np.inf
 
 
-def _composed(board: Float64, place: Float64) -> tuple[Float64, Float64]:
-    """Return the derivatives (6, 6) of the board's pose in the second camera by the two poses."""
-    (_, _, r_r1, r_t1, r_r2, r_t2, t_r1, t_t1, t_r2, t_t2) = cv2.composeRT(
-        board[:3], board[3:], place[:3], place[3:]
+def _corners_of(
+    sightings: Sequence[Sighting], camera: int, free: list[int], used: NDArray[np.int64]
+) -> _Corners:
+    chosen = [(number, one) for number, one in enumerate(sightings) if one.camera == camera]
+    ends = np.cumsum([0, *(len(one.seen.pixels) for _, one in chosen)]).tolist()
+    parts = [
+        (number, one.frame, slice(*part))
+        for (number, one), part in zip(chosen, pairwise(ends), strict=True)
+    ]
+    return _Corners(
+        np.concatenate([np.empty((0, 3)), *(one.seen.points_m for _, one in chosen)]),
+        np.concatenate([np.empty((0, 2)), *(one.seen.pixels for _, one in chosen)]),
+        np.repeat(np.array([one.frame for _, one in chosen], np.int64), np.diff(ends)),
+        parts,
+        free,
+        used,
     )
-    return np.block([[r_r1, r_t1], [t_r1, t_t1]]), np.block([[r_r2, r_t2], [t_r2, t_t2]])
+
+
+def _rows(part: slice) -> slice:
+    """Return the rows of a part's corners, two for each."""
+    return slice(2 * part.start, 2 * part.stop)
+
+
+def _rotations(vectors: Float64) -> tuple[Float64, Float64]:
+    """Return rotation matrices (N, 3, 3) of rotation vectors (N, 3), and their left Jacobians.
+
+    ``exp(r + δ) ≈ exp(J δ) exp(r)`` with ``J = I + (1 - cos θ)/θ² [r] + (θ - sin θ)/θ³ [r]²``
+    (Chirikjian, Stochastic Models, Information Theory, and Lie Groups 2, 2012, section 10.6).
+    """
+    angle = np.linalg.norm(vectors, axis=1)
+    small = angle < 1e-4  # the series' first terms are exact to rounding
+    a = np.where(small, 1.0, angle)
+    sine = np.where(small, 1.0 - angle**2 / 6.0, np.sin(a) / a)
+    cosine = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(a)) / a**2)
+    rest = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (a - np.sin(a)) / a**3)
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    square = cross @ cross
+    sine, cosine, rest = (one[:, None, None] for one in (sine, cosine, rest))
+    return (
+        np.eye(3) + sine * cross + cosine * square,
+        np.eye(3) + cosine * cross + rest * square,
+    )
+
+
+def _crossed(points: Float64, rows: Float64) -> Float64:
+    """Return each point × its two rows: (N, 3), (2 N, 3) → (2 N, 3).
+
+    A row of derivatives by a point becomes one by a small rotation of the point.
+    """
+    x, y, z = np.repeat(points, 2, axis=0).T
+    a, b, c = rows.T
+    return np.column_stack([y * c - z * b, z * a - x * c, x * b - y * a])
 
 
 def as_vector(T: Float64) -> Float64:

@@ -144,7 +144,7 @@ def first_pose(seen: BoardView, camera: Camera) -> Float64 | None:
         return None
     if not found or not np.isfinite(rotations[0]).all():
         return None
-    return rigid(rotations[0].ravel(), translations[0].ravel())
+    return rigid(cv2.Rodrigues(rotations[0])[0], translations[0].ravel())
 
 
 def as_pinhole(camera: Camera, which: str) -> Intrinsics:

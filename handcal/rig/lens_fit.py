@@ -24,7 +24,7 @@ from handcal.types import Float64
 
 # Focal lengths tried, in widths of the image, and the views that judge them.
 _FOCAL_WIDTHS = np.geomspace(0.25, 4.0, 9)
-_START_VIEWS = 12
+_START_VIEWS = 8
 _AS_GOOD = 1.05
 _FISHEYE_GAIN = 2.0
 # Prism and tilted are not among them: their coefficients shift the image's middle and so turn the
@@ -128,7 +128,7 @@ def _judged(lens: LensModel, fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -
 
 def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
     """Return the undistorted camera of the focal length that fits best; None if none fits."""
-    few = views[:: max(1, len(views) // _START_VIEWS)]
+    few = views[:: -(-len(views) // _START_VIEWS)]
     best, least_px = None, np.inf
     for width in _FOCAL_WIDTHS:
         camera = undistorted_camera(lens, few[0].size, width * few[0].size[0])

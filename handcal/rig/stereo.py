@@ -13,7 +13,13 @@ import numpy as np
 
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Adjusted, Setup, Sighting, adjust, as_transform, as_vector
-from handcal.rig.camera import CameraSettings, calibrate_camera, normal_spread, tilt
+from handcal.rig.camera import (
+    CameraCalibration,
+    CameraSettings,
+    calibrate_camera,
+    normal_spread,
+    tilt,
+)
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, LensModel
 from handcal.rig.stereo_pairs import (
@@ -75,6 +81,8 @@ class StereoCalibration:
     verdict: CalibrationVerdict
     left_out: int = 0
     """Number of single corners that contradict those beside them."""
+    solved: tuple[CameraCalibration | None, CameraCalibration | None] = (None, None)
+    """The depth and the headset camera, each by its own images; None if given."""
 
     def __post_init__(self) -> None:
         freeze(self, "T_H_D", np.float64, 4, 4)
@@ -111,12 +119,19 @@ def calibrate_stereo(
     check_moved({name: pair.depth for name, pair in both.items()})
     lenses: list[LensModel | None] = [None, None]
     are_given = depth is not None and headset is not None
+    of_depth = of_headset = None
     if depth is None:
-        depth, lenses[0] = _solved([first for first, _ in pairs], "depth", settings.camera)
+        of_depth = _solved([first for first, _ in pairs], "depth", settings.camera)
+        depth, lenses[0] = of_depth.intrinsics, of_depth.lens
     if headset is None:
-        headset, lenses[1] = _solved([second for _, second in pairs], "headset", settings.camera)
-    fit = _fit(both, each_alone(both, depth, headset), (depth, headset), lenses)
+        of_headset = _solved([second for _, second in pairs], "headset", settings.camera)
+        headset, lenses[1] = of_headset.intrinsics, of_headset.lens
+    alone = each_alone(both, depth, headset)
+    fit = _fit(both, alone, (depth, headset), lenses)
     if fit.rms_px > settings.max_rms_px:
+        # Pairs that contradict each other bend intrinsics that are free until nothing is sound.
+        lenses = [None, None]
+        fit = _fit(both, alone, (depth, headset), lenses)
         _check_not_swapped(both, (depth, headset), fit.rms_px, are_given)
         _check_not_mirrored(both, (depth, headset), fit.rms_px)
     depth, headset = fit.setup.cameras
@@ -129,7 +144,8 @@ def calibrate_stereo(
         name: rms(np.vstack(off_px[2 * number : 2 * number + 2]))
         for number, name in enumerate(both)
     }
-    alone = each_alone(both, depth, headset)
+    if lenses != [None, None]:
+        alone = each_alone(both, depth, headset)
     worst = _worst(both, fit, T_H_D, T_D_B)
     apart = differences(T_H_D, alone.T_H_D)
     covariance = fit.covariance()
@@ -155,19 +171,18 @@ def calibrate_stereo(
             settings,
         ),
         left_out=fit.left_out,
+        solved=(of_depth, of_headset),
     )
 
 
-def _solved(
-    views: Sequence[BoardImage], which: str, settings: CameraSettings
-) -> tuple[Camera, LensModel]:
+def _solved(views: Sequence[BoardImage], which: str, settings: CameraSettings) -> CameraCalibration:
     try:
         calibration = calibrate_camera(views, settings)
     except ViewsError as error:
         raise ViewsError(f"{which} camera: {error}") from error
     if calibration.verdict.name == "bad":
         raise ViewsError(f"{which} camera: {calibration.verdict.reason}")
-    return calibration.intrinsics, calibration.lens
+    return calibration
 
 
 def _fit(

@@ -158,18 +158,25 @@ def next_pair(
     information = np.asarray(np.linalg.inv(covariance), np.float64)
     scale = np.repeat(limits, 3)
     best: NextView | None = None
+    shown: list[tuple[str, Float64]] = []
+    sightings: list[Sighting] = []
     for words, pose in candidate_views(setup.cameras[0], points_m):
         trial = replace(setup, poses=(pose,))
-        sightings = []
+        of_pair = []
         for number, camera in enumerate(setup.cameras):
             pixels = predict(points_m, board_in(trial, 0, number), camera)[0]
             seen = _inside(pixels, camera)
             ids = np.flatnonzero(seen)
             view = BoardView(points_m[seen], pixels[seen], (camera.width, camera.height), ids, 2.0)
-            sightings.append(Sighting(0, number, view))
-        if min(len(one.seen.ids) for one in sightings) < _LEAST_SEEN_SHARE * len(points_m):
-            continue
-        ((shared, own, _),) = linearised(sightings, trial, lenses)
+            of_pair.append(Sighting(len(shown), number, view))
+        if min(len(one.seen.ids) for one in of_pair) >= _LEAST_SEEN_SHARE * len(points_m):
+            shown.append((words, pose))
+            sightings += of_pair
+    if not shown:
+        return None
+    trials = replace(setup, poses=tuple(pose for _, pose in shown))
+    blocks = linearised(sightings, trials, lenses)
+    for (words, pose), (shared, own, _) in zip(shown, blocks, strict=True):
         basis, _ = np.linalg.qr(own)
         shared = (shared - basis @ (basis.T @ shared)) / noise_px
         after = np.linalg.inv(information + shared.T @ shared)[:6, :6] / np.outer(scale, scale)
@@ -195,14 +202,15 @@ def candidate_views(camera: Camera, points_m: Float64) -> Iterator[tuple[str, Fl
     middle_m = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
     width_m = float(np.ptp(points_m[:, 0]))
     size = np.array([camera.width, camera.height])
+    tilts = {how: rigid(_TILT_RAD * np.array([*axis, 0.0]))[:3, :3] for how, axis in _TILTS.items()}
     for share in _WIDTH_SHARES:
         distance_m = camera.fx * width_m / (share * camera.width)
         for where, place in _PLACES.items():
             plane = to_plane(np.array([place]) * size, camera)[0]
             ray = np.array([*plane, 1.0]) / np.linalg.norm([*plane, 1.0])
             facing = _facing(ray)
-            for how, axis in _TILTS.items():
-                turn = facing @ rigid(_TILT_RAD * np.array([*axis, 0.0]))[:3, :3]
+            for how, tilt in tilts.items():
+                turn = facing @ tilt
                 rotation = cv2.Rodrigues(turn)[0].ravel()
                 pose = np.concatenate([rotation, distance_m * ray - turn @ middle_m])
                 in_front = (points_m @ turn.T + pose[3:])[:, 2].min() > 0.1 * distance_m

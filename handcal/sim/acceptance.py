@@ -12,6 +12,7 @@ from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
+from handcal.rig.tracked_file import write_tracked
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
 from handcal.sim.viewpoint import photograph_display
@@ -56,8 +57,11 @@ def write_acceptance(
             BOARD, VIEWPOINT_CAMERA, _CANDIDATES, rng, others=((T_D_C, DEPTH_CAMERA),)
         )
         by_distance = sorted(candidates, key=lambda T_C_B: float(T_C_B[2, 3]))
+        tracked = {}
         poses = [by_distance[i] for i in np.linspace(0, _CANDIDATES - 1, views).astype(int)]
         for number, T_C_B in enumerate(poses, 1):
             name = f"{number:03}.png"
             write_png(make_folder(folder / eye / "viewpoint") / name, viewpoint.paint(T_C_B, rng))
             write_png(make_folder(folder / eye / "depth") / name, depth.paint(T_D_C @ T_C_B, rng))
+            tracked[name] = rig.T_H_D @ T_D_C @ T_C_B
+        write_tracked(folder / eye / "tracked.json", tracked)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -14,12 +15,23 @@ from handcal.errors import CameraTimeoutError, LinkError
 from handcal.geometry import invert, project, rigid, transform
 from handcal.io.closable import Closable
 from handcal.link.client import HeadsetClient
+from handcal.link.pairing import new_device_id, new_pairing_key
+from handcal.link.server import HeadsetServer
 from handcal.rig.cube import Cube
 from handcal.rig.cube_track import cube_corners_m
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.sim.cube_captures import some_cube_pose
-from handcal.types import CameraIdentity, Eye, EyeDisplay, Float64, Frame, Rig
+from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.types import (
+    CameraIdentity,
+    Eye,
+    EyeDisplay,
+    Float64,
+    Frame,
+    HeadsetIdentity,
+    Rig,
+)
 
 _RATE_HZ = 30.0
 _POSE_PERIOD_S = 1.0 / 90.0
@@ -173,3 +185,18 @@ def _move(display: EyeDisplay, shift_m: Float64, points_E_m: Float64, gap_px: Fl
         ]
     )
     return np.asarray(np.linalg.lstsq(J, gap_px.ravel(), rcond=None)[0], np.float64)
+
+
+@contextmanager
+def simulated_wearer(rig: Rig, cube: Cube, seed: int) -> Iterator[tuple[HeadsetServer, CubeBench]]:
+    """Yield a link with a simulated headset, and the wearer, whose eyes are those of a seed."""
+    key = new_pairing_key().encode()
+    identity = HeadsetIdentity(new_device_id(), "Simulated headset", "simulator")
+    eyes = draw_eyes(np.random.default_rng(seed), WearerSettings())
+    with (
+        HeadsetServer(key) as server,
+        HeadsetClient(server.address, key, identity) as client,
+    ):
+        server.wait_connected(10.0)
+        with CubeBench(client, rig, cube, eyes, seed) as bench:
+            yield server, bench

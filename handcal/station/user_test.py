@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
+from handcal.camera.camera import Camera
 from handcal.display import TARGET_DEPTHS_M, view_of_eye
 from handcal.errors import FileError, HandcalError, PoseError
 from handcal.geometry import transform
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
+from handcal.rig.cube import Cube
+from handcal.rig.cube_file import read_cube
 from handcal.rig.cube_track import TrackedCube, facing_corners_m
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
+from handcal.sim.cube_bench import simulated_wearer
 from handcal.station.cube_tracking import CubeTracker
 from handcal.station.drawing import Drawing
 from handcal.types import EYES, Eye, Float64, Rig, Shape
@@ -28,6 +34,7 @@ from handcal.types import EYES, Eye, Float64, Rig, Shape
 Adjust: TypeAlias = Callable[[Eye, Float64, Callable[[Float64], None]], Float64]
 """Given an eye, its φ, and a function that draws with another φ: returns φ as adjusted by hand."""
 
+PLACE_PROMPT = "Look straight ahead. The cube is put {:g} m before you."
 _ACK_S = 6.0
 _POSE_AGE_NS = 60_000_000
 _POSE_PATIENCE_S, _POLL_S = 3.0, 0.02
@@ -43,6 +50,72 @@ class TrialSettings:
     """Largest distance of the cube from the wanted one."""
     patience_s: float = 120.0
     """Longest time until the cube is at rest at the wanted distance."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrialOrder:
+    """The trials of a stored session, as ordered by command line or window."""
+
+    session: Path
+    cube: Path | None = None
+    """Description of the cube; None: a 60 mm cube."""
+    trials: TrialSettings = TrialSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class StudyLeader:
+    """The person who puts the cube down and adjusts φ."""
+
+    place: Callable[[float], None]
+    adjust: Adjust
+
+
+def record_user_trials(
+    order: TrialOrder,
+    connect: Callable[[], AbstractContextManager[HeadsetServer]] | None,
+    open_camera: Callable[[], AbstractContextManager[Camera]],
+    leader: StudyLeader,
+    progress: Progress = Progress(),
+) -> tuple[Trial, ...]:
+    """Record the trials of a stored session, as `run_user_trials`.
+
+    Parameters
+    ----------
+    order : TrialOrder
+    connect : callable or None
+        Opens the link with a connected headset; None: the simulator, whose wearer takes the
+        leader's place, with the seed of the session.
+    open_camera : callable
+        Opens the depth camera; not called for the simulator.
+    leader : StudyLeader
+    progress : Progress
+
+    Raises
+    ------
+    FileError
+        If a file cannot be used, or the session is not of a simulated wearer but `connect` is None.
+    """
+    record = Session.open(order.session)
+    cube = Cube() if order.cube is None else read_cube(order.cube)
+    rig = record.rig
+    with ExitStack() as stack:
+        camera: Camera
+        if connect is None:
+            if "station" not in record.settings:
+                raise FileError(
+                    f"{order.session}: it is not of a simulated wearer; make one with handcal demo"
+                )
+            seed = record.settings["station"].get("seed", 1)
+            server, bench = stack.enter_context(simulated_wearer(rig, cube, seed))
+            camera, leader = bench, StudyLeader(bench.place, bench.adjust)
+        else:
+            server = stack.enter_context(connect())
+            camera = stack.enter_context(open_camera())
+        session = stack.enter_context(Session(order.session))
+        tracker = CubeTracker(camera, cube, rig.T_H_D, server.pose_at_host_ns)
+        return run_user_trials(
+            session, server, tracker, leader.adjust, leader.place, order.trials, progress
+        )
 
 
 def run_user_trials(
@@ -96,6 +169,7 @@ def run_user_trials(
     drawing.wait_acked(_ACK_S)
     try:
         for round_number, depth_m in enumerate(settings.depths_m):
+            server.send_prompt(PLACE_PROMPT.format(depth_m))
             place(depth_m)
             cube = wait_for_cube(tracker, server, rig, depth_m, settings, progress)
             for eye in settings.eyes:
@@ -109,6 +183,7 @@ def run_user_trials(
                 T_E_T = view_of_eye(rig.eyes[eye], _head_now(server)) @ cube.T_W_T
                 corners_W_m = transform(cube.T_W_T, facing_corners_m(tracker.cube, T_E_T))
                 server.wait_acked(server.send_shape(Shape(corners_W_m, (eye,))), _ACK_S)
+                server.wait_acked(server.send_prompt(adjust_prompt(eye), (eye,)), _ACK_S)
                 adjusted_m = adjust(eye, solved_m[eye], draw)
                 T_E_W = view_of_eye(rig.eyes[eye], _head_now(server))
                 trial = make_trial(
@@ -124,7 +199,17 @@ def run_user_trials(
                 draw(solved_m[eye])
     finally:
         server.send_shape(None)
+        server.send_prompt("")
     return tuple(trials)
+
+
+def adjust_prompt(eye: Eye) -> str:
+    """Return what the wearer is asked to do while φ is adjusted."""
+    other = "right" if eye == "left" else "left"
+    return (
+        f"Close your {other} eye. Say where the drawn corners must move until they cover the "
+        "cube's, and when they do."
+    )
 
 
 def solved_shifts_m(record: SessionRecord, eyes: Sequence[Eye]) -> Mapping[Eye, Float64]:

@@ -12,7 +12,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.types import CameraIdentity, Frame
+from handcal.types import CameraIdentity, Frame, UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice
@@ -23,7 +23,7 @@ from handcal_gui.widgets.path_field import PathField
 _RECORDED = "recorded"
 _SOURCES = {REALSENSE: tr("RealSense, colour"), _RECORDED: tr("Recording or video")}
 _PLAYBACK = PlaybackSettings(real_time=True, loop=True)
-_POLL_MS = 50
+_POLL_MS = 15
 
 
 class LiveCameras(QWidget):
@@ -65,6 +65,7 @@ class LiveCameras(QWidget):
         self.images: Images | None = None
         self._realsense, self._tell, self._open_source = realsense, tell, open_source
         self._live: LiveImages | None = None
+        self._warp: Callable[[UInt8], UInt8] | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in titles}
         self._recorded = {
             title: PathField(
@@ -125,6 +126,17 @@ class LiveCameras(QWidget):
         self._show_message(tr("No image"))
         self.images_changed.emit()
 
+    def show_through(self, warp: Callable[[UInt8], UInt8] | None, caption: str) -> None:
+        """Show all images warped, with a caption; `images` are not."""
+        self._warp = warp
+        for shown in self._views.values():
+            shown.show_text(message=shown.message, caption=caption)
+
+    def show_only_images(self, is_only: bool) -> None:
+        """Hide or show the choices of cameras."""
+        for field in (*self._sources.values(), *self._recorded.values(), *self._labels):
+            field.setVisible(not is_only)
+
     def _source(self, title: str) -> str:
         """Return a camera's source for `open_view_source`; empty if no recording is chosen."""
         chosen = str(self._sources[title].currentData())
@@ -137,7 +149,7 @@ class LiveCameras(QWidget):
         self.images = newest
         self._show_message("")
         for shown, image in zip(self._views.values(), newest, strict=True):
-            shown.show_image(image)
+            shown.show_image(image if self._warp is None else self._warp(image))
         self.images_changed.emit()
 
     def _fail(self, why: str) -> None:
@@ -146,7 +158,7 @@ class LiveCameras(QWidget):
 
     def _show_message(self, message: str) -> None:
         for shown in self._views.values():
-            shown.show_text(message=message)
+            shown.show_text(message=message, caption=shown.caption)
 
     def _refresh(self) -> None:
         for title, field in self._recorded.items():
@@ -156,10 +168,11 @@ class LiveCameras(QWidget):
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(SPACING_PX)
+        self._labels = [QLabel(title) for title in self._sources]
         for column, (title, source) in enumerate(self._sources.items()):
             row = QHBoxLayout()
             row.setSpacing(SPACING_PX)
-            row.addWidget(QLabel(title))
+            row.addWidget(self._labels[column])
             row.addWidget(source, 1)
             grid.addLayout(row, 0, column)
             grid.addWidget(self._recorded[title], 1, column)

@@ -36,6 +36,7 @@ def test_a_right_rig_passes_and_a_turned_camera_fails(
     assert passed["passed"]
     assert all(one["worst_arcmin"] < 4.0 for one in passed["eyes"].values())
     assert (images / "page" / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert np.linalg.norm(passed["depth_camera"]["shift_mm"]) < 0.5
     turned = replace(rig, T_H_D=rig.T_H_D @ rigid([0.0, 0.008, 0.0]))
     write_rig(tmp_path / "turned.yaml", turned)
     with pytest.raises(HandcalError, match=r"depth camera turned by 0\.[45]\d°"):

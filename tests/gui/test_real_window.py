@@ -254,9 +254,7 @@ def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
         time.sleep(0.2)
 
 
-@pytest.mark.parametrize(
-    "arrangement", ["panels", pytest.param("station", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("arrangement", ["panels", pytest.param("station", marks=pytest.mark.slow)])
 def test_three_presses_lead_from_the_start_page_to_a_verified_result(
     display: Display,
     tmp_path: Path,

@@ -17,11 +17,13 @@ from handcal.register.prior import PriorSettings
 from handcal.register.solve import solve_alignment
 from handcal.register.surface import describe_surface
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
+from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import overlay_hand, view_through
 from handcal.sim.raster import visible_points
 from handcal.types import (
     EYES,
     Alignment,
+    DepthCheck,
     Eye,
     EyeDistance,
     EyeShift,
@@ -343,3 +345,56 @@ def test_both_eyes_see_what_the_weights_say(apart_m: float) -> None:
     fused = fuse_alignments([(alignment, solved)], RIG, unknowing).shifts
     for eye, shift_m in true_m.items():
         np.testing.assert_allclose(fused[eye].shift_m, shift_m, atol=5e-4)
+
+
+SCALE, OFFSET_M = 1.01, 0.002
+
+
+def _depth_check(views_m2: Float64, scale: float = 1.0, offset_m: float = 0.0) -> DepthCheck:
+    return DepthCheck(
+        "2026-01-01", 8, scale, offset_m, views_m2, np.array([[0.3, 0.8]]), np.zeros(1), np.zeros(1)
+    )
+
+
+def _by_wrong_depth(alignment: Alignment) -> Alignment:
+    """Return an alignment whose hand was measured with a wrong scale and offset of depth."""
+    T_D_W = invert(view_of_eye(RIG.eyes["left"], np.eye(4)) @ RIG.T_H_D) @ alignment.T_E_W["left"]
+    hand_D_m = transform(T_D_W, alignment.hand_m)
+    depth_m = hand_D_m[:, 2:]
+    wrong_D_m = hand_D_m * ((SCALE * depth_m + OFFSET_M) / depth_m)
+    return replace(alignment, hand_m=transform(invert(T_D_W), wrong_D_m))
+
+
+def test_a_bias_of_depth_moves_the_estimate_as_its_covariance_says() -> None:
+    alignment = overlay_by_eye(
+        np.random.default_rng(2),
+        trial_hand(1),
+        RIG,
+        {"left": np.array([0.003, -0.002, 0.001])},
+        2000,
+    )
+    biased = replace(RIG, depth_check=_depth_check(np.zeros((2, 2)), SCALE, OFFSET_M))
+    right, wrong = (
+        fuse_alignments([(one, solve_alignment(one, RIG, "consistent"))], biased, USUAL)
+        for one in (alignment, _by_wrong_depth(alignment))
+    )
+    moved_m = wrong.shifts["left"].shift_m - right.shifts["left"].shift_m
+    said_m = np.sqrt(np.diag(right.by_depth_m2[:3, :3]))
+    assert np.linalg.norm(moved_m) > 0.004
+    np.testing.assert_allclose(said_m, np.abs(moved_m), atol=0.001)
+    assert said_m[2] == pytest.approx(abs(moved_m[2]), rel=0.1)
+
+
+def test_an_uncertain_depth_widens_sigma_and_more_alignments_do_not_help() -> None:
+    check = _depth_check(np.diag([0.01**2, 0.003**2]))
+    checked = replace(RIG, depth_check=check)
+    solved = _align(np.random.default_rng(1), ONE["left"], {"left": np.zeros(3)})
+    for count in (1, 6):
+        known = [solved] * count
+        plain, widened = (
+            fuse_alignments(known, rig, USUAL).shifts["left"] for rig in (RIG, checked)
+        )
+        np.testing.assert_array_equal(plain.shift_m, widened.shift_m)
+        added_m2 = widened.covariance_m2[2, 2] - plain.covariance_m2[2, 2]
+        # 1 % of half a metre and 3 mm, times 4/3; shrunk by the prior as φ is.
+        assert 0.003 < np.sqrt(added_m2) < 4 / 3 * np.hypot(0.005, 0.003) + 1e-4

@@ -5,9 +5,10 @@ import pytest
 
 from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import invert, rigid
-from handcal.rig.accept import EyeAcceptance, accept_eye, likely_cause, problem
+from handcal.rig.accept import EyeAcceptance, accept_eye, camera_move, likely_cause, problem
 from handcal.rig.display import DisplayHomography
 from handcal.rig.example import example_rig
+from handcal.rig.viewpoint import TrackedView
 from handcal.rig.views import ViewsError
 from handcal.sim.boards import board_poses, board_view
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
@@ -68,6 +69,29 @@ def test_a_depth_camera_that_has_only_shifted_passes() -> None:
     found = accepted(RIG, turned(RIG, [0.0, 0.0, 0.0], [0.002, 0.0, 0.0]), "left")
     assert problem(found) == ""
     assert np.linalg.norm(found.shift_m - PHI_M) == pytest.approx(0.002, rel=0.05)
+
+
+def test_a_shift_of_the_depth_camera_is_found_by_tracked_boards() -> None:
+    rng = np.random.default_rng(5)
+    views = {
+        str(number): TrackedView(
+            board_view(BOARD, T_D_B, DEPTH_CAMERA, rng, 0.1),
+            RIG.T_H_D @ T_D_B @ rigid(None, rng.normal(0.0, 0.0003, 3)),
+        )
+        for number, T_D_B in enumerate(board_poses(BOARD, DEPTH_CAMERA, 16, rng))
+    }
+    assert camera_move(RIG, views, DEPTH_CAMERA).problem == ""
+    shift_m = np.array([0.002, 0.0, -0.001])
+    T_H_D = rigid(None, -shift_m) @ RIG.T_H_D
+    found = camera_move(replace(RIG, T_H_D=T_H_D), views, DEPTH_CAMERA)
+    np.testing.assert_allclose(found.shift_m, shift_m, atol=0.0006)
+    assert "the depth camera is shifted by" in likely_cause([], found)
+
+
+def test_without_tracked_boards_a_small_rotation_may_be_a_shift() -> None:
+    shifted = [accepted(RIG, turned(RIG, [0.0, 0.0, 0.0], [0.005, 0.0, 0.0]), eye) for eye in EYES]
+    assert all(problem(one) for one in shifted)
+    assert "or shifted by 5 mm" in likely_cause(shifted)
 
 
 def test_a_changed_display_is_not_taken_for_the_depth_camera() -> None:

@@ -1,5 +1,5 @@
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -76,12 +76,21 @@ def test_the_tracked_cube_is_drawn_where_it_is(
 def test_the_trials_measure_the_true_error(
     session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
 ) -> None:
-    server, _, room = bench
+    server, client, room = bench
     before = len(Session.open(session.path).trials)
     settings = TrialSettings(depths_m=(0.4, 0.6))
+    prompts: list[tuple[str, tuple[Eye, ...]]] = []
+
+    def adjust(eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
+        draw(shift_m)  # acknowledged, and so is the prompt before it
+        prompts.append((client.state().prompt, client.state().eyes))
+        return room.adjust(eye, shift_m, draw)
+
     made = run_user_trials(
-        session, server, tracker(session, server, room), room.adjust, room.place, settings
+        session, server, tracker(session, server, room), adjust, room.place, settings
     )
+    assert [eyes for _, eyes in prompts] == [("left",), ("right",)] * 2
+    assert prompts[0][0].startswith("Close your right eye. Say where")
     record = Session.open(session.path)
     assert len(record.trials) == before + 4
     assert [trial.eye for trial in made] == ["left", "right"] * 2

@@ -23,7 +23,7 @@ from handcal.rig.display import fit_homography, pose_before
 from handcal.rig.grid import Grid, find_grid
 from handcal.rig.views import ViewsError
 from handcal.rig.warp import RotationWarp
-from handcal.types import Float64, Intrinsics, UInt8
+from handcal.types import Intrinsics, UInt8
 
 CubeRow: TypeAlias = dict[str, float | int | str]
 """Errors of one pair of captures; units are in the names."""
@@ -74,7 +74,9 @@ def judge_captures(
     rows: list[CubeRow] = []
     for position, of_position in groupby(poses, key=lambda pose: pose.position):
         with _noted(left_out, f"{position}/{GRID}"):
-            warp = RotationWarp(camera, _turn(folder / position, camera, grid))
+            warp = display_warp(folder / position, camera, grid)
+            if warp is None:
+                warp = RotationWarp(camera, np.eye(3))
             for pose in of_position:
                 name = f"{position}/{pose.pose}"
                 progress.at(poses.index(pose) / len(poses), f"Looking at {name}")
@@ -87,6 +89,29 @@ def judge_captures(
                             whose = {"position": position, "pose": pose.pose, "drawn": drawn}
                             rows.append(whose | errors)
     return CubeTest(rows, left_out)
+
+
+def display_warp(position: Path, camera: Intrinsics, grid: Grid) -> RotationWarp | None:
+    """Return the warp of a position's images to the display's axes; None without its grid.
+
+    Parameters
+    ----------
+    position : Path
+        Folder of the position.
+    camera : Intrinsics
+    grid : Grid
+
+    Raises
+    ------
+    FileError, BoardError, ViewsError, ValueError
+        If the image of the grid cannot be used.
+    """
+    path = images_in(position).get(GRID) if position.is_dir() else None
+    if path is None:
+        return None
+    size = grid.width_px, grid.height_px
+    homography = fit_homography({GRID: find_grid(_read(path), grid)}, camera, *size)
+    return RotationWarp(camera, pose_before(homography, camera, *size)[0])
 
 
 def cube_row(found: CubeMisalignment) -> CubeRow:
@@ -121,16 +146,6 @@ def _noted(left_out: dict[str, str], name: str) -> Iterator[None]:
         yield
     except _UNUSABLE as error:
         left_out[name] = str(error)
-
-
-def _turn(position: Path, camera: Intrinsics, grid: Grid) -> Float64:
-    """Return R_S_C; without an image of the grid, that of a camera parallel to the display."""
-    path = images_in(position).get(GRID)
-    if path is None:
-        return np.eye(3)
-    size = grid.width_px, grid.height_px
-    homography = fit_homography({GRID: find_grid(_read(path), grid)}, camera, *size)
-    return pose_before(homography, camera, *size)[0]
 
 
 def _read(path: Path) -> UInt8:

@@ -16,7 +16,7 @@ from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.lab.evaluate.cube_report import cube_report
 from handcal.lab.evaluate.cube_summary import ErrorSummary, cube_summary
-from handcal.lab.evaluate.cube_test import CubeTest, judge_captures
+from handcal.lab.evaluate.cube_test import CubeTest, display_warp, judge_captures
 from handcal.lab.evaluate.masked_frames import read_masked_frames, read_masked_names
 from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
 from handcal.lab.evaluate.segmentation_report import segmentation_report
@@ -38,6 +38,7 @@ from handcal.rig.cube_file import read_cube
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid, grid_on
 from handcal.rig.rig_file import read_rig
+from handcal.rig.warp import RotationWarp
 from handcal.sim.cube_captures import CaptureSettings, write_captures
 from handcal.types import Rig
 
@@ -190,6 +191,19 @@ def cube_and_grid(settings: CubeTestSettings, folder: Path) -> tuple[Cube, Grid]
         )
     display = _rig(settings).eyes[settings.eye]
     return read_cube(file), grid_on(display.width_px, display.height_px, settings.square_px)
+
+
+def position_warp(settings: CubeTestSettings, folder: Path, position: str) -> RotationWarp | None:
+    """Return the warp of the live view at a position; None before its grid is captured.
+
+    Raises
+    ------
+    HandcalError
+        If the camera's intrinsics or the image of the grid cannot be used.
+    """
+    camera = read_intrinsics(_file(settings.camera, folder / "camera.json"))
+    grid = cube_and_grid(settings, folder)[1]
+    return display_warp(folder / position, camera, grid)
 
 
 def _evaluate_captures(

@@ -1,22 +1,29 @@
-"""A dialog for taking the captures of a cube test with a camera, one by one."""
+"""A dialog for taking the captures of a cube test with a camera, by key or at rest.
+
+The live image is undistorted and turned to the display's axes once the position's grid is captured,
+so that a hand aligned in it is aligned for an eye (Hu et al. 2021).
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
-from handcal.lab.evaluate.cube_capture import instruction, keep_capture
-from handcal.lab.evaluate.cube_folder import CapturePlan, PlannedCapture, missing_captures
-from handcal.lab.evaluate.run import cube_and_grid
+from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
+from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
+from handcal.lab.evaluate.run import cube_and_grid, position_warp
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
+from handcal.rig.warp import RotationWarp
 from handcal.station.doctor import Finding, Health
+from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font
@@ -31,6 +38,8 @@ from handcal_gui.windows.evaluation.capture_list import CaptureList
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 _FIRST_SIZE = QSize(1120, 760)
+_TURNED = "Turned to the display's axes"
+_NOT_TURNED = "Along the camera's axes"
 MOST_POSES = 100
 
 
@@ -79,14 +88,40 @@ class CaptureDialog(PreparationDialog):
         self._take = main_button("takeCapture", "Take again")
         self._take.setMinimumWidth(self._take.sizeHint().width())
         self._take.setToolTip("Space bar")
+        self._by_itself = with_name(
+            QCheckBox("A&utomatically"),
+            "byItself",
+            help_text="Take each image once the cube or the grid is at rest. Between two images of "
+            "the cube, cover it.",
+        )
+        self._large = with_name(
+            QCheckBox("&Large view"),
+            "largeView",
+            help_text="Fill the screen with the live image, to align a hand by. Escape goes back.",
+        )
         self._close = button("close", "Close")
+        self._watch: RestWatch | None = None
+        self._is_watching = False
+        self._warp: tuple[str, RotationWarp | None] = "", None
+        self._judge = LatestJob(self._keep_at_rest, self)
+        self._judge.answered.connect(self._on_judged)
+        self._judge.failed.connect(self._on_judging_failed)
+        self._turn = LatestJob(
+            lambda position: position_warp(self.entries, self._folder, position), self
+        )
+        self._turn.answered.connect(self._show_turned)
+        self._turn.failed.connect(self._show_not_turned)
         self._look = LatestJob(lambda plan: missing_captures(self._folder, plan), self)
         self._look.answered.connect(self._show_missing)
         self._look.failed.connect(self._show_failure)
         self.form.changed.connect(self._change_plan)
         self._camera.images_changed.connect(self._refresh)
         self._camera.failed.connect(self._show_failure)
+        self._camera.images_changed.connect(self._consider)
         self._list.chosen_changed.connect(self._refresh)
+        self._list.chosen_changed.connect(self._turn_view)
+        self._by_itself.toggled.connect(self._refresh)
+        self._large.toggled.connect(self._enlarge)
         self._start.clicked.connect(self.start)
         self._take.clicked.connect(self.take)
         self._close.clicked.connect(self.accept)
@@ -115,10 +150,95 @@ class CaptureDialog(PreparationDialog):
 
     def done(self, result: int) -> None:
         """Close camera and dialog."""
+        self._judge.stop()
+        self._turn.stop()
         self._camera.stop()
         self._look.stop()
         self._bar.stop()
         super().done(result)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave the large view by Escape before the dialog."""
+        if event.key() == Qt.Key.Key_Escape and self._large.isChecked():
+            self._large.setChecked(False)
+        else:
+            super().keyPressEvent(event)
+
+    def _consider(self) -> None:
+        """Examine the present image, if captures are taken automatically and none is examined."""
+        images, chosen = self._camera.images, self._list.chosen
+        if (
+            self._by_itself.isChecked()
+            and not self._is_watching
+            and not self._bar.is_busy
+            and images is not None
+            and chosen is not None
+            and not self._list.chosen_is_taken
+        ):
+            self._is_watching = True
+            self._judge.ask((images[0], chosen, time.monotonic_ns()))
+
+    def _keep_at_rest(self, seen: tuple[UInt8, PlannedCapture, int]) -> tuple[str, str]:
+        """Keep an image at rest; return what it shows, or why not. Runs in the job's thread."""
+        image, chosen, t_ns = seen
+        assert self._looked_for is not None
+        self._watch = self._watch or RestWatch(*self._looked_for)
+        why_not = self._watch.consider(image, chosen, t_ns)
+        if why_not:
+            return "", why_not
+        return keep_capture(image, self._folder, chosen, *self._looked_for), ""
+
+    def _on_judged(self, seen: tuple[UInt8, PlannedCapture, int], answer: tuple[str, str]) -> None:
+        self._is_watching = False
+        shown, why_not = answer
+        if shown:
+            self._show_taken(seen[1], shown)
+        else:
+            self._found.show_finding(Finding("", Health.LIMITED, f"waiting: {why_not}"))
+
+    def _on_judging_failed(self, why: str) -> None:
+        self._is_watching = False
+        self._by_itself.setChecked(False)
+        self._show_not_done(why)
+
+    def _turn_view(self) -> None:
+        """Turn the live image as at the position of the selected capture."""
+        chosen = self._list.chosen
+        position = "" if chosen is None else chosen.where.split("/")[0]
+        if position and position != self._warp[0]:
+            self._warp = position, None
+            self._camera.show_through(None, _NOT_TURNED)
+            self._turn.ask(position)
+
+    def _show_turned(self, position: str, warp: RotationWarp | None) -> None:
+        self._warp = position, warp
+        if warp is None:
+            self._camera.show_through(None, f"{_NOT_TURNED}: capture the display's grid first")
+        else:
+            self._camera.show_through(self._warped, _TURNED)
+
+    def _show_not_turned(self, why: str) -> None:
+        self._camera.show_through(None, f"{_NOT_TURNED}: {why}")
+
+    def _warped(self, image: UInt8) -> UInt8:
+        warp = self._warp[1]
+        if warp is None:
+            return image
+        try:
+            return warp.warp(image)
+        except ValueError as error:  # an image of another size than the intrinsics'
+            self._warp = self._warp[0], None
+            self._show_not_turned(str(error))
+            return image
+
+    def _enlarge(self, is_large: bool) -> None:
+        self.form.setVisible(not is_large)
+        self._list.setVisible(not is_large)
+        self._camera.show_only_images(is_large)
+        if is_large:
+            self.showFullScreen()
+        else:
+            self.showNormal()
 
     def _prepare(self) -> tuple[tuple[Cube, Grid], list[int]]:
         return cube_and_grid(self.entries, self._folder), self._list_cameras()
@@ -148,6 +268,8 @@ class CaptureDialog(PreparationDialog):
 
     def _show_taken(self, taken: PlannedCapture, seen: str) -> None:
         self._found.show_finding(Finding("", Health.GOOD, f"taken: {taken.file}, {seen}"))
+        if taken.kind == GRID:
+            self._warp = "", None
         self._ask()
 
     def _show_not_done(self, why: str) -> None:
@@ -182,7 +304,15 @@ class CaptureDialog(PreparationDialog):
         scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
         middle = hbox((self._camera, 1), self._list, spacing=2 * SPACING_PX)
-        foot = hbox(self._start, self._take, (self._bar, 1), self._close, spacing=SPACING_PX)
+        foot = hbox(
+            self._start,
+            self._take,
+            self._by_itself,
+            self._large,
+            (self._bar, 1),
+            self._close,
+            spacing=SPACING_PX,
+        )
         vbox(
             self.form,
             (middle, 1),

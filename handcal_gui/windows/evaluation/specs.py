@@ -24,6 +24,7 @@ from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.evaluation.capture_dialog import MOST_POSES, CaptureDialog
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.preparation import Preparation
+from handcal_gui.windows.evaluation.trials_dialog import TrialsDialog
 from handcal_gui.windows.evaluation.work import FileEvaluation, StudyEvaluation
 
 _MOST_WEARERS, _MOST_SEED, _MOST_PROCESSES = 10_000, 2**31 - 1, 1024
@@ -69,6 +70,13 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 lambda entries, progress: run_user_test(entries.settings, progress),
             ),
             _users_form,
+            Preparation(
+                "Record…",
+                "Record the trials of one session with a cube in the room; enter the session "
+                "first.",
+                lambda entries: bool(entries.sessions),
+                TrialsDialog,
+            ),
         ),
         "segmentation": EvaluationSpec(
             "Segmentation",

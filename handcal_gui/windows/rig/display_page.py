@@ -105,8 +105,8 @@ class DisplayPage(StepPage):
             }
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
-        grid = ImagesPanel(("Viewpoint camera",), _GRID_HINT)
-        board = ImagesPanel(("Viewpoint camera",), _BOARD_HINT)
+        grid = ImagesPanel(("Viewpoint camera",), _GRID_HINT, "setup-display")
+        board = ImagesPanel(("Viewpoint camera",), _BOARD_HINT, "setup-board")
         panels = {"Grid on the display": grid, "Camera pose": board}
         super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
         self._eye: Eye = eye

@@ -6,14 +6,17 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtSvg import QSvgRenderer
+from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QSplitter, QWidget
 
+from handcal.io.resources import resource_path
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import button, paragraph
+from handcal_gui.widgets.fields import button, choice, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -22,6 +25,41 @@ from handcal_gui.windows.rig.shot_list import ShotList
 from handcal_gui.windows.rig.shot_view import ShotView
 from handcal_gui.windows.rig.shots import Shot, look
 from handcal_gui.windows.rig.solve import SolvedPart
+from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
+
+
+class Drawing(QWidget):
+    """Shows a shipped SVG drawing, as large as fits.
+
+    Parameters
+    ----------
+    page : str
+        As for `resource_path`.
+    """
+
+    def __init__(self, page: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("drawing")
+        self.setAccessibleName("Drawing of the arrangement")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._renderer = QSvgRenderer(str(resource_path(page)), self)
+        self._renderer.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
+
+    @property
+    def is_readable(self) -> bool:
+        """True if the drawing was found and can be drawn."""
+        return self._renderer.isValid()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw on white, in which the drawings are made."""
+        painter = QPainter(self)
+        size = QSizeF(self._renderer.defaultSize())
+        size.scale(QSizeF(self.size()), Qt.AspectRatioMode.KeepAspectRatio)
+        place = QRectF(QPointF(), size)
+        place.moveCenter(QRectF(self.rect()).center())
+        painter.fillRect(place, Qt.GlobalColor.white)
+        self._renderer.render(painter, place)
+        painter.end()
 
 
 class ImagesPanel(QWidget):
@@ -33,6 +71,9 @@ class ImagesPanel(QWidget):
         Name of the camera, or names of the two cameras of pairs.
     hint : str
         Text shown while there are no images.
+    drawing : str
+        Name of the drawing of the arrangement in the tutorial, shown while there are no images, and
+        on request.
 
     Attributes
     ----------
@@ -47,13 +88,26 @@ class ImagesPanel(QWidget):
     again_requested = Signal()
     take_requested = Signal()
 
-    def __init__(self, titles: tuple[str, ...], hint: str, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, titles: tuple[str, ...], hint: str, drawing: str, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
         self._list = ShotList("Images")
         self._view = ShotView(titles)
         self._maps = tuple(CoverageMap(title) for title in titles)
+        self._sigmas = tuple(UncertaintyMap(title) for title in titles)
+        self._shown_map = choice(
+            "map", "Map", {"coverage": "Images of the board", "uncertainty": "Uncertainty"}
+        )
+        self._shown_map.currentIndexChanged.connect(self._show_map)
+        self._drawing = Drawing(f"docs/pictures/{drawing}.svg")
+        self._arrange = button(
+            "arrangement", "Arrangement", help_text="Show how the devices are arranged"
+        )
+        self._arrange.setCheckable(True)
+        self._arrange.toggled.connect(self._show_drawing)
         self._count = QLabel()
         self._count.setObjectName("count")
         self._hint = paragraph("hint", hint)
@@ -71,6 +125,7 @@ class ImagesPanel(QWidget):
         self._list.dropped_changed.connect(self._refresh)
         self._list.dropped_changed.connect(self.dropped_changed)
         self._lay_out()
+        self._show_map()
         self._refresh()
 
     def dropped_of(self, before: tuple[str, ...]) -> tuple[str, ...]:
@@ -106,6 +161,8 @@ class ImagesPanel(QWidget):
         """Show the residual of each image."""
         worst = (solved.worst.name, solved.worst.why) if solved.worst else ("", "")
         self._list.show_results(solved.residuals_px, solved.tilts_rad, worst)
+        for shown, found in zip(self._sigmas, solved.uncertainties, strict=False):
+            shown.show_uncertainty(found)
 
     def show_trouble(self, why: str) -> None:
         """Show why there are no images."""
@@ -141,15 +198,30 @@ class ImagesPanel(QWidget):
         good = sum(not shot.problem for shot in kept)
         self._count.setText(f"{good} of {len(self.shots)} used" if self.shots else "No images yet")
         self._hint.setVisible(not self.shots)
+        self._show_drawing()
+
+    def _show_drawing(self) -> None:
+        is_shown = not self.shots or self._arrange.isChecked()
+        self._drawing.setVisible(is_shown)
+        self._split.setVisible(not is_shown)
+
+    def _show_map(self) -> None:
+        is_coverage = self._shown_map.currentData() == "coverage"
+        for shown in self._maps:
+            shown.setVisible(is_coverage)
+        for other in self._sigmas:
+            other.setVisible(not is_coverage)
 
     def _lay_out(self) -> None:
-        side = vbox(self._count, *self._maps, 1, spacing=SPACING_PX)
-        split = QSplitter(Qt.Orientation.Horizontal)
+        side = vbox(self._count, *self._maps, *self._sigmas, self._shown_map, 1, spacing=SPACING_PX)
+        self._split = split = QSplitter(Qt.Orientation.Horizontal)
         split.setChildrenCollapsible(False)
         split.addWidget(self._list)
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
-        row = hbox((split, 1), side, spacing=2 * SPACING_PX)
+        row = hbox((split, 1), (self._drawing, 1), side, spacing=2 * SPACING_PX)
         layout = vbox(self._hint, self._trouble, (row, 1), on=self, margins=0, spacing=SPACING_PX)
-        self._buttons = hbox(self._take, self._again, (self.bar, 1), spacing=SPACING_PX)
+        self._buttons = hbox(
+            self._take, self._again, self._arrange, (self.bar, 1), spacing=SPACING_PX
+        )
         layout.addLayout(self._buttons)

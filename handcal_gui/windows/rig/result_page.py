@@ -28,6 +28,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.rig.accept_dialog import AcceptDialog
 from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
@@ -51,6 +52,7 @@ class ResultPage(QWidget):
         self.setObjectName("resultPage")
         self._project = project
         self._saved: Path | None = None
+        self._acceptance: AcceptDialog | None = None
         self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", "Name of the rig")
         self._findings = FindingList("Check of the rig")
         self._numbers = NumberTable("Numbers of the rig")
@@ -59,12 +61,16 @@ class ResultPage(QWidget):
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
         self._save = main_button("saveRig", "Save rig file…")
+        self._accept = button(
+            "acceptRig", "Accept…", help_text="Check what is drawn by a camera in the eye's place"
+        )
         self._use = button("useRig", "Use for the next calibration")
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
         self._name.editingFinished.connect(self._on_name_edited)
         self._save.clicked.connect(self.save)
+        self._accept.clicked.connect(self._open_acceptance)
         self._use.clicked.connect(self._ask_to_use)
         project.rig_changed.connect(self.enter)
 
@@ -109,7 +115,13 @@ class ResultPage(QWidget):
         self._end.show_finding(Finding("", Health.GOOD, f"saved as {path}"))
 
     def stop(self) -> None:
-        """Do nothing: the page has no background work."""
+        """Close the acceptance, if it is open."""
+        if self._acceptance is not None:
+            self._acceptance.reject()
+
+    def _open_acceptance(self) -> None:
+        self._acceptance = AcceptDialog(self._project, self)
+        self._acceptance.open()
 
     def _on_name_edited(self) -> None:
         name = self._name.text().strip()
@@ -160,6 +172,7 @@ class ResultPage(QWidget):
         foot = QHBoxLayout()
         foot.setSpacing(2 * SPACING_PX)
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
+        foot.addWidget(self._accept)
         foot.addWidget(self._use)
         foot.addWidget(self._save)
         vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)

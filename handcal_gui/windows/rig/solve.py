@@ -10,7 +10,7 @@ from pathlib import Path
 from handcal.errors import HandcalError
 from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
-from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
+from handcal.rig.camera import CameraCalibration, CameraSettings, calibrate_camera, tilt
 from handcal.rig.formats import camera_json, read_intrinsics
 from handcal.rig.lens import Camera, first_pose
 from handcal.rig.steps import (
@@ -21,6 +21,7 @@ from handcal.rig.steps import (
     intrinsics_in,
     pose_in,
 )
+from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import BoardImage, WorstView
 from handcal.types import Eye, Rig
@@ -46,6 +47,10 @@ class SolvedPart:
     tilts_rad: Mapping[str, float] = field(default_factory=dict)
     """By image; the tilt is the angle between the board's normal and the line of sight."""
     worst: WorstView | None = None
+    uncertainties: tuple[ProjectionUncertainty | None, ...] = ()
+    """Of each camera of the step; None if it was not solved."""
+    lenses: str = ""
+    """The lens models compared, in words."""
     add_to: Callable[[Rig], Rig] | None = None
     """Returns a rig with this part added; None if it is bad or not part of a rig."""
 
@@ -72,6 +77,12 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
         result.residuals_px,
         _tilts([first for first, _ in pairs], result.depth),
         result.worst,
+        tuple(None if one is None else one.uncertainty for one in result.solved),
+        "; ".join(
+            f"{which}: {_compared(one)}"
+            for which, one in zip(("Depth camera", "headset camera"), result.solved, strict=True)
+            if one is not None and one.compared
+        ),
         None if result.verdict.name == "bad" else add_to,
     )
 
@@ -88,6 +99,8 @@ def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Pa
         result.residuals_px,
         _tilts(views, result.intrinsics),
         result.worst,
+        (result.uncertainty,),
+        _compared(result) if result.compared else "",
     )
 
 
@@ -117,6 +130,15 @@ def solve_display(
         add_to=None if result.verdict.name == "bad" else add_to,
     )
     return solved, of_pose
+
+
+def _compared(result: CameraCalibration) -> str:
+    """Return the lens models compared with their errors on images not used to solve them."""
+    listed = ", ".join(
+        f"{one.lens} {one.held_out_px:.3f} px (± {one.edge_px:.2f} px at the edge)"
+        for one in result.compared
+    )
+    return f"lens {result.lens}, of {listed}"
 
 
 def _tilts(views: Sequence[BoardImage], camera: Camera) -> dict[str, float]:

@@ -11,11 +11,12 @@ from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.types import Origin
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import main_button
+from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.rows import COLUMNS
 from handcal_gui.windows.rig.solve import SolvedPart
@@ -41,6 +42,7 @@ class SolveBox(QWidget):
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
+        self._lenses = paragraph("lenses")
         self._table = NumberTable("Numbers")
         self._table.setMinimumWidth(40 * SPACING_PX)
         self._lay_out()
@@ -59,6 +61,7 @@ class SolveBox(QWidget):
     def show_origin(self, origin: Origin | None) -> None:
         """Show an earlier result; None if there is none."""
         self._worst.hide()
+        self._lenses.hide()
         self._table.hide()
         if origin is None:
             self.show_finding(Finding("", Health.LIMITED, "Not solved yet"))
@@ -79,11 +82,14 @@ class SolveBox(QWidget):
         if solved.worst is not None:
             worst = f"Worst: {solved.worst.name}, {solved.worst.rms_px:.2f} px: {solved.worst.why}"
             self._worst.show_finding(Finding("", Health.LIMITED, worst))
+        self._lenses.setText(f"{sentence(solved.lenses)}.")
+        self._lenses.setVisible(bool(solved.lenses))
         self._table.show_rows(COLUMNS, solved.rows)
         self._table.show()
 
     def _show_failure(self, why: str) -> None:
         self._worst.hide()
+        self._lenses.hide()
         self._table.hide()
         self.show_finding(Finding("", Health.BROKEN, why))
 
@@ -94,5 +100,6 @@ class SolveBox(QWidget):
         left.addLayout(row)
         left.addWidget(self._verdict)
         left.addWidget(self._worst)
+        left.addWidget(self._lenses)
         left.addStretch(1)
         hbox((left, 1), self._table, on=self, margins=0, spacing=2 * SPACING_PX)

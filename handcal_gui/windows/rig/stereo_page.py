@@ -51,7 +51,7 @@ class StereoPage(StepPage):
             }
         )
         form.show_entries(project.inputs.stereo)
-        panel = ImagesPanel(("Depth camera", "Headset camera"), _HINT)
+        panel = ImagesPanel(("Depth camera", "Headset camera"), _HINT, "setup-stereo")
         super().__init__("stereoPage", project, form, {"Pairs": panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)

@@ -36,7 +36,7 @@ class ViewpointPage(StepPage):
             }
         )
         form.show_entries(project.inputs.viewpoint)
-        panel = ImagesPanel(("Viewpoint camera",), _HINT)
+        panel = ImagesPanel(("Viewpoint camera",), _HINT, "setup-viewpoint")
         super().__init__("viewpointPage", project, form, {"Images": panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)

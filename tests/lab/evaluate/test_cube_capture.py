@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CancelledError
+from handcal.errors import CameraEndError, CancelledError
 from handcal.geometry import rigid
 from handcal.io.images import write_png
-from handcal.lab.evaluate.cube_capture import keep_capture, take_captures
+from handcal.lab.evaluate.cube_capture import (
+    RestWatch,
+    keep_capture,
+    take_at_rest,
+    take_captures,
+)
 from handcal.lab.evaluate.cube_folder import (
     CapturePlan,
     PlannedCapture,
@@ -107,3 +112,92 @@ def test_an_image_replaces_an_earlier_one_only_if_the_cube_is_seen(tmp_path: Pat
     write_png(tmp_path / "expected.png", seen)
     kept = images_in(earlier.parent)["real"]
     assert kept.read_bytes() == (tmp_path / "expected.png").read_bytes()
+
+
+@lru_cache(maxsize=1)
+def cube_drawn() -> UInt8:
+    """Return the cube as a display draws it: bright in the dark, slightly beside the real one."""
+    moved = np.roll(cube_seen(), 2, axis=1).astype(np.float32)
+    return (0.6 * moved).astype(np.uint8)
+
+
+def look(scene: UInt8, number: int) -> UInt8:
+    """Return an RGB image of a scene, with noise of its own."""
+    noise = np.random.default_rng(number).normal(0.0, 2.0, scene.shape)
+    return np.repeat(np.clip(scene + noise, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+REAL, DRAWN = PlannedCapture("a/1", "real"), PlannedCapture("a/1", "virtual")
+
+
+class Watched:
+    """A watch that sees an image every 0.3 s."""
+
+    def __init__(self) -> None:
+        self._watch = RestWatch(CUBE, GRID)
+        self._looks = 0
+
+    def say(self, scene: UInt8, capture: PlannedCapture, looks: int = 1) -> str:
+        for _ in range(looks):
+            self._looks += 1
+            said = self._watch.consider(
+                look(scene, self._looks), capture, 300_000_000 * self._looks
+            )
+        return said
+
+
+def test_a_cube_is_taken_once_it_is_at_rest() -> None:
+    watched = Watched()
+    assert "moves" in watched.say(cube_seen(), REAL, 2)
+    assert "moves" in watched.say(np.roll(cube_seen(), 4, axis=1), REAL, 2)
+    assert watched.say(np.roll(cube_seen(), 4, axis=1), REAL) == ""
+
+
+def test_a_hand_before_the_real_cube_does_not_make_it_a_drawn_one() -> None:
+    watched = Watched()
+    assert watched.say(cube_seen(), REAL, 3) == ""
+    assert "taken last" in watched.say(cube_seen(), DRAWN, 4)
+    assert "dark" in watched.say(np.zeros_like(cube_seen()), DRAWN)
+    assert "taken last" in watched.say(cube_seen(), DRAWN, 4)
+    assert "dark" in watched.say(np.zeros_like(cube_seen()), DRAWN)
+    assert watched.say(cube_drawn(), DRAWN, 3) == ""
+
+
+class Film(ViewpointCamera):
+    """A camera that sees scenes one after the other, each for a second, at 5 frames a second."""
+
+    def __init__(self, scenes: list[UInt8]) -> None:
+        self.name = "Film"
+        self._frames = iter(scene for scene in scenes for _ in range(5))
+        self._count = 0
+
+    def read(self) -> tuple[UInt8, int]:
+        scene = next(self._frames, None)
+        if scene is None:
+            raise CameraEndError("the film has ended")
+        self._count += 1
+        return look(scene, self._count), 200_000_000 * self._count
+
+    def close(self) -> None:
+        pass
+
+
+def test_captures_are_taken_by_themselves(tmp_path: Path) -> None:
+    dark, said = np.zeros((360, 640), np.uint8), list[str]()
+    film = Film([draw_grid(GRID), dark, cube_seen(), dark, cube_drawn()])
+    take_at_rest(film, tmp_path, PLAN, CUBE, GRID, said.append)
+    assert missing_captures(tmp_path, PLAN) == []
+    assert [line for line in said if line.startswith("centre")] == [
+        "centre: show the grid on the display, darken the room",
+        said[2],
+        "centre/pose-1: switch the display off",
+        "centre/pose-1/real.png: 3 faces of the cube",
+        "centre/pose-1: show the virtual cube, cover the real one (a)",
+        "centre/pose-1/virtual-a.png: 3 faces of the cube",
+    ]
+    assert said[2].startswith("centre/grid.png: ")
+
+
+def test_a_camera_that_ends_ends_the_captures(tmp_path: Path) -> None:
+    with pytest.raises(CameraEndError):
+        take_at_rest(Film([cube_seen()]), tmp_path, PLAN, CUBE, GRID, lambda _: None)

@@ -1,23 +1,28 @@
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
+from handcal.display import eye_projection
 from handcal.errors import CancelledError, FileError
-from handcal.geometry import invert, rigid
+from handcal.geometry import image_points, invert, rigid, transform
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.lab.evaluate.cube import CubeMisalignment
-from handcal.lab.evaluate.cube_test import cube_row, judge_captures
+from handcal.lab.evaluate.cube_test import cube_row, display_warp, judge_captures
 from handcal.progress import Progress
-from handcal.rig.cube import Cube
+from handcal.rig.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.example import example_rig
 from handcal.rig.grid import Grid, draw_grid
+from handcal.rig.warp import RotationWarp
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.sim.viewpoint import photograph_display
+from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 from handcal.types import Float64, Intrinsics
 
 CUBE = Cube()
@@ -134,3 +139,51 @@ def test_it_can_be_given_up(tmp_path: Path) -> None:
 
     with pytest.raises(CancelledError):
         judge_captures(tmp_path, CUBE, CAMERA, GRID, Progress(give_up))
+
+
+@lru_cache(maxsize=1)
+def turned_view() -> tuple[RotationWarp, Float64]:
+    """Return the warp by a rendered image of the grid, and the true rotation R_S_C."""
+    display = example_rig().eyes["left"]
+    T_E_C = rigid([0.03, -0.02, 0.05], [0.002, -0.001, 0.001])
+    rng = np.random.default_rng(3)
+    with TemporaryDirectory() as folder:
+        seen = photograph_display(
+            draw_grid(GRID), display, T_E_C[:3, :3], CAMERA, rng, shift_m=T_E_C[:3, 3]
+        )
+        write_png(Path(folder, "grid.png"), seen)
+        warp = display_warp(Path(folder), CAMERA, GRID)
+    assert warp is not None
+    # Steps of one pixel across and down on the display, as an eye at the camera's place sees it.
+    steps = np.linalg.inv(eye_projection(display, T_E_C[:3, 3])[:, :3])
+    x, y = (steps[:, axis] / np.linalg.norm(steps[:, axis]) for axis in range(2))
+    away = np.cross(x, y)
+    u, _, vt = np.linalg.svd(np.column_stack([x, y, away / np.linalg.norm(away)]))
+    R_E_S = u @ vt
+    return warp, R_E_S.T @ T_E_C[:3, :3]
+
+
+def test_the_live_view_is_within_a_pixel_of_the_rendered_truth() -> None:
+    warp, R_S_C = turned_view()
+    seen = painter().paint(T_E_T, np.random.default_rng(4))
+    found = find_cube(warp.warp(seen), CUBE)
+    corners_m = transform(rigid(R_S_C) @ T_E_T, marker_corners_m(CUBE, found))
+    true_px = image_points(corners_m, replace(CAMERA, distortion=()))
+    off_px = np.linalg.norm(np.concatenate([*found.values()]) - true_px, axis=1)
+    assert len(off_px) == 12
+    assert off_px.max() < 1.0
+
+
+def test_a_live_view_of_25_frames_a_second_leaves_most_of_a_processor() -> None:
+    """40 ms of processor time a frame are there; the warp takes 5 on a slow one."""
+    warp = RotationWarp(VIEWPOINT_CAMERA, rigid([0.03, -0.02, 0.05])[:3, :3])
+    frame = np.zeros((720, 1280, 3), np.uint8)
+    warp.warp(frame)
+    begin_s = time.process_time()
+    for _ in range(10):
+        warp.warp(frame)
+    assert (time.process_time() - begin_s) / 10 < 0.04
+
+
+def test_without_the_grid_there_is_no_turned_view(tmp_path: Path) -> None:
+    assert display_warp(tmp_path / "none", CAMERA, GRID) is None

@@ -8,11 +8,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CameraError
@@ -20,16 +21,19 @@ from handcal.geometry import rigid
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import write_cube
 from handcal.rig.example import example_rig
+from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.types import Intrinsics, UInt8
 from handcal_gui.evaluation_entries import CubeEntries
+from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
 from handcal_gui.windows.evaluation.capture_list import CaptureList
 
 Kind = TypeVar("Kind", bound=QWidget)
+GRID_CAMERA = Intrinsics(634, 360, 900.0, 900.0, 316.5, 179.5, ())
 
 
 @lru_cache(maxsize=1)
@@ -217,3 +221,40 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
     technician.wait(lambda: technician.said == "It was unplugged.")
     assert not technician.button.isEnabled()
     technician.start()
+
+
+def test_captures_at_rest_are_taken_by_themselves_and_the_view_is_turned(
+    make: Callable[[CubeEntries], Technician], entries: CubeEntries
+) -> None:
+    write_intrinsics(Path(entries.captures, "camera.json"), GRID_CAMERA, "json")
+    technician = make(entries)
+    technician.camera.image = cv2.resize(grid_seen(), (634, 360), interpolation=cv2.INTER_AREA)
+    technician.start()
+    view = technician.live.findChild(ImageView)
+    assert isinstance(view, ImageView)
+    technician.wait(lambda: view.caption.endswith("capture the display's grid first"))
+    by_itself = technician.dialog.findChild(QCheckBox, "byItself")
+    assert isinstance(by_itself, QCheckBox)
+    by_itself.setChecked(True)
+    technician.wait_for_instruction("centre/pose-1: switch the display off.")
+    technician.wait(lambda: view.caption == "Turned to the display's axes")
+    technician.wait(lambda: technician.said.startswith("Waiting: "))
+    technician.camera.image = cube_seen()  # of another size than the intrinsics
+    technician.wait_for_instruction("centre/pose-1: show the virtual cube, cover the real one.")
+    assert "640×360" in view.caption
+
+
+def test_the_large_view_shows_the_image_alone_until_escape(
+    make: Callable[[CubeEntries], Technician], entries: CubeEntries
+) -> None:
+    technician = make(entries)
+    technician.start()
+    large = technician.dialog.findChild(QCheckBox, "largeView")
+    assert isinstance(large, QCheckBox)
+    large.setChecked(True)
+    assert not technician.list.isVisible()
+    assert not technician.dialog.form.isVisible()
+    assert technician.live.isVisible()
+    QTest.keyClick(technician.dialog, Qt.Key.Key_Escape)
+    assert technician.dialog.isVisible()
+    assert technician.list.isVisible()

@@ -4,22 +4,28 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QTreeWidget, QTreeWidgetItem
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTreeWidget, QTreeWidgetItem
 from pytestqt.qtbot import QtBot
 
+from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import WorstView
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.coverage_map import CoverageMap
-from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.images_panel import Drawing, ImagesPanel
 from handcal_gui.windows.rig.solve import SolvedPart
+from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
+
+PAGES = "setup-stereo", "setup-viewpoint", "setup-display", "setup-board"
 
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> Iterator[ImagesPanel]:
-    panel = ImagesPanel(("Depth camera", "Headset camera"), "Take some.")
+    panel = ImagesPanel(("Depth camera", "Headset camera"), "Take some.", "setup-stereo")
     qtbot.addWidget(panel)
     panel.resize(1000, 420)
     panel.show()
@@ -130,3 +136,46 @@ def test_what_was_left_out_of_other_images_is_forgotten(
         full.look(folders, photographs.work.board, before)
     qtbot.waitUntil(lambda: not full.bar.is_busy, timeout=20_000)
     assert full.dropped_of(before) == ()
+
+
+def test_the_drawing_is_shown_without_images_and_on_request(
+    qtbot: QtBot, panel: ImagesPanel, photographs: Any
+) -> None:
+    drawing, arrange = panel.findChild(Drawing), panel.findChild(QPushButton, "arrangement")
+    assert isinstance(drawing, Drawing)
+    assert isinstance(arrange, QPushButton)
+    assert drawing.isVisible()
+    image = drawing.grab().toImage()
+    shades = {image.pixel(x, y) for x in range(0, image.width(), 3) for y in range(0, 200, 3)}
+    assert len(shades) > 3
+    look(panel, photographs)
+    qtbot.waitUntil(lambda: not panel.bar.is_busy and not drawing.isVisible(), timeout=20_000)
+    arrange.setChecked(True)
+    assert drawing.isVisible()
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_every_step_has_a_drawing(qtbot: QtBot, page: str) -> None:
+    drawing = Drawing(f"docs/pictures/{page}.svg")
+    qtbot.addWidget(drawing)
+    assert drawing.is_readable
+
+
+def test_the_uncertainty_of_a_solved_camera_is_shown(qtbot: QtBot, panel: ImagesPanel) -> None:
+    sigma_px = np.full((9, 12), 0.1)
+    sigma_px[0, 0], sigma_px[0, 1] = 2.0, np.nan
+    found = ProjectionUncertainty(sigma_px, 0.1, 0.9)
+    panel.show_solved(
+        SolvedPart(CalibrationVerdict("good", ""), (), {}, uncertainties=(found, None))
+    )
+    shown_map = panel.findChild(QComboBox, "map")
+    assert isinstance(shown_map, QComboBox)
+    shown_map.setCurrentIndex(1)
+    maps = panel.findChildren(UncertaintyMap)
+    assert [one.caption for one in maps] == ["Depth camera: ± 0.10, 0.90 px", "Headset camera: –"]
+    assert all(one.isVisible() for one in maps)
+    assert not any(one.isVisible() for one in panel.findChildren(CoverageMap))
+    image = maps[0].grab().toImage()
+    top = maps[0].height() - 120 + 4
+    uncertain, known = (QColor(image.pixel(x, top)).lightness() for x in (6, 34))
+    assert uncertain < known

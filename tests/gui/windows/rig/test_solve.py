@@ -73,6 +73,13 @@ def test_the_viewpoint_camera_is_kept_in_a_file(photographs: Any, tmp_path: Path
     assert solved.add_to is None
     assert read_intrinsics(output).fx == pytest.approx(photographs.viewpoint.fx, rel=0.003)
     assert solved.rows[1].label == "fx"
+    (uncertainty,) = solved.uncertainties
+    assert uncertainty is not None
+    compared = solve_viewpoint(
+        shots_of(photographs, "viewpoint"), replace(entries, lens="auto"), output
+    )
+    assert "of none " in compared.lenses
+    assert "radial" in compared.lenses
 
 
 def test_too_few_images_are_told(photographs: Any, tmp_path: Path) -> None:

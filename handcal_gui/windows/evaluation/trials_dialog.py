@@ -1,0 +1,286 @@
+"""A dialog for the user test's trials with a cube in the room (Hu et al. 2021)."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from handcal.camera.camera import Camera
+from handcal.camera.realsense import RealSenseCamera
+from handcal.errors import HandcalError
+from handcal.link.pairing import Pairings, pairing_file
+from handcal.link.server import HeadsetServer
+from handcal.progress import Progress
+from handcal.session.trial import Trial
+from handcal.station.doctor import Finding, Health
+from handcal.station.user_test import StudyLeader, TrialOrder, record_user_trials
+from handcal.types import Eye, Float64
+from handcal_gui.evaluation_entries import UserEntries
+from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import button, choice, main_button, paragraph, with_name
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.evaluation.preparation import PreparationDialog
+
+STEP_M = 0.00025
+_POLL_S, _PATIENCE_S = 0.1, 120.0
+_MOVES: dict[str, tuple[str, int, int, int, Qt.Key]] = {
+    # text; row and column; axis of φ, from 1, with its sign; key. The drawing of something nearer
+    # than the virtual image moves against the eye.
+    "up": ("Up", 0, 1, 2, Qt.Key.Key_Up),
+    "left": ("Left", 1, 0, 1, Qt.Key.Key_Left),
+    "right": ("Right", 1, 2, -1, Qt.Key.Key_Right),
+    "down": ("Down", 2, 1, -2, Qt.Key.Key_Down),
+    "larger": ("Larger", 0, 3, 3, Qt.Key.Key_Plus),
+    "smaller": ("Smaller", 2, 3, -3, Qt.Key.Key_Minus),
+}
+Record: TypeAlias = Callable[..., tuple[Trial, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A request to the study leader."""
+
+    text: str
+    button: str
+    is_adjusting: bool = False
+
+
+class _Desk:
+    """Passes requests of the trials' thread to the dialog, and the answers back."""
+
+    def __init__(self, tell: Callable[[_Step], object], progress: Progress) -> None:
+        self.answers: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._tell, self._progress = tell, progress
+
+    @property
+    def leader(self) -> StudyLeader:
+        """The study leader behind the dialog."""
+        return StudyLeader(self._place, self._adjust)
+
+    def _place(self, depth_m: float) -> None:
+        self._tell(
+            _Step(
+                f"Put the cube {depth_m:g} m from the eyes, two or three faces towards them.",
+                "It is there",
+            )
+        )
+        while self._answer():
+            pass
+
+    def _adjust(self, eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
+        self._tell(
+            _Step(
+                f"{eye.capitalize()} eye: move the drawn corners until they cover the cube's.",
+                "They coincide",
+                is_adjusting=True,
+            )
+        )
+        shift_m = shift_m.copy()
+        while move := self._answer():
+            shift_m[abs(move) - 1] += STEP_M * (1 if move > 0 else -1)
+            draw(shift_m)
+        return shift_m
+
+    def _answer(self) -> int:
+        """Return the next move, or 0 if the step is done."""
+        while True:
+            self._progress.check()
+            try:
+                return self.answers.get(timeout=_POLL_S)
+            except queue.Empty:
+                continue
+
+
+class TrialsDialog(PreparationDialog):
+    """Leads through the trials of one session: place the cube, adjust φ, for each eye.
+
+    Parameters
+    ----------
+    entries : UserEntries
+        With the session.
+    record : callable
+        Like `record_user_trials`.
+
+    Attributes
+    ----------
+    told : Signal(object)
+        The next request to the study leader, from the trials' thread.
+    """
+
+    told = Signal(object)
+
+    def __init__(
+        self,
+        entries: UserEntries,
+        parent: QWidget | None = None,
+        record: Record = record_user_trials,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("trialsDialog")
+        self.setWindowTitle("Record trials")
+        self.entries = entries
+        self._record = record
+        self._desk: _Desk | None = None
+        self._step: _Step | None = None
+        self.form = EntriesForm(
+            {
+                "headset": (
+                    "Headset",
+                    choice(
+                        "headset",
+                        "Headset",
+                        {"network": "Paired headset, RealSense", "virtual": "Simulator"},
+                        "The simulator needs a session of a simulated wearer, who adjusts φ.",
+                    ),
+                ),
+                "cube": (
+                    "Cube",
+                    PathField("Cube", "file", "Cubes (*.json)", "60 mm, as printed by default"),
+                ),
+            }
+        )
+        self.form.show_entries(entries)
+        self._instruction = paragraph("instruction")
+        self._found = FindingLine("trials")
+        self._bar = JobBar()
+        self._start = button("start", "Start")
+        self._next = main_button("next", "They coincide")
+        self._next.setMinimumWidth(self._next.sizeHint().width())
+        self._close = button("close", "Close")
+        self._table = NumberTable("Trials recorded")
+        self._moves = {
+            name: button(name, text, help_text=f"{text} ({1e3 * STEP_M:g} mm of φ)")
+            for name, (text, *_) in _MOVES.items()
+        }
+        self.told.connect(self._show_step)
+        self.form.changed.connect(self._keep)
+        self._start.clicked.connect(self.start)
+        self._next.clicked.connect(partial(self._answer, 0))
+        for name, move in self._moves.items():
+            *_, axis, key = _MOVES[name]
+            move.setShortcut(key)
+            move.clicked.connect(partial(self._answer, axis))
+        self._close.clicked.connect(self.accept)
+        self._bar.failed.connect(self._show_failure)
+        self._bar.busy_changed.connect(self._refresh)
+        self._lay_out()
+        self._found.show_finding(
+            Finding("", Health.LIMITED, f"trials will be stored in {entries.sessions}")
+        )
+        self._refresh()
+
+    def start(self) -> None:
+        """Connect, and begin with the first distance."""
+        entries = self.entries
+        order = TrialOrder(
+            Path(entries.sessions).expanduser(),
+            Path(entries.cube).expanduser() if entries.cube else None,
+        )
+        connect = None if entries.headset == "virtual" else _paired_headset
+
+        def work(progress: Progress) -> object:
+            self._desk = desk = _Desk(self.told.emit, progress)
+            return self._record(order, connect, _depth_camera, desk.leader, progress)
+
+        self._table.show_rows(("px", "′"), ())
+        self._bar.run("Waiting for the headset", work, self._show_trials)
+
+    def done(self, result: int) -> None:
+        """Cancel the trials, and close."""
+        self._bar.stop()
+        super().done(result)
+
+    def _answer(self, move: int) -> None:
+        if self._desk is not None and self._step is not None:
+            if move == 0:
+                self._step = None
+                self._refresh()
+            self._desk.answers.put(move)
+
+    def _show_step(self, step: _Step) -> None:
+        if self._bar.is_busy:
+            self._step = step
+            self._refresh()
+
+    def _show_trials(self, trials: tuple[Trial, ...]) -> None:
+        self._step = None
+        self._table.show_rows(
+            ("px", "′"),
+            [
+                Row(
+                    f"{trial.eye}, {trial.target_depth_m:g} m",
+                    (f"{trial.error_px.mean():.1f}", f"{trial.error_arcmin.mean():.1f}"),
+                    "Mean over the four corners.",
+                )
+                for trial in trials
+            ],
+        )
+        self._found.show_finding(Finding("", Health.GOOD, f"trials stored: {len(trials)}"))
+        self._refresh()
+
+    def _show_failure(self, why: str) -> None:
+        self._step = None
+        self._found.show_finding(Finding("", Health.BROKEN, why))
+        self._refresh()
+
+    def _keep(self) -> None:
+        self.entries = self.form.take(self.entries)
+
+    def _refresh(self) -> None:
+        step = self._step if self._bar.is_busy else None
+        self.form.setEnabled(not self._bar.is_busy)
+        self._start.setEnabled(not self._bar.is_busy)
+        self._next.setEnabled(step is not None)
+        for move in self._moves.values():
+            move.setEnabled(step is not None and step.is_adjusting)
+        self._next.setText("They coincide" if step is None else step.button)
+        self._instruction.setText("" if step is None else step.text)
+
+    def _lay_out(self) -> None:
+        scale_font(self._instruction, 1.6, is_bold=True)
+        self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
+        pad = with_name(QWidget(), "moves", "Moves of φ")
+        grid = QGridLayout(pad)
+        grid.setContentsMargins(0, 0, 0, 0)
+        for name, move in self._moves.items():
+            _, row, column, *_ = _MOVES[name]
+            grid.addWidget(move, row, column)
+        foot = hbox(self._start, self._next, (self._bar, 1), self._close, spacing=SPACING_PX)
+        vbox(
+            self.form,
+            self._instruction,
+            pad,
+            (self._table, 1),
+            self._found,
+            foot,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=SPACING_PX,
+        )
+
+
+@contextmanager
+def _paired_headset() -> Iterator[HeadsetServer]:
+    pairings = Pairings.read(pairing_file())
+    if not pairings.all:
+        raise HandcalError("no headset is paired; pair one with Connect a headset")
+    with HeadsetServer(pairings, ("0.0.0.0", 47800)) as server:  # noqa: S104
+        server.wait_connected(_PATIENCE_S)
+        yield server
+
+
+def _depth_camera() -> AbstractContextManager[Camera]:
+    return RealSenseCamera()

@@ -1,0 +1,187 @@
+"""A dialog that accepts a rig without a wearer: images taken live, and the page with the result."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QDialog, QGridLayout, QLabel, QWidget
+
+from handcal.errors import HandcalError
+from handcal.io.images import IMAGE_SUFFIXES
+from handcal.progress import Progress
+from handcal.rig.accept import FEWEST_VIEWS
+from handcal.rig.acceptance import Acceptance, AcceptanceSettings, run_acceptance, view_rows
+from handcal.rig.assemble import screen_of
+from handcal.rig.board import Board
+from handcal.rig.choose import ALIKE, ChooseSettings
+from handcal.rig.grid import grid_on
+from handcal.rig.rig_file import write_rig
+from handcal.station.doctor import Finding, Health
+from handcal.types import EYES, Eye
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.windows.rig.images_panel import Drawing
+from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.take_dialog import TakeDialog
+
+_HOW = (
+    "For each eye, put the viewpoint camera behind its display. Take the grid in a dark room. Do "
+    "not move camera or headset; switch the display off, and take the board with both cameras at "
+    f"{FEWEST_VIEWS} or more distances, 0.35 to 0.65 m."
+)
+_COLUMNS = ("Corners", "Mean, ′", "Largest, ′")
+
+
+class AcceptDialog(QDialog):
+    """Takes the images of an acceptance, and shows if the rig passes.
+
+    Parameters
+    ----------
+    project : RigProject
+        Images and page are stored in the folder ``accept`` of the project's.
+    """
+
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("acceptDialog")
+        self.setWindowTitle("Accept the rig")
+        self._project = project
+        self._folder = project.folder.path / "accept"
+        self._page: Path | None = None
+        self._counts = {eye: QLabel() for eye in EYES}
+        self._found = FindingLine("accepted")
+        self._table = NumberTable("Drawn against seen")
+        self._bar = JobBar()
+        self._run = main_button("runAcceptance", "Accept")
+        self._open = button("openPage", "Open page")
+        self._close = button("close", "Close")
+        self._run.clicked.connect(self.run)
+        self._open.clicked.connect(self._open_page)
+        self._close.clicked.connect(self.accept)
+        self._bar.failed.connect(
+            lambda why: self._found.show_finding(Finding("", Health.BROKEN, why))
+        )
+        self._bar.busy_changed.connect(self._refresh)
+        self._lay_out()
+        self._refresh()
+        self._found.show_finding(Finding("", Health.LIMITED, "not accepted yet"))
+
+    def run(self) -> None:
+        """Evaluate the eyes that have images."""
+        project, folder = self._project, self._folder
+        settings = AcceptanceSettings(
+            folder,
+            folder / "rig.yaml",
+            folder / "page",
+            project.inputs.board,
+            project.inputs.left.square_px,
+            self._eyes,
+            project.camera_file,
+        )
+        rig = project.rig
+
+        def work(progress: Progress) -> object:
+            write_rig(settings.rig, rig)
+            return run_acceptance(settings, progress)
+
+        self._bar.run("Looking for grid and board", work, self._show)
+
+    def done(self, result: int) -> None:
+        """Cancel the evaluation, and close."""
+        self._bar.stop()
+        super().done(result)
+
+    @property
+    def _eyes(self) -> tuple[Eye, ...]:
+        return tuple(eye for eye in EYES if self._count(eye, "grid"))
+
+    def _count(self, eye: Eye, what: str) -> int:
+        folder = self._folder / eye / what
+        if not folder.is_dir():
+            return 0
+        return sum(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
+
+    def _take(self, eye: Eye, what: str) -> None:
+        project = self._project
+        board, choose = project.inputs.board, ChooseSettings()
+        folders = {
+            "Viewpoint camera": self._folder / eye / "viewpoint",
+            "Depth camera": self._folder / eye / "depth",
+        }
+        if what == "grid":
+            try:
+                board, choose = self._grid_board(eye), ALIKE
+            except HandcalError as error:
+                self._found.show_finding(Finding("", Health.BROKEN, str(error)))
+                return
+            folders = {"Viewpoint camera": self._folder / eye / "grid"}
+        dialog = TakeDialog(folders, board, choose, project.realsense, self)
+        dialog.finished.connect(self._refresh)
+        dialog.open()
+
+    def _grid_board(self, eye: Eye) -> Board:
+        screen = screen_of(self._project.rig, eye)
+        square_px = self._project.inputs.left.square_px
+        return grid_on(screen.width_px, screen.height_px, square_px).board
+
+    def _show(self, found: Acceptance) -> None:
+        self._page = found.files[-1]
+        rows = [
+            Row(f"{eye}, {depth_m} m", tuple(numbers))
+            for eye, one in found.eyes.items()
+            for depth_m, *numbers in view_rows(one)
+        ]
+        self._table.show_rows(_COLUMNS, rows)
+        if found.cause:
+            finding = Finding("", Health.BROKEN, f"the rig fails: {found.cause}")
+        else:
+            finding = Finding("", Health.GOOD, f"the rig passes: {', '.join(found.eyes)}")
+        if found.left_out:
+            name, why = next(iter(found.left_out.items()))
+            words = f"{len(found.left_out)} left out, such as {name}: {why}"
+            finding = Finding("", finding.health, finding.found, words)
+        self._found.show_finding(finding)
+        self._refresh()
+
+    def _open_page(self) -> None:
+        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._page)))
+
+    def _refresh(self) -> None:
+        for eye, shown in self._counts.items():
+            grids, pairs = self._count(eye, "grid"), self._count(eye, "viewpoint")
+            shown.setText(f"{grids} of the grid, {pairs} of the board")
+        self._run.setEnabled(bool(self._eyes) and not self._bar.is_busy)
+        self._open.setEnabled(self._page is not None)
+
+    def _lay_out(self) -> None:
+        images = QGridLayout()
+        images.setHorizontalSpacing(2 * SPACING_PX)
+        for row, eye in enumerate(EYES):
+            images.addWidget(QLabel(f"{eye.capitalize()} eye"), row, 0)
+            for column, what in enumerate(("grid", "board"), 1):
+                take = button(f"{eye}-{what}", f"Take {what}…", f"Take {what}, {eye} eye")
+                take.clicked.connect(partial(self._take, eye, what))
+                images.addWidget(take, row, column)
+            images.addWidget(self._counts[eye], row, 3)
+        images.setColumnStretch(3, 1)
+        drawing = Drawing("docs/pictures/setup-accept.svg")
+        drawing.setMinimumHeight(20 * SPACING_PX)
+        foot = hbox(self._run, (self._bar, 1), self._open, self._close, spacing=SPACING_PX)
+        vbox(
+            paragraph("how", _HOW),
+            (drawing, 1),
+            images,
+            self._found,
+            (self._table, 1),
+            foot,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=SPACING_PX,
+        )

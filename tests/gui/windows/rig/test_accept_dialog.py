@@ -1,0 +1,75 @@
+"""The acceptance in the window, on rendered images in place of cameras."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.camera.settings import RealSenseSettings
+from handcal.rig.formats import write_intrinsics
+from handcal.sim.acceptance import write_acceptance
+from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
+from handcal_gui.windows.rig.accept_dialog import AcceptDialog
+from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
+from handcal_gui.windows.rig.take_dialog import TakeDialog
+
+Kind = TypeVar("Kind", bound=QWidget)
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> RigProject:
+    project = RigProject(ProjectFolder(tmp_path / "project"), RealSenseSettings())
+    camera = tmp_path / "viewpoint.json"
+    write_intrinsics(camera, VIEWPOINT_CAMERA, "json")
+    project.enter(board=BOARD, viewpoint=ViewpointEntries(intrinsics=str(camera)))
+    return project
+
+
+@pytest.fixture
+def dialog(qtbot: QtBot, project: RigProject) -> Iterator[AcceptDialog]:
+    dialog = AcceptDialog(project)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    yield dialog
+    dialog.reject()
+
+
+def part(dialog: QWidget, kind: type[Kind], name: str) -> Kind:
+    found = dialog.findChild(kind, name)
+    assert isinstance(found, kind)
+    return found
+
+
+def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> None:
+    assert not part(dialog, QPushButton, "runAcceptance").isEnabled()
+    part(dialog, QPushButton, "left-board").click()
+    taking = part(dialog, TakeDialog, "takeDialog")
+    assert {"Viewpoint camera", "Depth camera"} <= {
+        label.text() for label in taking.findChildren(QLabel)
+    }
+    taking.reject()
+
+
+def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> None:
+    folder = project.folder.path / "accept"
+    write_acceptance(folder, project.rig, 6, np.random.default_rng(1), samples=1)
+    shutil.rmtree(folder / "right")
+    (folder / "left" / "grid").mkdir()
+    (folder / "left" / "grid.png").rename(folder / "left" / "grid" / "grid-001.png")
+    dialog = AcceptDialog(project)
+    qtbot.addWidget(dialog)
+    part(dialog, QPushButton, "runAcceptance").click()
+    found = part(dialog, QLabel, "acceptedFound")
+    qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
+    table = part(dialog, QTableWidget, "drawn-against-seen")
+    assert table.rowCount() >= 5
+    assert (folder / "page" / "report.html").exists()
+    dialog.reject()
