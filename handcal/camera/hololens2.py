@@ -1,0 +1,187 @@
+"""Frames from a HoloLens 2's own depth camera, which tell the headset's pose."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+
+from handcal.camera.hl2ss import (
+    CALIBRATION_REQUEST,
+    STREAMS,
+    Hl2ssConnection,
+    Stream,
+    parse_calibration,
+    parse_packet,
+)
+from handcal.camera.radial import DEPTH_SCALE_M, PinholeView, is_not_wrapped, white_brightness
+from handcal.camera.settings import HoloLens2Settings
+from handcal.errors import CameraError, CameraTimeoutError
+from handcal.io.closable import Closable
+from handcal.types import CameraIdentity, Float32, Float64, Frame, UInt8
+
+PREFIX = "hololens2:"
+_LONG_THROW = ",longthrow"
+_CALIBRATION_S = 10.0
+_POLL_S = 0.2
+_SHOWN_M = 0.3
+"""Distance at which a white surface is white in the grey image."""
+
+
+def hololens2_settings(source: str) -> HoloLens2Settings | None:
+    """Return the settings that a source's name stands for; None if it is another camera's.
+
+    The name is ``hololens2:HOST``, or ``hololens2:HOST,longthrow`` for the other depth camera.
+    """
+    if not source.startswith(PREFIX):
+        return None
+    host = source.removeprefix(PREFIX)
+    if host.endswith(_LONG_THROW):
+        return HoloLens2Settings(host.removesuffix(_LONG_THROW), "longthrow")
+    return HoloLens2Settings(host)
+
+
+class HoloLens2Camera(Closable):
+    """Depth of a HoloLens 2, streamed by hl2ss; implements `Camera`.
+
+    The view is resampled to a pinhole camera's; `Frame.color` is the brightness of the camera's own
+    light in grey, aligned with depth. Written from hl2ss's sources and tested on a server of its
+    format; not yet run on a device.
+
+    Parameters
+    ----------
+    settings : HoloLens2Settings
+
+    Attributes
+    ----------
+    T_H_D : (4, 4) float64
+        From the depth camera to the headset's rig node, by the factory's calibration.
+
+    Raises
+    ------
+    CameraError
+        If no hl2ss answers at the address, or not as it should.
+    """
+
+    def __init__(self, settings: HoloLens2Settings) -> None:
+        if not settings.host:
+            raise CameraError(f"say which HoloLens 2: {PREFIX}ADDRESS, as its settings show it")
+        self._stream = STREAMS[settings.stream]
+        self.identity = CameraIdentity(f"HoloLens 2 {self._stream.name}")
+        self.name = f"{self.identity.model} at {settings.host}"
+        port = settings.port or self._stream.port
+        with Hl2ssConnection(settings.host, port, CALIBRATION_REQUEST) as connection:
+            data = connection.receive(self._stream.calibration_bytes, _CALIBRATION_S)
+        self._calibration = parse_calibration(self._stream, data)
+        self.T_H_D: Float64 = self._calibration.T_H_D
+        self._view = PinholeView(self._calibration.rays)
+        self.depth_intrinsics = self._view.intrinsics
+        self._white = 0.0
+        request = self._stream.request(settings.divisor)
+        self._newest = _Newest(Hl2ssConnection(settings.host, port, request), self._stream)
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        """Return the newest frame since the last one; see `Camera.read`."""
+        index, t_host_ns, data = self._newest.take(self.name, timeout_s)
+        packet = parse_packet(self._stream, data)
+        if packet.T_W_H is None:
+            raise CameraTimeoutError(
+                f"{self.name} does not know where it is; look around in a lit room"
+            )
+        distance_m: Float32 = packet.distance.astype(np.float32)
+        distance_m /= np.float32(self._calibration.units_per_m)
+        brightness = packet.brightness.astype(np.float32)
+        self._white = max(self._white, white_brightness(distance_m, brightness))
+        distance_m = self._without_wrapped(distance_m, brightness)
+        return Frame(
+            index=index,
+            t_camera_ns=packet.t_ns,
+            t_host_ns=t_host_ns,
+            depth=self._view.depth(distance_m),
+            depth_scale_m=DEPTH_SCALE_M,
+            depth_intrinsics=self.depth_intrinsics,
+            color=self._grey(brightness),
+            color_intrinsics=self.depth_intrinsics,
+            T_W_H=packet.T_W_H,
+        )
+
+    def close(self) -> None:
+        """End the stream; safe to call twice."""
+        self._newest.close()
+
+    def _without_wrapped(self, distance_m: Float32, brightness: Float32) -> Float32:
+        alias_m = self._calibration.alias_m
+        if alias_m is None:
+            return distance_m
+        is_near = is_not_wrapped(distance_m, brightness, alias_m, self._white)
+        return np.where(is_near, distance_m, np.float32(0.0))
+
+    def _grey(self, brightness: Float32) -> UInt8:
+        seen = self._view.image(brightness)
+        share = seen * np.float32(_SHOWN_M**2 / max(self._white, 1.0))
+        grey = 255.0 * np.sqrt(np.clip(share, 0.0, 1.0))
+        return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
+
+
+class _Newest(Closable):
+    """The newest packet of a stream, received by a thread of its own: older ones are dropped."""
+
+    def __init__(self, connection: Hl2ssConnection, stream: Stream) -> None:
+        self._connection = connection
+        self._stream = stream
+        self._packet: tuple[int, int, bytes] | None = None
+        self._error: CameraError | None = None
+        self._is_closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._receive, name="hl2ss", daemon=True)
+        self._thread.start()
+
+    def take(self, name: str, timeout_s: float) -> tuple[int, int, bytes]:
+        """Return number, time of arrival on the host's clock, and data of the newest packet.
+
+        Raises
+        ------
+        CameraTimeoutError
+            If there is no new one in time.
+        CameraError
+            If the stream has ended.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._packet or self._error or self._is_closed, timeout_s
+            )
+            if self._is_closed:
+                raise CameraError(f"{name} is closed; open it again")
+            if self._packet is not None:
+                packet, self._packet = self._packet, None
+                return packet
+            if self._error is not None:
+                raise self._error
+        raise CameraTimeoutError(
+            f"{name} sent no image for {timeout_s:g} s; put the headset on, and keep hl2ss running"
+        )
+
+    def close(self) -> None:
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+        self._connection.close()
+        self._thread.join()
+
+    def _receive(self) -> None:
+        number = 0
+        while not self._is_closed:
+            try:
+                data = self._connection.receive_packet(self._stream, _POLL_S)
+            except CameraTimeoutError:
+                continue
+            except CameraError as error:
+                with self._changed:
+                    self._error = error
+                    self._changed.notify_all()
+                return
+            number += 1
+            with self._changed:
+                self._packet = number, time.monotonic_ns(), data
+                self._changed.notify_all()
