@@ -42,6 +42,11 @@ def hololens2_settings(source: str) -> HoloLens2Settings | None:
     return HoloLens2Settings(host)
 
 
+def identity_of(settings: HoloLens2Settings) -> CameraIdentity:
+    """Return the camera's identity; hl2ss does not tell the headset's serial number."""
+    return CameraIdentity(f"HoloLens 2 {STREAMS[settings.stream].name}")
+
+
 class HoloLens2Camera(Closable):
     """Depth of a HoloLens 2, streamed by hl2ss; implements `Camera`.
 
@@ -68,7 +73,7 @@ class HoloLens2Camera(Closable):
         if not settings.host:
             raise CameraError(f"say which HoloLens 2: {PREFIX}ADDRESS, as its settings show it")
         self._stream = STREAMS[settings.stream]
-        self.identity = CameraIdentity(f"HoloLens 2 {self._stream.name}")
+        self.identity = identity_of(settings)
         self.name = f"{self.identity.model} at {settings.host}"
         port = settings.port or self._stream.port
         with Hl2ssConnection(settings.host, port, CALIBRATION_REQUEST) as connection:

@@ -67,7 +67,11 @@ _ROI = arg(
 
 @command(
     arg("output", type=Path, help="a .db3 file, or a new folder"),
-    arg("--source", default="realsense", help="realsense, simulator, or a recording to convert"),
+    arg(
+        "--source",
+        default="realsense",
+        help="realsense, hololens2:HOST, simulator, or a recording to convert",
+    ),
     arg(
         "--seconds",
         type=number(float, 0.01, 86_400.0),
@@ -190,7 +194,8 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
 
 
 def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Camera:
-    """Open the camera that an option names: realsense, simulator or the path of a recording."""
+    """Open the camera that an option names: of a kind, or the path of a recording."""
+    from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
     from handcal.sim.camera import SyntheticCamera
@@ -205,8 +210,9 @@ def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Cam
             return SyntheticCamera(world, swaying_hand, seed=seed)
         case "realsense":
             return RealSenseCamera(realsense)
-        case path:
-            return open_recording(Path(path))
+        case other:
+            hololens2 = hololens2_settings(other)
+            return open_recording(Path(other)) if hololens2 is None else HoloLens2Camera(hololens2)
 
 
 def _replay_row(step: ReplayStep) -> dict[str, Any]:

@@ -172,8 +172,12 @@ def display(arguments: argparse.Namespace) -> None:
         "--stereo",
         type=Path,
         metavar="FILE",
-        required=True,
         help="JSON from 'handcal rig stereo'",
+    ),
+    arg(
+        "--factory",
+        metavar="SOURCE",
+        help="in place of --stereo: hololens2:HOST, a headset that knows its own depth camera",
     ),
     arg(
         "--depth-intrinsics",
@@ -192,15 +196,22 @@ def display(arguments: argparse.Namespace) -> None:
     *_RIG_AND_OUTPUT,
 )
 def make(arguments: argparse.Namespace) -> None:
-    """Write the depth camera's pose, from a stereo calibration, into a rig file."""
+    """Write the depth camera's pose, by stereo calibration or the factory, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
     from handcal.rig.steps import identity_in, intrinsics_in, pose_in
 
+    if (arguments.stereo is None) == (arguments.factory is None):
+        raise HandcalError("give either --stereo or --factory")
+    rig = _read_rig(arguments.rig)
+    if arguments.factory is not None:
+        rig = _with_factory_pose(rig, arguments.factory)
+        _write(arguments.output, replace(rig, name=arguments.name or rig.name))
+        return
     stereo = read_stereo(arguments.stereo)
     show_verdict(stereo.verdict)
     rig = with_stereo(
-        _read_rig(arguments.rig),
+        rig,
         stereo,
         depth_intrinsics=intrinsics_in(arguments.depth_intrinsics),
         T_C_D=pose_in(arguments.depth_to_color),
@@ -209,8 +220,22 @@ def make(arguments: argparse.Namespace) -> None:
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
 
 
+def _with_factory_pose(rig: Rig, source: str) -> Rig:
+    from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+    from handcal.rig.assemble import with_factory_pose
+
+    settings = hololens2_settings(source)
+    if settings is None:
+        raise HandcalError(f"--factory: a headset is hololens2:HOST, not {source}")
+    with HoloLens2Camera(settings) as camera:
+        return with_factory_pose(rig, camera.T_H_D, camera.depth_intrinsics, camera.identity)
+
+
 @command(
-    arg("source", help="a recording of the board with depth and colour, or realsense"),
+    arg(
+        "source",
+        help="a recording of the board with depth and colour, realsense, or hololens2:HOST",
+    ),
     arg(
         "--stills",
         action="store_true",

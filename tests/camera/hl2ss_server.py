@@ -28,7 +28,7 @@ def calibration_of(
     numbers = [rays[..., 0], rays[..., 1], rig_to_camera, [units_per_m]]
     numbers += [] if alias is None else [[alias]]
     numbers += [np.zeros(rays.size), np.zeros(4)]
-    return np.concatenate([np.ravel(one) for one in numbers]).astype("<f4").tobytes()
+    return np.concatenate([np.ravel(np.asarray(one)) for one in numbers]).astype("<f4").tobytes()
 
 
 def packet_of(ticks: int, payload: bytes, T_W_H: Float64 | None) -> bytes:
