@@ -20,7 +20,7 @@ _LEAST_COVERED = 0.5
 _JUMP_M = 0.02
 _NEAR_M = 0.7
 _SKIN = 0.5
-_LEAST_PIXELS = 200
+_BRIGHT_PIXELS = 1000
 
 
 class PinholeView:
@@ -142,10 +142,11 @@ def white_brightness(distance_m: Float32, brightness: Float32) -> float:
     0 if hardly anything is near.
     """
     is_near = (distance_m > 0.0) & (distance_m < _NEAR_M)
-    if np.count_nonzero(is_near) < _LEAST_PIXELS:
+    if np.count_nonzero(is_near) < _BRIGHT_PIXELS:
         return 0.0
     at_1_m = brightness[is_near] * np.square(distance_m[is_near])
-    return float(np.percentile(at_1_m, 95.0)) / _SKIN
+    # Not a share of them: most may be of a far wall. A few may be of a mirror.
+    return float(np.partition(at_1_m, -_BRIGHT_PIXELS)[-_BRIGHT_PIXELS]) / _SKIN
 
 
 def is_not_wrapped(distance_m: Float32, brightness: Float32, alias_m: float, white: float) -> Bool:

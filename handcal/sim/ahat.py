@@ -10,6 +10,7 @@ middle, as hl2ss's authors measured on a device.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -43,6 +44,7 @@ class AhatSettings:
     """Fault: added to every distance."""
 
 
+@cache
 def ahat_rays() -> Float32:
     """Return the rays (512, 512, 2) of the lens's pixels, in the plane z = 1."""
     side = np.arange(SIDE_PX) - _MIDDLE_PX
@@ -52,7 +54,9 @@ def ahat_rays() -> Float32:
     for _ in range(20):
         angle -= (angle + _CUBIC * angle**3 - radius) / (1.0 + 3.0 * _CUBIC * angle**2)
     growth = np.tan(angle) / np.maximum(radius, 1e-9) / _FOCAL_PX
-    return np.dstack([x * growth, y * growth]).astype(np.float32)
+    rays = np.dstack([x * growth, y * growth]).astype(np.float32)
+    rays.flags.writeable = False
+    return rays
 
 
 def sense_distance(

@@ -13,6 +13,7 @@ import pytest
 from handcal.camera.feed import CameraFeed, FeedSettings
 from handcal.camera.hl2ss import STREAMS, parse_calibration
 from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+from handcal.camera.radial import is_not_wrapped, white_brightness
 from handcal.camera.settings import HoloLens2Settings
 from handcal.errors import CameraError, CameraTimeoutError
 from handcal.geometry import rigid
@@ -100,6 +101,21 @@ def test_depth_is_that_of_a_pinhole_camera(
     assert np.count_nonzero(frame.depth[~is_hand]) < 0.03 * is_hand.sum()
     assert frame.color is not None
     assert frame.color[seen].mean() > 3.0 * frame.color[~is_hand].mean()
+
+
+def test_a_small_hand_tells_a_large_far_wall_apart() -> None:
+    """Most of what seems near is the wall: not it, but the brightest is taken for skin."""
+    distance_m = np.full((512, 512), 1.6 - 1.055, np.float32)
+    brightness = np.full((512, 512), 400.0 * 0.8 / 1.6**2, np.float32)
+    distance_m[200:250, 200:250] = 0.5
+    brightness[200:250, 200:250] = 400.0 * 0.55 / 0.5**2
+    brightness[:5, :5] = 10_000.0  # a mirror
+    white = white_brightness(distance_m, brightness)
+    assert white == pytest.approx(440.0)
+    is_near = is_not_wrapped(distance_m, brightness, 1.055, white)
+    assert is_near[200:250, 200:250].all()
+    assert np.count_nonzero(is_near) == 50 * 50 + 25
+    assert white_brightness(np.zeros_like(distance_m), brightness) == 0.0
 
 
 def test_a_plane_is_flat_up_to_the_sides(serve: Serve) -> None:
